@@ -266,6 +266,9 @@ int settings_parse(const settings_form_t *form, settings_report_t *report, const
     if (result != 0 && report->errors == 0) {
         settings_complain(report, (result > 0) ? (unsigned)result : 0U, "cannot be read; write KEY = VALUE lines");
     }
+    if (report->errors == 0 && form->complete != NULL) {
+        form->complete(values, loader.lines);
+    }
     if (report->errors == 0 && form->relate != NULL) {
         form->relate(report, values, loader.lines);
     }

@@ -53,6 +53,7 @@ typedef struct {
     uint32_t min;
     uint32_t max;
     const char *not_zero;         ///< SETTINGS_NUMBER: why 0 is refused, if it is worth a sentence.
+    const char *rule;             ///< SETTINGS_NUMBER: the rule that bounds the range, named in a refusal; null: none.
     const settings_word_t *words; ///< SETTINGS_WORD: two or more, ends with a null word.
     /// SETTINGS_TEXT: what is wrong with it, as in "TEXT is no socket"; null: nothing.
     const char *(*wrong)(const char *text);
@@ -79,6 +80,8 @@ typedef struct settings_form {
     void (*range)(uint16_t range, uint32_t *out_min, uint32_t *out_max);
     /// Why this key cannot be and what to do, for keys that people look for; null: nothing to say.
     const char *(*hint)(const char *key);
+    /// Fills in what was not given and follows from other values; null: nothing does. `lines` as below.
+    void (*complete)(void *values, const unsigned *lines);
     /// Complains where values do not fit together. `lines` has the line of every row, 0 if it was not given.
     void (*relate)(settings_report_t *report, const void *values, const unsigned *lines);
 } settings_form_t;

@@ -104,7 +104,8 @@ static bool parse_number(const settings_form_t *form, const settings_key_t *row,
         return settings_wrong(out_why, "%s = %s: %s; write %s", row->key, text, row->not_zero, choices);
     }
     if (negative || *out_number < min || *out_number > max) {
-        return settings_wrong(out_why, "%s = %s is out of range; write %s", row->key, text, choices);
+        return settings_wrong(out_why, "%s = %s is out of range%s%s; write %s", row->key, text,
+                              (row->rule != NULL) ? ": " : "", (row->rule != NULL) ? row->rule : "", choices);
     }
     return true;
 }

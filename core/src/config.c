@@ -39,19 +39,19 @@ static const iw_config_range_t ranges[] = {
     {50, 20000},                        // accel_mm_s2
     {100, 20000},                       // decel_mm_s2
     {10, 5000},                         // max_speed_mm_s
-    {0, IW_CURRENT_LIMIT_mA},           // max_current_mA
+    {300, IW_CURRENT_LIMIT_mA},         // max_current_mA
     {1100, 5000},                       // zero_hold_ms
     {20, 200},                          // wheel_silent_ms
     {20, 200},                          // echo_ms
-    {0, 20},                            // rest_rpm
+    {0, 1000},                          // rest_rpm; see check_relations
     {50, 2000},                         // rest_ms
-    {50, 5000},                         // follow_mm_s
-    {100, 5000},                        // follow_ms
-    {200, 10000},                       // blocked_ms
+    {50, 500},                          // follow_mm_s
+    {100, 1000},                        // follow_ms
+    {200, 2000},                        // blocked_ms
     {20, 150},                          // pair_mm
     {500, 3000},                        // pair_leak_ms
     {10, 300},                          // wheel_lag_ms
-    {20, 500},                          // radius_mm
+    {60, 400},                          // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per
     {IW_DLC_SETPOINT, IW_CAN_DATA_MAX}, // setpoint_dlc
@@ -64,12 +64,31 @@ IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (FIELDS - 1U) * 
 #define WATCHDOG_MS (IW_WHEEL_WATCHDOG_US / IW_US_PER_MS)
 #define GEAR_MAX    100U
 
+#define REST_STANDARD_MM_S 45U
+#define REST_MAX_MM_S      60U
+/// 1 rpm at a radius of 1 mm is 0.10472 mm/s: 2618 / 25000.
+#define RPM_TERM  2618U
+#define MM_S_TERM 25000U
+
 static uint32_t divide_up(uint32_t numerator, uint32_t denominator) {
     return (numerator + denominator - 1U) / denominator;
 }
 
 iw_config_range_t iw_config_range(iw_config_fault_t field) {
     return ranges[field - IW_CONFIG_PERIOD];
+}
+
+/// The largest whole rpm of telemetry that is no faster at the wheel.
+static uint32_t slowest_rpm(const iw_config_t *config, uint32_t speed_mm_s) {
+    const uint32_t turns = config->rpm_of_rotor ? config->gear_turns : 1U;
+    const uint32_t per = config->rpm_of_rotor ? config->gear_per : 1U;
+    return speed_mm_s * MM_S_TERM * turns / (RPM_TERM * config->radius_mm * per);
+}
+
+iw_config_rest_t iw_config_rest(const iw_config_t *config) {
+    const uint32_t usual = slowest_rpm(config, REST_STANDARD_MM_S);
+    const iw_config_rest_t rest = {(uint16_t)((usual > 0U) ? usual : 1U), (uint16_t)slowest_rpm(config, REST_MAX_MM_S)};
+    return rest;
 }
 
 void iw_config_default(iw_config_t *out_config) {
@@ -94,6 +113,9 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->gear_turns < config->gear_per || config->gear_turns > GEAR_MAX * config->gear_per) {
         return IW_CONFIG_GEAR_RATIO;
     }
+    if (config->rest_rpm > iw_config_rest(config).max) {
+        return IW_CONFIG_REST_SPEED;
+    }
     return (client_lost_ms(config) > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;
 }
 
@@ -108,14 +130,20 @@ iw_config_fault_t iw_config_check(const iw_config_t *config) {
     return check_relations(config);
 }
 
+/// A way by setpoints, at the configured radius.
+static uint32_t real_mm(const iw_config_t *config, uint32_t way_mm) {
+    return divide_up(way_mm * config->radius_mm, IW_SETPOINT_RADIUS_MM);
+}
+
 iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
     iw_stop_budget_t budget;
     // Worst case: the lease ends right after a pair was sent, at full speed on both wheels. v*v/2a is the ramp's way.
     budget.client_lost_ms = client_lost_ms(config);
-    budget.client_lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
+    const uint32_t lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
+    budget.client_lost_mm = real_mm(config, lost_mm);
     budget.killed_ms = WATCHDOG_MS;
-    budget.killed_mm = divide_up(speed * WATCHDOG_MS, 1000U);
+    budget.killed_mm = real_mm(config, divide_up(speed * WATCHDOG_MS, 1000U));
     return budget;
 }

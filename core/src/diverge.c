@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/diverge.h"
 
-#include "iwheel/private/wheel.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -11,13 +10,13 @@
 /// More time than this between two steps does not count: the steps would be late, and late ones do not compare.
 #define ELAPSED_MAX_US 50000U
 /// No speed and no deviation counts beyond these: far more than is configurable.
-#define SPEED_MAX_UM_S 40000000
-#define PATH_MAX_UM    1000000
+#define MEASURED_MAX_MM_S 40000
+#define PATH_MAX_UM       1000000
 
 void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm) {
     memset(self, 0, sizeof *self);
     self->config = config;
-    self->rpm_um_s = (int32_t)(um_s_per_rpm * (IW_DIVERGE_RADIUS_MM * 7U) / (config->radius_mm * 8U));
+    self->um_s_per_rpm = (int32_t)um_s_per_rpm;
 }
 
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us) {
@@ -35,10 +34,8 @@ static int32_t clamp(int32_t value, int32_t bound) {
     return (value < -bound) ? -bound : value;
 }
 
-/// What was measured, at the radius that the setpoints mean.
 static IW_APART int32_t measured_um_s(const iw_diverge_t *self, size_t side) {
-    const int32_t at_radius = clamp(self->measured_mm_s[side], (int32_t)IW_WHEEL_FASTEST_MM_S);
-    return at_radius * (IW_DIVERGE_RADIUS_MM * 1000) / (int32_t)self->config->radius_mm;
+    return clamp(self->measured_mm_s[side], MEASURED_MAX_MM_S) * 1000;
 }
 
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us) {
@@ -71,7 +68,7 @@ static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t per
 static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     const int32_t expected = self->expected_um_s[side];
     const int32_t difference = measured_um_s(self, side) - expected;
-    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->rpm_um_s;
+    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->um_s_per_rpm * 7 / 8;
     if (iw_magnitude(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
         return 2 * difference;
     }
@@ -82,8 +79,7 @@ static void integrate(iw_diverge_t *self, uint32_t elapsed_us) {
     const iw_config_t *const config = self->config;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t short_of = self->applied_mm_s[side] * 1000 - self->expected_um_s[side];
-        const int32_t next = self->expected_um_s[side] + lagging(short_of, elapsed_us, config->wheel_lag_ms);
-        self->expected_um_s[side] = clamp(next, SPEED_MAX_UM_S);
+        self->expected_um_s[side] += lagging(short_of, elapsed_us, config->wheel_lag_ms);
     }
     const int32_t left = beyond_um_s(self, IW_LEFT);
     const int32_t right = beyond_um_s(self, IW_RIGHT);

@@ -107,13 +107,14 @@ static void look_at_ratio(iw_motion_evidence_wheel_t *self, iw_gateway_t *gatewa
 static void look_at_type(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
                          const iw_snapshot_wheel_t *wheel, int16_t applied) {
     const int32_t measured = wheel->speed_mm_s;
-    const int32_t slack = iw_magnitude(applied) * 15 / 100 + (int32_t)wheel->um_s_per_rpm / 1000 + 1;
-    const bool follows = seen->state == IW_STATE_ARMED && wheel->heard && iw_magnitude(measured - applied) <= slack;
+    const int32_t expected = applied * (int32_t)seen->config->radius_mm / IW_SETPOINT_RADIUS_MM;
+    const int32_t slack = iw_magnitude(expected) * 15 / 100 + (int32_t)wheel->um_s_per_rpm / 1000 + 1;
+    const bool follows = seen->state == IW_STATE_ARMED && wheel->heard && iw_magnitude(measured - expected) <= slack;
     if (iw_magnitude(applied) < IW_EVIDENCE_TYPE_MM_S || !follows || applied != self->applied_mm_s) {
         self->steady_us = seen->at_us;
         self->applied_mm_s = applied;
     } else if (seen->at_us - self->steady_us >= IW_EVIDENCE_TYPE_US) {
-        confirm(gateway, seen, IW_LEDGER_SETPOINT_TYPE, measured * 1000 / applied);
+        confirm(gateway, seen, IW_LEDGER_SETPOINT_TYPE, measured * 1000 / expected);
     }
 }
 

@@ -4,6 +4,11 @@
 #include "iwheel/gateway.h"
 #include "magnitude.h"
 
+int32_t iw_watch_own_mm_s(const iw_gateway_t *self, size_t side) {
+    const int32_t speed_um_s = self->told[side].speed.speed_rpm * self->diverge.um_s_per_rpm;
+    return (self->config.invert[side] ? -speed_um_s : speed_um_s) / 1000;
+}
+
 static void compare(iw_gateway_t *self) {
     iw_diverge_t *const diverge = &self->diverge;
     const iw_diverge_verdict_t verdict = iw_diverge_step(diverge, self->now_us);
@@ -25,7 +30,7 @@ void iw_watch_pair(iw_gateway_t *self, bool heard) {
     iw_diverge_t *const diverge = &self->diverge;
     for (size_t side = 0; side < IW_SIDES; side++) {
         diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
-        diverge->measured_mm_s[side] = self->wheel[side].speed_mm_s;
+        diverge->measured_mm_s[side] = iw_watch_own_mm_s(self, side);
     }
     iw_diverge_begin(diverge, self->permit.armed_us);
     if (has_ended(self) || !heard || self->setpoint.from_zero) {

@@ -189,6 +189,11 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
             why, "lease_ms + period_ms + max_speed_mm_s / decel_mm_s2 exceeds 1000 ms, after which the wheels stop "
                  "by themselves: lower one of the first three, or raise decel_mm_s2");
         return false;
+    case IW_CONFIG_REST_SPEED:
+        IWN_TEXT_JOIN(why, "rest_rpm is more than 60 mm/s at a wheel of this radius and gear: set it to ");
+        iwn_text_int(why, iw_config_rest(&config).standard);
+        IWN_TEXT_JOIN(why, " first");
+        return false;
     case IW_CONFIG_GEAR_RATIO:
         IWN_TEXT_JOIN(why, "gear_ratio must lie within 1 and 100");
         return false;

@@ -21,19 +21,19 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, accel_mm_s2), 50, 20000, IW_CONFIG_ACCEL},
     {offsetof(iw_config_t, decel_mm_s2), 100, 20000, IW_CONFIG_DECEL},
     {offsetof(iw_config_t, max_speed_mm_s), 10, 5000, IW_CONFIG_MAX_SPEED},
-    {offsetof(iw_config_t, max_current_mA), 0, 2000, IW_CONFIG_MAX_CURRENT},
+    {offsetof(iw_config_t, max_current_mA), 300, 2000, IW_CONFIG_MAX_CURRENT},
     {offsetof(iw_config_t, zero_hold_ms), 1100, 5000, IW_CONFIG_ZERO_HOLD},
     {offsetof(iw_config_t, wheel_silent_ms), 20, 200, IW_CONFIG_WHEEL_SILENT},
     {offsetof(iw_config_t, echo_ms), 20, 200, IW_CONFIG_ECHO},
-    {offsetof(iw_config_t, rest_rpm), 0, 20, IW_CONFIG_REST_RPM},
+    {offsetof(iw_config_t, rest_rpm), 0, 1000, IW_CONFIG_REST_RPM},
     {offsetof(iw_config_t, rest_ms), 50, 2000, IW_CONFIG_REST},
-    {offsetof(iw_config_t, follow_mm_s), 50, 5000, IW_CONFIG_FOLLOW_SPEED},
-    {offsetof(iw_config_t, follow_ms), 100, 5000, IW_CONFIG_FOLLOW},
-    {offsetof(iw_config_t, blocked_ms), 200, 10000, IW_CONFIG_BLOCKED},
+    {offsetof(iw_config_t, follow_mm_s), 50, 500, IW_CONFIG_FOLLOW_SPEED},
+    {offsetof(iw_config_t, follow_ms), 100, 1000, IW_CONFIG_FOLLOW},
+    {offsetof(iw_config_t, blocked_ms), 200, 2000, IW_CONFIG_BLOCKED},
     {offsetof(iw_config_t, pair_mm), 20, 150, IW_CONFIG_PAIR},
     {offsetof(iw_config_t, pair_leak_ms), 500, 3000, IW_CONFIG_PAIR_LEAK},
     {offsetof(iw_config_t, wheel_lag_ms), 10, 300, IW_CONFIG_WHEEL_LAG},
-    {offsetof(iw_config_t, radius_mm), 20, 500, IW_CONFIG_RADIUS},
+    {offsetof(iw_config_t, radius_mm), 60, 400, IW_CONFIG_RADIUS},
     {offsetof(iw_config_t, gear_turns), 1, 1000, IW_CONFIG_GEAR_TURNS},
     {offsetof(iw_config_t, gear_per), 1, 1000, IW_CONFIG_GEAR_PER},
     {offsetof(iw_config_t, setpoint_dlc), 5, 8, IW_CONFIG_SETPOINT_DLC},
@@ -61,6 +61,7 @@ static void make_room(uint16_t gear) {
     config.decel_mm_s2 = 20000;
     config.gear_turns = gear;
     config.gear_per = gear;
+    config.rest_rpm = 0;
 }
 
 static void test_default_is_the_documented_one(void) {
@@ -123,6 +124,13 @@ static void test_check_every_value_of_every_field_is_judged_by_its_range(void) {
             make_room((value >= 1 && value <= 1000) ? (uint16_t)value : 1);
             put(&limits[i], (uint16_t)value);
             const iw_config_fault_t fault = iw_config_check(&config);
+            if (limits[i].fault == IW_CONFIG_REST_RPM && value <= 1000) {
+                const iw_config_fault_t rest = (value <= 2) ? IW_CONFIG_OK : IW_CONFIG_REST_SPEED;
+                if (fault != rest) {
+                    TEST_ASSERT_EQUAL_INT(rest, fault);
+                }
+                continue;
+            }
             if (fault != (within ? IW_CONFIG_OK : limits[i].fault)) {
                 TEST_ASSERT_EQUAL_INT(within ? IW_CONFIG_OK : limits[i].fault, fault);
             }
@@ -231,6 +239,83 @@ static void test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more
     }
 }
 
+/// Radius, gear, and what they make of rest_rpm. 1 rpm at 192 mm is 20.106 mm/s.
+static const struct {
+    uint16_t radius_mm;
+    bool rotor;
+    uint16_t turns;
+    uint16_t per;
+    iw_config_rest_t rest;
+} rests[] = {
+    {192, false, 1, 1, {2, 2}},       // 45 / 20.106 = 2.24, 60 / 20.106 = 2.98
+    {60, false, 1, 1, {7, 9}},        // 1 rpm is 6.283 mm/s: 7.16, 9.55
+    {400, false, 1, 1, {1, 1}},       // 41.888 mm/s: 1.07, 1.43
+    {192, false, 27, 2, {2, 2}},      // A gear does not matter where the wheel's turns count ...
+    {192, true, 27, 2, {30, 40}},     // ... and does where the rotor's do: 1.4893 mm/s: 30.2, 40.3
+    {60, true, 1000, 10, {716, 954}}, // 0.062832 mm/s: 716.2, 954.9
+    {400, true, 1000, 1000, {1, 1}},  // As without.
+};
+
+static void set_rest_case(size_t i) {
+    iw_config_default(&config);
+    config.radius_mm = rests[i].radius_mm;
+    config.rpm_of_rotor = rests[i].rotor;
+    config.gear_turns = rests[i].turns;
+    config.gear_per = rests[i].per;
+}
+
+static void test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel(void) {
+    for (size_t i = 0; i < sizeof rests / sizeof rests[0]; i++) {
+        set_rest_case(i);
+        TEST_ASSERT_EQUAL_UINT16(rests[i].rest.standard, iw_config_rest(&config).standard);
+        TEST_ASSERT_EQUAL_UINT16(rests[i].rest.max, iw_config_rest(&config).max);
+        for (uint16_t rpm = 0; rpm <= 1000; rpm++) {
+            config.rest_rpm = rpm;
+            const iw_config_fault_t fault = iw_config_check(&config);
+            const iw_config_fault_t wanted = (rpm <= rests[i].rest.max) ? IW_CONFIG_OK : IW_CONFIG_REST_SPEED;
+            if (fault != wanted) {
+                TEST_ASSERT_EQUAL_INT(wanted, fault);
+            }
+        }
+    }
+}
+
+/// The default is at least 1, and with every radius it is permitted.
+static void test_rest_default_is_permitted_with_every_radius(void) {
+    for (uint16_t radius = 60; radius <= 400; radius++) {
+        config.radius_mm = radius;
+        config.rest_rpm = iw_config_rest(&config).standard;
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT16(1, config.rest_rpm);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+    }
+}
+
+static void test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget(void) {
+    config.decel_mm_s2 = 100;
+    config.rest_rpm = 3;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_REST_SPEED, iw_config_check(&config));
+    config.gear_per = 2;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_GEAR_RATIO, iw_config_check(&config));
+}
+
+/// What a setpoint means is fixed at 192 mm: with another wheel the ways differ, not the times.
+static void test_stop_budget_is_of_the_configured_radius(void) {
+    static const struct {
+        uint16_t radius_mm;
+        uint32_t client_lost_mm;
+        uint32_t killed_mm;
+    } cases[] = {
+        {60, 174, 313}, {192, 554, 1000}, {250, 722, 1303}, {400, 1155, 2084}}; // 554 and 1000 mm, by radius / 192
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        config.radius_mm = cases[i].radius_mm;
+        const iw_stop_budget_t budget = iw_config_stop_budget(&config);
+        TEST_ASSERT_EQUAL_UINT32(887, budget.client_lost_ms);
+        TEST_ASSERT_EQUAL_UINT32(1000, budget.killed_ms);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].client_lost_mm, budget.client_lost_mm);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].killed_mm, budget.killed_mm);
+    }
+}
+
 static void test_check_gear_ratio_comes_before_the_stop_budget(void) {
     config.decel_mm_s2 = 100;
     config.gear_turns = 1000;
@@ -286,6 +371,10 @@ int main(void) {
     RUN_TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred);
     RUN_TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not);
     RUN_TEST(test_check_gear_ratio_comes_before_the_stop_budget);
+    RUN_TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel);
+    RUN_TEST(test_rest_default_is_permitted_with_every_radius);
+    RUN_TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget);
+    RUN_TEST(test_stop_budget_is_of_the_configured_radius);
     RUN_TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand);
     return UNITY_END();
 }

@@ -163,7 +163,7 @@ static void sweep_currents(int32_t speed_mm_s) {
 }
 
 static void test_check_every_current_passes_within_the_configured_maximum_only(void) {
-    static const uint16_t maxima[] = {0, 1, 1234, 1999, 2000};
+    static const uint16_t maxima[] = {300, 301, 1234, 1999, 2000};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
     for (size_t i = 0; i < 10; i++) {
         config.max_current_mA = maxima[i / 2];

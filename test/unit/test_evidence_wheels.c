@@ -81,7 +81,7 @@ static void test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_ar
 
 static void test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio(void) {
     rig.config.gear_turns = 2;
-    rig.config.follow_mm_s = 1000;
+    rig.config.follow_mm_s = 500;
     world_rig_begin(&rig, 0);
     set_gear(2, true);
     world_rig_drive(&rig, 300, 300, 12000);

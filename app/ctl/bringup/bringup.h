@@ -175,4 +175,7 @@ bool bringup_is_confirmed(const bringup_t *self, const char *item);
 __attribute__((format(printf, 5, 6))) void bringup_note(bringup_t *self, const char *section, const char *key,
                                                         const char *item, const char *format, ...);
 
+/// After another radius or gear: a `rest_rpm` that would now call a rolling wheel at rest becomes the default.
+void bringup_fit_rest(iw_config_t *core);
+
 #endif

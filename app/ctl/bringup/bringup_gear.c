@@ -121,6 +121,7 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
                                    : "the rpm count the wheel's turns");
     if (talk_yes(self, "Take that?", true)) {
         self->config.core = core;
+        bringup_fit_rest(&self->config.core);
         note_gear(self, turned, geared, rpm);
     }
 }

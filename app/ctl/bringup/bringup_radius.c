@@ -9,8 +9,6 @@
 #define TICKS_MIN    60
 #define DISTANCE_MIN 1.0
 #define DISTANCE_MAX 100.0
-#define RADIUS_MIN   20
-#define RADIUS_MAX   500
 /// Both wheels went equally far, if the machine went straight.
 #define ALIKE_PERCENT 3.0
 
@@ -59,6 +57,7 @@ static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, 
     const bool geared = bringup_is_confirmed(self, "gear_ratio");
     const double ticks = (double)(llabs(hand->ticks[IW_LEFT]) + llabs(hand->ticks[IW_RIGHT])) / 2.0;
     self->config.core.radius_mm = (uint16_t)lround(mean);
+    bringup_fit_rest(&self->config.core);
     self->mm_per_tick = straight ? distance_m * 1000.0 / ticks : 0.0;
     bringup_note(self, "wheels", "radius_mm", (straight && geared) ? "wheel_radius" : NULL,
                  "%.2f m pushed: left %lld, right %lld ticks%s%s", distance_m, hand->ticks[IW_LEFT],
@@ -67,6 +66,7 @@ static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, 
 
 /// True: it is done.
 static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m) {
+    const iw_config_range_t range = iw_config_range(IW_CONFIG_RADIUS);
     const double left = radius_of(self, distance_m, hand->ticks[IW_LEFT]);
     const double right = radius_of(self, distance_m, hand->ticks[IW_RIGHT]);
     const double mean = (left + right) / 2.0;
@@ -80,8 +80,8 @@ static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m)
         talk_say("  They differ by more than %.0f %%: it was a curve, or the tyres differ. Better once more, straight.",
                  ALIKE_PERCENT);
     }
-    if (mean < RADIUS_MIN || mean > RADIUS_MAX) {
-        talk_say("  That is no radius between %d and %d mm: was the distance in metres?", RADIUS_MIN, RADIUS_MAX);
+    if (mean < range.min || mean > range.max) {
+        talk_say("  That is no radius between %u and %u mm: was the distance in metres?", range.min, range.max);
         return false;
     }
     const bool taken = talk_yes(self, "Take the mean?", straight);

@@ -114,7 +114,7 @@ static void slow_down(const bringup_t *self, const gateway_config_t *config, boo
     out_trial->core.lease_ms = 200;
     out_trial->core.period_ms = 20;
     out_trial->core.zero_hold_ms = 1100;
-    out_trial->core.blocked_ms = 5000; // A wheel that does not turn is a result here, and no burst lasts that long.
+    out_trial->core.blocked_ms = 2000; // A wheel that does not turn is a result here, and no burst lasts that long.
     out_trial->core.pair_mm = 150;     // Nor does a pair in the air turn a machine: as wide as it can be.
     out_trial->core.pair_leak_ms = 500;
     out_trial->core.wheel_silent_ms = 150; // Nobody leans on wheels in the air: rather patient than cut short.

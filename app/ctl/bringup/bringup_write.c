@@ -32,6 +32,13 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
     va_end(arguments);
 }
 
+void bringup_fit_rest(iw_config_t *core) {
+    const iw_config_rest_t rest = iw_config_rest(core);
+    if (core->rest_rpm > rest.max) {
+        core->rest_rpm = rest.standard;
+    }
+}
+
 bool bringup_is_confirmed(const bringup_t *self, const char *item) {
     for (unsigned i = 0; i < self->notes; i++) {
         if (self->note[i].item != NULL && strcmp(self->note[i].item, item) == 0) {

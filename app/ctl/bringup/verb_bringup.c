@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#define CURRENT_MIN_mA 50
+#define CURRENT_MIN_mA 300 // Of max_current_mA.
 #define CURRENT_MAX_mA 2000
 
 typedef struct {

@@ -13,7 +13,10 @@
 #define CORE(member, fault)       .kind = SETTINGS_NUMBER, .range = (fault), AT(core.member)
 #define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), AT(member)
 #define WORD(member, list)        .kind = SETTINGS_WORD, .words = (list), AT(member)
+#define RULE(text)                .rule = (text)
 #define TEXT(member, judge)       .kind = SETTINGS_TEXT, .wrong = (judge), AT(member)
+
+#define REST_RULE "rule R15, a wheel that rolls must not count as at rest"
 
 static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};
@@ -86,7 +89,7 @@ static const settings_key_t keys[] = {
      WORD(core.current_role, roles)},
     {"wheels", "rpm_of", "", "Whose turns the measured rpm count.", WORD(core.rpm_of_rotor, wheel_rotor)},
     {"wheels", "radius_mm", " mm", "Of the wheel. The document says approximately 192; measure it.",
-     CORE(radius_mm, IW_CONFIG_RADIUS)},
+     CORE(radius_mm, IW_CONFIG_RADIUS), RULE("rule R15, a wrong radius makes every speed and distance wrong")},
     {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
      .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
     {"wheels", "track_mm", " mm", "Distance between the wheels; only for twist commands.", NUMBER(track_mm, 50, 5000)},
@@ -115,7 +118,8 @@ static const settings_key_t keys[] = {
      CORE(decel_mm_s2, IW_CONFIG_DECEL)},
     {"drive", "max_speed_mm_s", " mm/s", "Faster commands are scaled down, both wheels by one factor.",
      CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
-    {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT)},
+    {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT),
+     RULE("rule R15, with less a loaded wheel may have no torque to brake with")},
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
 
     {"limits", "wheel_silent_ms", " ms",
@@ -123,17 +127,21 @@ static const settings_key_t keys[] = {
      CORE(wheel_silent_ms, IW_CONFIG_WHEEL_SILENT)},
     {"limits", "echo_ms", " ms", "A setpoint not seen on the bus after this long is stalled.",
      CORE(echo_ms, IW_CONFIG_ECHO)},
-    {"limits", "rest_rpm", " rpm", "At rest means |rpm| not above this ...", CORE(rest_rpm, IW_CONFIG_REST_RPM)},
+    {"limits", "rest_rpm", " rpm",
+     "At rest means |rpm| not above this: at most 60 mm/s at the wheel. Left out: the largest whole number that is at\n"
+     "most 45 mm/s at the wheel, at least 1 ...",
+     CORE(rest_rpm, IW_CONFIG_REST_RPM), RULE(REST_RULE)},
     {"limits", "rest_ms", " ms", "... for this long.", CORE(rest_ms, IW_CONFIG_REST)},
     {"limits", "follow_mm_s", " mm/s", "A wheel faster than it was told by this ...",
-     CORE(follow_mm_s, IW_CONFIG_FOLLOW_SPEED)},
-    {"limits", "follow_ms", " ms", "... for this long latches.", CORE(follow_ms, IW_CONFIG_FOLLOW)},
+     CORE(follow_mm_s, IW_CONFIG_FOLLOW_SPEED), RULE("rule R13, a wheel that runs away must latch")},
+    {"limits", "follow_ms", " ms", "... for this long latches.", CORE(follow_ms, IW_CONFIG_FOLLOW),
+     RULE("rule R13, a wheel that runs away must latch")},
     {"limits", "blocked_ms", " ms", "A wheel below 20 % of its command for this long stops the pair.",
-     CORE(blocked_ms, IW_CONFIG_BLOCKED)},
+     CORE(blocked_ms, IW_CONFIG_BLOCKED), RULE("rule R13, a blocked wheel must stop the pair")},
     {"limits", "pair_mm", " mm", "The pair stops when it leaves its commanded path by this, right wheel against left.",
-     CORE(pair_mm, IW_CONFIG_PAIR)},
+     CORE(pair_mm, IW_CONFIG_PAIR), RULE("rule R14, a machine that turns by itself must stop")},
     {"limits", "pair_leak_ms", " ms", "An older deviation counts less and less, with this time constant.",
-     CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK)},
+     CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK), RULE("rule R14, a machine that turns by itself must stop")},
     {"limits", "wheel_lag_ms", " ms", "A wheel follows its setpoint with this time constant.",
      CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
 
@@ -224,6 +232,32 @@ static void budget_cures(const iw_config_t *core, char *out, size_t size) {
     }
 }
 
+/// Without a value standstill follows from radius and gear.
+static void complete(void *values, const unsigned *lines) {
+    iw_config_t *core = &((gateway_config_t *)values)->core;
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        if (keys[i].range == IW_CONFIG_REST_RPM && lines[i] == 0U) {
+            core->rest_rpm = iw_config_rest(core).standard;
+        }
+    }
+}
+
+static unsigned line_of(uint16_t range, const unsigned *lines) {
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        if (keys[i].range == range) {
+            return lines[i];
+        }
+    }
+    return 0;
+}
+
+static void complain_rest(settings_report_t *report, const iw_config_t *core, unsigned line) {
+    settings_complain(report, line,
+                      "rest_rpm = %u is more than 60 mm/s at a wheel with radius_mm = %u: " REST_RULE
+                      "; write 0..%u rpm, or leave the key out to have %u",
+                      core->rest_rpm, core->radius_mm, iw_config_rest(core).max, iw_config_rest(core).standard);
+}
+
 static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
     const iw_config_t *core = &((const gateway_config_t *)values)->core;
     char cures[SETTINGS_MESSAGE_SIZE];
@@ -236,6 +270,8 @@ static void relate(settings_report_t *report, const void *values, const unsigned
             "= %u ms to stop, more than the %u ms of their own watchdog; %s",
             core->lease_ms, core->period_ms, core->max_speed_mm_s, core->decel_mm_s2,
             (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
+    } else if (fault == IW_CONFIG_REST_SPEED) {
+        complain_rest(report, core, line_of(IW_CONFIG_REST_RPM, lines));
     } else if (fault != IW_CONFIG_OK) {
         settings_complain(report, 0, "the values do not fit together (fault %d); compare with share/gateway.conf",
                           (int)fault);
@@ -249,6 +285,7 @@ static const settings_form_t form = {
     .missing = "create it from share/gateway.conf, or give another with -c FILE",
     .range = find_range,
     .hint = hint,
+    .complete = complete,
     .relate = relate,
 };
 IW_STATIC_ASSERT(sizeof keys / sizeof keys[0] <= SETTINGS_KEYS_MAX, keys_fit);
@@ -300,6 +337,7 @@ void gateway_config_print_noted(const gateway_config_t *config, gateway_config_n
     const settings_note_t noted = {.say = note, .context = context};
     gateway_config_t defaults;
     gateway_config_default(&defaults);
+    defaults.core.rest_rpm = iw_config_rest(&config->core).standard;
     (void)fputs(
         "; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. Two have "
         "no\n"

@@ -10,7 +10,12 @@
 /// Cut off: seven eighths of the 20 mm/s that one rpm means.
 #define TELEMETRY_MM_S 18U
 
-/// One wheel goes so much further than the other.
+/// A speed or a way by setpoints, at the configured radius.
+static uint64_t real(const gateway_config_t *config, uint64_t by_setpoints) {
+    return by_setpoints * config->core.radius_mm / IW_SETPOINT_RADIUS_MM;
+}
+
+/// One wheel goes so much further than the other: really, not by its setpoints.
 static unsigned tenths(const gateway_config_t *config, uint64_t apart_mm) {
     return (unsigned)(apart_mm * MILLI_TENTHS_PER_RADIAN / 1000U / config->track_mm);
 }
@@ -28,19 +33,20 @@ static uint64_t brake_mm(const gateway_config_t *config, uint64_t speed_mm_s) {
 
 gw_angles_t gw_angles(const gateway_config_t *config) {
     const iw_config_t *const core = &config->core;
-    const uint64_t speed = core->max_speed_mm_s;
-    const uint64_t ordinary = speed * IW_DIVERGE_DROOP_PERCENT / 100U + TELEMETRY_MM_S;
-    const uint64_t steady = (uint64_t)core->pair_mm * 1000U / core->pair_leak_ms + ordinary;
+    const uint64_t speed = real(config, core->max_speed_mm_s);
+    const uint64_t pair_mm = real(config, core->pair_mm);
+    const uint64_t ordinary = speed * IW_DIVERGE_DROOP_PERCENT / 100U + real(config, TELEMETRY_MM_S);
+    const uint64_t steady = pair_mm * 1000U / core->pair_leak_ms + ordinary;
     const uint64_t quarter = speed * GONE_PERCENT / 100U;
     const uint64_t apart = speed - quarter;
-    const uint64_t ramp = speed * speed / (2U * (uint64_t)core->decel_mm_s2);
+    const uint64_t ramp = speed * core->max_speed_mm_s / (2U * (uint64_t)core->decel_mm_s2);
     const uint64_t coast = speed * speed / (2U * (uint64_t)GW_ANGLES_COAST_MM_S2);
     const bool noticed = apart > steady;
     return (gw_angles_t){
         .unnoticed = tenths(config, steady),
-        .blocked = tenths(config, core->pair_mm / 2U + speed / 100U + brake_mm(config, speed)),
-        .slow = noticed ? tenths(config, core->pair_mm * apart / (apart - ordinary) + speed / 100U +
-                                             brake_mm(config, speed) - brake_mm(config, quarter))
+        .blocked = tenths(config, pair_mm / 2U + speed / 100U + brake_mm(config, speed)),
+        .slow = noticed ? tenths(config, pair_mm * apart / (apart - ordinary) + speed / 100U + brake_mm(config, speed) -
+                                             brake_mm(config, quarter))
                         : tenths(config, apart),
         .coasting = tenths(config, (coast > ramp) ? coast - ramp : 0U),
         .runs_on = tenths(config, speed),

@@ -9,7 +9,12 @@
 
 #include "iwheel/types.h"
 
-/// Ranges are inclusive. What is short stands first: a Cortex-M reaches it by shorter instructions.
+/// The radius that the wheel's firmware assumes: a setpoint of 1 mm/s means 1 mm/s at this radius. Measured speeds are
+/// compared with setpoints in this unit, whatever `radius_mm` is.
+#define IW_SETPOINT_RADIUS_MM 192
+
+/// Ranges are inclusive. No value in them switches a safety rule off; a value outside is refused by `iw_config_check`.
+/// What is short stands first: a Cortex-M reaches it by shorter instructions.
 typedef struct {
     uint8_t setpoint_type;          ///< Byte 0 of a setpoint. The document lists no values: valid only with `..._set`.
     bool setpoint_type_set;         ///< The wheels do not move until this is true.
@@ -23,19 +28,19 @@ typedef struct {
     uint16_t accel_mm_s2;     ///< Slope away from zero, 50..20000.
     uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
     uint16_t max_speed_mm_s;  ///< 10..5000. Faster commands are scaled, both wheels by one factor.
-    uint16_t max_current_mA;  ///< 0..2000.
+    uint16_t max_current_mA;  ///< 300..2000: with less a loaded wheel may have no torque to brake with.
     uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
     uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
     uint16_t echo_ms;         ///< A setpoint not echoed for this long is stalled, 20..200.
-    uint16_t rest_rpm;        ///< At rest means |rpm| <= this, 0..20 ...
+    uint16_t rest_rpm;        ///< At rest means |rpm| <= this, at most 60 mm/s at the wheel (iw_config_rest) ...
     uint16_t rest_ms;         ///< ... for this long, 50..2000.
-    uint16_t follow_mm_s;     ///< A wheel faster than applied by this, 50..5000 ...
-    uint16_t follow_ms;       ///< ... for this long, 100..5000, latches.
-    uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this long, 200..10000, stops the pair.
+    uint16_t follow_mm_s;     ///< A wheel faster than applied by this, in the unit of setpoints, 50..500 ...
+    uint16_t follow_ms;       ///< ... for this long, 100..1000, latches.
+    uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this long, 200..2000, stops the pair.
     uint16_t pair_mm;         ///< So far may the pair leave its path, right minus left, 20..150 ...
     uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000. Then it stops.
     uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
-    uint16_t radius_mm;       ///< Of the wheel, 20..500; the document says "approximately 192".
+    uint16_t radius_mm;       ///< Of the wheel, 60..400; the document says "approximately 192".
     uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
     uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
     uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
@@ -78,6 +83,7 @@ typedef enum {
     IW_CONFIG_CURRENT_ROLE, ///< Not an iw_current_role_t.
     IW_CONFIG_FORCE_UNIT,   ///< Not an iw_force_unit_t.
     IW_CONFIG_GEAR_RATIO,   ///< gear_turns / gear_per outside 1..100.
+    IW_CONFIG_REST_SPEED,   ///< rest_rpm is more than 60 mm/s at the wheel: `iw_config_rest` tells how much is not.
     IW_CONFIG_STOP_BUDGET,  ///< lease + period + max_speed / decel exceeds 1000 ms, the wheel's own watchdog.
 } iw_config_fault_t;
 
@@ -89,6 +95,14 @@ typedef struct {
 /// The range of that field.
 iw_config_range_t iw_config_range(iw_config_fault_t field);
 
+/// What `rest_rpm` may be with the radius and the gear of a configuration.
+typedef struct {
+    uint16_t standard; ///< The largest whole rpm of telemetry that is at most 45 mm/s at the wheel, at least 1.
+    uint16_t max;      ///< The same for 60 mm/s: more would call a wheel that rolls at rest.
+} iw_config_rest_t;
+/// Of a configuration whose radius and gear are within their ranges. Whoever sets them sets `rest_rpm` by this.
+iw_config_rest_t iw_config_rest(const iw_config_t *config);
+
 /// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
 void iw_config_default(iw_config_t *out_config);
 
@@ -99,7 +113,7 @@ iw_config_fault_t iw_config_check(const iw_config_t *config);
 /// client's last command: lease, one period, ramp from the maximum speed.
 typedef struct {
     uint32_t client_lost_ms; ///< Until the wheels are told to stand, at most.
-    uint32_t client_lost_mm; ///< The way in that time, at the maximum speed.
+    uint32_t client_lost_mm; ///< The way in that time, at the maximum speed and at `radius_mm`.
     uint32_t killed_ms;      ///< Gateway killed and not restarted: the wheel's watchdog, then unknown.
     uint32_t killed_mm;      ///< At full command for that time; braking comes on top and is not documented.
 } iw_stop_budget_t;

@@ -10,7 +10,7 @@
 /// is what a loaded wheel stays below its setpoint, and a step of its telemetry: so much of the
 /// difference does not count. A steady difference of `pair_mm` in `pair_leak_ms` on top of it is never noticed.
 ///
-/// Millimetres and mm/s are those of the wheel's firmware, which takes the radius to be IW_DIVERGE_RADIUS_MM.
+/// Millimetres and mm/s are those of setpoints, at IW_SETPOINT_RADIUS_MM.
 ///
 /// The best reaction depends on what happened. A wheel that is blocked turns the machine for as long as the other one
 /// goes on: zero at once. A wheel that runs on turns it for as long as it is faster: common ramp.
@@ -19,8 +19,6 @@
 
 #include "iwheel/config.h"
 
-/// Radius that the wheel's firmware assumes: a setpoint in mm/s means that many mm/s at this radius.
-#define IW_DIVERGE_RADIUS_MM 192
 /// What a wheel may stay below or above its expected speed without counting. Ours.
 #define IW_DIVERGE_DROOP_PERCENT 4
 /// A wheel below this share of its expected speed has hardly any: zero at once. Ours: docs/pair.md has the table.
@@ -45,8 +43,8 @@ typedef struct {
     const iw_config_t *config;       ///< The owner's.
     uint8_t side;                    ///< An iw_side_t: whose speed differs more. Of the last step that compared.
     int32_t applied_mm_s[IW_SIDES];  ///< For the next step, written by the owner.
-    int32_t measured_mm_s[IW_SIDES]; ///< The same, in the machine's frame, at `radius_mm`.
-    int32_t rpm_um_s;                ///< A step of telemetry.
+    int32_t measured_mm_s[IW_SIDES]; ///< The same, in the machine's frame.
+    int32_t um_s_per_rpm;            ///< Speed in um/s at 1 rpm of telemetry, a step of it.
     int32_t expected_um_s[IW_SIDES]; ///< Where each wheel should be by now.
     int32_t path_um;                 ///< Right minus left: how far the pair has left its path, leaking.
     int32_t largest_um;              ///< The largest |path_um| since the drive began.
@@ -54,7 +52,7 @@ typedef struct {
     iw_time_us_t begun_us;           ///< When the drive began.
 } iw_diverge_t;
 
-/// `config` must be checked and outlive it. `um_s_per_rpm`: of both wheels, at `radius_mm`.
+/// `config` must be checked and outlive it. `um_s_per_rpm`: of both wheels.
 void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm);
 
 /// The drive that began at that time is going on: with a new one the deviation, and the largest of it, begin from zero.

@@ -40,7 +40,8 @@ static inline void iw_follow_restart(iw_follow_t *self) {
     self->running = 0;
 }
 
-/// Compares the speed applied and measured now, both in the machine's frame. The gravest verdict comes first.
+/// Compares the speed applied and measured now, both in the machine's frame and in the unit of setpoints. The gravest
+/// verdict comes first.
 iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s, int32_t measured_mm_s);
 
 /// True if command and measurement have agreed in sign, both above IW_SIGN_MM_S, for IW_FOLLOW_SIGN_US.

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// Wheels of another radius than the 192 mm that their firmware assumes: setpoints pass unchanged, and what is measured is compared
+// with them in their own unit. The simulator's wheels turn as the firmware commands; their real radius follows the configuration.
+#include "unity.h"
+#include "world_rig.h"
+
+#include <string.h>
+
+static const uint16_t radii[] = {60, 192, 250, 400};
+#define RADII (sizeof radii / sizeof radii[0])
+
+static world_rig_t rig;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void begin(uint16_t radius_mm) {
+    memset(&rig, FIXTURE_POISON, sizeof rig);
+    fixture_config(&rig.config);
+    rig.config.radius_mm = radius_mm;
+    rig.config.rest_rpm = iw_config_rest(&rig.config).standard;
+    world_rig_begin(&rig, 0);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        rig.world.pair.wheel[side].motion.config.radius_mm = radius_mm;
+    }
+}
+
+static void assert_armed(uint16_t radius_mm) {
+    char what[32];
+    (void)snprintf(what, sizeof what, "radius %u", radius_mm);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, iw_gateway_state(&rig.gateway), what);
+}
+
+static void test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence(void) {
+    for (size_t i = 0; i < RADII; i++) {
+        begin(radii[i]);
+        world_rig_drive(&rig, 1000, 1000, 5000);
+        assert_armed(radii[i]);
+        world_rig_drive(&rig, 500, -500, 5000);
+        assert_armed(radii[i]);
+        TEST_ASSERT_INT_WITHIN(45, 500 * radii[i] / 192, rig.gateway.wheel[IW_LEFT].speed_mm_s);
+        TEST_ASSERT_INT_WITHIN(21, 500, rig.gateway.diverge.measured_mm_s[IW_LEFT]);
+        TEST_ASSERT_INT_WITHIN(21, -500, rig.gateway.diverge.measured_mm_s[IW_RIGHT]);
+    }
+}
+
+static void test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel(void) {
+    for (size_t i = 0; i < RADII; i++) {
+        begin(radii[i]);
+        world_rig_drive(&rig, 800, 800, 5000);
+        TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED,
+                              iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_SETPOINT_TYPE)->state);
+    }
+}
+
+/// A limit of 60 mm in the unit of setpoints is reached after the same time, whatever the radius.
+static void test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel(void) {
+    iw_time_us_t took_us[RADII];
+    for (size_t i = 0; i < RADII; i++) {
+        begin(radii[i]);
+        world_rig_drive(&rig, 1000, 1000, 3000);
+        const iw_drive_t wanted = {.speed_mm_s = {1000, 1000}};
+        const iw_time_us_t from_us = rig.now_us;
+        iw_applied_t applied;
+        rig.world.pair.wheel[IW_LEFT].motion.blocked = true;
+        while (iw_gateway_state(&rig.gateway) == IW_STATE_ARMED && rig.now_us < from_us + 1000000U) {
+            (void)iw_gateway_drive(&rig.gateway, rig.now_us, WORLD_CLIENT, &wanted, &applied);
+            world_rig_run(&rig, 1);
+        }
+        took_us[i] = rig.now_us - from_us;
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_PAIR_DIVERGES, rig.gateway.permit.stop.cause);
+        TEST_ASSERT_EQUAL_UINT64(took_us[0], took_us[i]);
+    }
+}
+
+/// One rpm is 42 mm/s at 400 mm, and 6 at 60: rest is by rpm, and arm waits for the same real speed.
+static void test_gateway_radius_rest_is_a_speed_at_the_wheel(void) {
+    static const struct {
+        uint16_t radius_mm;
+        int16_t at_rest_rpm;
+    } cases[] = {{60, 7}, {192, 2}, {400, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        iw_codec_wheel_t told = {.speed = {.speed_rpm = cases[i].at_rest_rpm}};
+        begin(cases[i].radius_mm);
+        iw_wheel_t *const wheel = &rig.gateway.wheel[IW_LEFT];
+        iw_wheel_hear(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        TEST_ASSERT_GREATER_THAN_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
+        TEST_ASSERT_LESS_OR_EQUAL_INT32(45, wheel->speed_mm_s);
+        told.speed.speed_rpm++;
+        iw_wheel_hear(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        TEST_ASSERT_EQUAL_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
+        TEST_ASSERT_GREATER_THAN_INT32(45, wheel->speed_mm_s);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence);
+    RUN_TEST(test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel);
+    RUN_TEST(test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel);
+    RUN_TEST(test_gateway_radius_rest_is_a_speed_at_the_wheel);
+    return UNITY_END();
+}
