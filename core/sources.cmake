@@ -7,6 +7,7 @@ set(IWHEEL_CORE_SOURCES
     src/codec.c
     src/config.c
     src/confirmation.c
+    src/current.c
     src/diverge.c
     src/envelope.c
     src/evidence.c

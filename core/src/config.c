@@ -14,6 +14,7 @@ static const iw_config_t standard = {
     .decel_mm_s2 = 1500,
     .max_speed_mm_s = 1000,
     .max_current_mA = IW_CURRENT_LIMIT_mA,
+    .min_current_mA = 300,
     .zero_hold_ms = 1500,
     .wheel_silent_ms = 50,
     .echo_ms = 50,
@@ -40,6 +41,7 @@ static const iw_config_range_t ranges[] = {
     {100, 20000},                       // decel_mm_s2
     {10, 5000},                         // max_speed_mm_s
     {300, IW_CURRENT_LIMIT_mA},         // max_current_mA
+    {300, IW_CURRENT_LIMIT_mA},         // min_current_mA
     {1100, 5000},                       // zero_hold_ms
     {20, 200},                          // wheel_silent_ms
     {20, 200},                          // echo_ms

@@ -47,9 +47,10 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 }
 
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
-    // The document allows -2000 to 2000 mA and does not say what a limit below zero means.
-    const bool negative_limit = config->current_role == IW_ROLE_LIMIT && current_mA < 0;
-    return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
+    // A wheel with a limit near 0 has no torque; the document does not say what a limit below zero means.
+    const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA &&
+                           current_mA < (int32_t)config->max_current_mA;
+    return !low_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
 
 static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_us, iw_side_t side,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
+#include "iwheel/private/current.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -123,6 +124,10 @@ static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *req
     }
     applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s);
     applied.limited = scale_pair(drive.current_mA, config->max_current_mA) || applied.limited;
+    if (config->current_role == IW_ROLE_LIMIT) {
+        const bool zero = drive.speed_mm_s[IW_LEFT] == 0 && drive.speed_mm_s[IW_RIGHT] == 0;
+        applied.limited = iw_current_limit(config, drive.current_mA, zero) || applied.limited;
+    }
     for (size_t side = 0; side < IW_SIDES; side++) {
         applied.pair.wheel[side].speed_mm_s = (int16_t)drive.speed_mm_s[side];
         applied.pair.wheel[side].current_mA = (int16_t)drive.current_mA[side];

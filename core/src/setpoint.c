@@ -2,6 +2,7 @@
 #include "iwheel/private/setpoint.h"
 
 #include "iwheel/codec.h"
+#include "iwheel/private/current.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -35,6 +36,7 @@ static void clear(iw_setpoint_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->speed_um_s[side] = 0;
         self->current_uA[side] = 0;
+        self->limit_mA[side] = (int16_t)self->config->max_current_mA;
     }
     self->from_zero = true;
     forget_command(self);
@@ -192,8 +194,12 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
 }
 
 iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us) {
+    const uint32_t elapsed_us = iw_age_us(self->last_us, now_us);
     if (!self->from_zero && !(arrived(self, IW_LEFT) && arrived(self, IW_RIGHT))) {
-        advance(self, iw_age_us(self->last_us, now_us));
+        advance(self, elapsed_us);
+    }
+    if (!self->from_zero) { // A first zero has the maximum.
+        iw_current_follow(self->limit_mA, &self->target, elapsed_us);
     }
     self->from_zero = false;
     self->due_us = next_on_grid(self, now_us);
@@ -206,7 +212,7 @@ iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         pair.wheel[side].speed_mm_s = (int16_t)(self->speed_um_s[side] / 1000);
         pair.wheel[side].current_mA = (self->config->current_role == IW_ROLE_LIMIT)
-                                          ? self->target.wheel[side].current_mA
+                                          ? self->limit_mA[side]
                                           : (int16_t)(self->current_uA[side] / 1000);
     }
     return pair;

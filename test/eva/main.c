@@ -112,6 +112,7 @@ static void any_config(iw_config_t *out_config) {
     out_config->decel_mm_s2 = any_within(IW_CONFIG_DECEL);
     out_config->max_speed_mm_s = any_within(IW_CONFIG_MAX_SPEED);
     out_config->max_current_mA = any_within(IW_CONFIG_MAX_CURRENT);
+    out_config->min_current_mA = any_within(IW_CONFIG_MIN_CURRENT);
     out_config->zero_hold_ms = any_within(IW_CONFIG_ZERO_HOLD);
     out_config->wheel_silent_ms = any_within(IW_CONFIG_WHEEL_SILENT);
     out_config->echo_ms = any_within(IW_CONFIG_ECHO);

@@ -176,7 +176,8 @@ static iw_time_us_t sent_us(const world_t *self) {
 }
 
 static bool drive(world_t *self) {
-    const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 0}, false};
+    // A limit that is too low on the left, and lower than the maximum on both.
+    const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 1200}, true};
     const oracle_asked_t asked = {self->now_us, sent_us(self), self->client};
     const bool aged = asked.sent_us < self->now_us;
     iw_applied_t applied = {0};

@@ -312,10 +312,6 @@ static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, i
         (current > 0) != (current_wanted > 0)) {
         oracle_break(self, now_us, 306, "%d mA although %d mA were wanted", current, current_wanted);
     }
-    if (self->config->current_role == IW_ROLE_LIMIT && current != self->target.wheel[side].current_mA) {
-        oracle_break(self, now_us, 303, "limit %d mA although %d mA were wanted", current,
-                     self->target.wheel[side].current_mA);
-    }
 }
 
 static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t current) {
@@ -348,6 +344,7 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     const bool zero = speed == 0 && (current == 0 || self->config->current_role == IW_ROLE_LIMIT);
     judge_form(self, now_us, frame);
     judge_state(self, now_us, zero, current);
+    oracle_judge_limit(self, now_us, side, &(iw_command_t){(int16_t)speed, (int16_t)current});
     if (!zero) {
         judge_permission(self, now_us, side, speed, current);
         judge_change(self, now_us, wheel, speed, current);

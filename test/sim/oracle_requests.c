@@ -96,6 +96,7 @@ void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t 
             oracle_break(self, now_us, 332, "a drive out of range was accepted");
         }
         judge_applied(self, now_us, request, applied);
+        oracle_judge_applied_limits(self, now_us, request, applied);
         // What was overtaken by a newer one takes nothing from it; the first one replaces what the arm granted.
         const iw_time_us_t until_us = sent_us + oracle_us(self->config->lease_ms);
         self->lease_until_us = (self->fresh && self->lease_until_us > until_us) ? self->lease_until_us : until_us;

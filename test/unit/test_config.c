@@ -22,6 +22,7 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, decel_mm_s2), 100, 20000, IW_CONFIG_DECEL},
     {offsetof(iw_config_t, max_speed_mm_s), 10, 5000, IW_CONFIG_MAX_SPEED},
     {offsetof(iw_config_t, max_current_mA), 300, 2000, IW_CONFIG_MAX_CURRENT},
+    {offsetof(iw_config_t, min_current_mA), 300, 2000, IW_CONFIG_MIN_CURRENT},
     {offsetof(iw_config_t, zero_hold_ms), 1100, 5000, IW_CONFIG_ZERO_HOLD},
     {offsetof(iw_config_t, wheel_silent_ms), 20, 200, IW_CONFIG_WHEEL_SILENT},
     {offsetof(iw_config_t, echo_ms), 20, 200, IW_CONFIG_ECHO},
@@ -71,6 +72,8 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT16(1500, config.decel_mm_s2);
     TEST_ASSERT_EQUAL_UINT16(1000, config.max_speed_mm_s);
     TEST_ASSERT_EQUAL_UINT16(2000, config.max_current_mA);
+    TEST_ASSERT_EQUAL_UINT16(300, config.min_current_mA);
+    TEST_ASSERT_FALSE(config.asymmetric_current);
     TEST_ASSERT_EQUAL_UINT16(1500, config.zero_hold_ms);
     TEST_ASSERT_EQUAL_UINT16(50, config.wheel_silent_ms);
     TEST_ASSERT_EQUAL_UINT16(50, config.echo_ms);

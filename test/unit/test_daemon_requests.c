@@ -34,6 +34,7 @@ static void test_drive_reaches_the_wheel_it_is_for(void) {
 }
 
 static void test_current_reaches_the_wheel_it_is_for(void) {
+    daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100,\"left_mA\":500,\"right_mA\":900}",

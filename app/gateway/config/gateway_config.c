@@ -120,6 +120,13 @@ static const settings_key_t keys[] = {
      CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
     {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT),
      RULE("rule R15, with less a loaded wheel may have no torque to brake with")},
+    {"drive", "min_current_mA", " mA",
+     "With current_role limit no limit of a client is lower: it is raised to this, as a wheel without torque cannot "
+     "brake.",
+     CORE(min_current_mA, IW_CONFIG_MIN_CURRENT)},
+    {"drive", "asymmetric_current", "",
+     "no: both wheels get the larger limit of a client, since unequal torque turns the machine.",
+     WORD(core.asymmetric_current, no_yes)},
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
 
     {"limits", "wheel_silent_ms", " ms",

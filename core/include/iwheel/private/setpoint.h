@@ -34,6 +34,7 @@ typedef struct {
     iw_pair_t target;     ///< The client's command, cleared whenever the demand is not FOLLOW.
     int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
     int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
+    int16_t limit_mA[IW_SIDES];   ///< IW_ROLE_LIMIT: as last taken. See current.h.
 } iw_setpoint_t;
 
 /// `config` must be checked and outlive it. Begins in silence.

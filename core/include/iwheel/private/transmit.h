@@ -22,7 +22,7 @@
 // setpoint of one of the two ids, with the configured type and length, current and speed within the configured
 // maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
 // between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
-// whatever its slew. A negative current is refused where the current is a limit; while setpoint type or current role
+// whatever its slew. A current limit below `min_current_mA` is refused; while setpoint type or current role
 // are unset nothing passes.
 //
 // Written independently of the scheduler, so that an error in one is caught by the other.
