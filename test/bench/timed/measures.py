@@ -43,9 +43,9 @@ class Renewal(threading.Thread):
 
 
 @contextlib.contextmanager
-def driven(around):
+def driven(around, program=None, served=True):
     """A gateway of its own, which a client drives as long."""
-    around.start_gateway()
+    around.start_gateway(program, served)
     client = around.client()
     around.arm(client)
     client.drive(100, 100)
@@ -185,6 +185,36 @@ class FloodLoaded(Flood):
             for hog in hogs:
                 hog.kill()
                 hog.wait()
+
+
+class Pair(Measure):
+    """How long the right setpoint comes after the left one on a machine with other work: of this build, and of a program from before."""
+
+    candidates = ("before", "gateway")
+    hogs = 4
+
+    def begin(self):
+        self.around.start_wheels()
+
+    def judge(self):
+        gaps = numbers(self.around.tool("pair_stamps", self.around.interface, self.plan["pair_s"], piped=True).text(self.plan["pair_s"] + 30))
+        return {"gaps_ns": gaps}
+
+    def drive(self, program):
+        with driven(self.around, program, served=False):
+            hogs = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(self.hogs)]
+            try:
+                return self.judge()
+            finally:
+                for hog in hogs:
+                    hog.kill()
+                    hog.wait()
+
+    def before(self):
+        return self.drive(self.plan["before"])
+
+    def gateway(self):
+        return self.drive(None)
 
 
 class Calls(Measure):
@@ -450,4 +480,4 @@ class Estop(Measure):
             self.around.end_gateway()
 
 
-MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "flood_loaded": FloodLoaded, "calls": Calls, "line": Line, "told": Told, "estop": Estop}
+MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "flood_loaded": FloodLoaded, "pair": Pair, "calls": Calls, "line": Line, "told": Told, "estop": Estop}
