@@ -96,8 +96,8 @@ static bool withdraw_id(iw_bxcan_t *self, uint32_t id, iw_bxcan_outgoing_t *heir
     return done;
 }
 
-/// Transmit mailbox registers, bxCAN 9.3: all but TIR, which makes the request. The mailbox; IW_BXCAN_MAILBOXES: none is
-/// free.
+/// Transmit mailbox registers, bxCAN 9.3: all but TIR, which makes the request. Returns the mailbox, or
+/// IW_BXCAN_MAILBOXES if none is free.
 static uint32_t load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, iw_bxcan_outgoing_t *heir) {
     for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
         if (self->outgoing[i].owed == 0U) {
@@ -135,11 +135,11 @@ static bool can_be_sent(const iw_bxcan_t *self, const iw_can_frame_t *frames, ui
     return good;
 }
 
-/// Every mailbox is filled before the first one is requested. The controller has no request for two mailboxes: TXRQ is a
-/// bit of each TIR (bxCAN 9.3), and on an idle bus the left frame begins with the first write. The second write comes a
-/// few cycles later, long before that frame ends, so the right one is next in this controller. Not guaranteed: another
-/// node's lower id goes between, a frame that fails is repeated first, and a reset of the CPU between both writes leaves
-/// the left one alone.
+/// Every mailbox is filled before the first one is requested. The controller has no request for two mailboxes: TXRQ is
+/// a bit of each TIR (bxCAN 9.3), and on an idle bus the left frame begins with the first write. The second write comes
+/// a few cycles later, long before that frame ends, so the right one is next in this controller. Not guaranteed:
+/// another node's lower id goes between, a frame that fails is repeated first, and a reset of the CPU between both
+/// writes leaves the left one alone.
 int iw_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     iw_bxcan_t *const self = context;
     uint32_t mailbox[IW_SIDES];

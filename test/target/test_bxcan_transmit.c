@@ -118,18 +118,12 @@ static uint32_t written[64];
 static uint32_t writes;
 
 static void note_write(uint32_t offset) {
-    if (writes < sizeof written / sizeof written[0]) {
-        written[writes++] = offset;
-    }
+    written[writes++ % 64U] = offset;
 }
 
 static int send_pair(uint8_t left_mark, uint8_t right_mark) {
     const iw_can_frame_t pair[] = {rig_frame(266, left_mark), rig_frame(298, right_mark)};
     return iw_bxcan_send(driver, pair, 2);
-}
-
-static bool is_request(uint32_t offset) {
-    return offset == 0x180U || offset == 0x190U || offset == 0x1A0U;
 }
 
 static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
@@ -139,7 +133,8 @@ static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
     rig[0].on_write = NULL;
     TEST_ASSERT_GREATER_THAN(2, writes);
     for (uint32_t i = 0; i < writes; i++) {
-        TEST_ASSERT_EQUAL_MESSAGE(i >= writes - 2U, is_request(written[i]), "requests come last, both of them");
+        TEST_ASSERT_EQUAL_MESSAGE(i >= writes - 2U, (written[i] & 0x18FU) == 0x180U,
+                                  "requests come last, both of them");
     }
     assert_on_bus(266, 1);
     assert_on_bus(298, 2);
