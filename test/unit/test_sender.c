@@ -151,6 +151,15 @@ static void test_sender_port_that_claims_more_than_two_frames_has_accepted_two(v
     TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_RIGHT]);
 }
 
+/// Not ready, and asked all the same: behind two frames that wait for their echo no third one leaves.
+static void test_sender_pair_that_neither_wheel_may_have_reaches_no_port(void) {
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_FALSE(iw_sender_ready(&sender, true));
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_EQUAL_UINT32(2, bus.calls);
+}
+
 static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, (int16_t)(config.max_speed_mm_s + 1)));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
@@ -183,6 +192,7 @@ int main(void) {
     RUN_TEST(test_sender_one_accepted_of_two_is_a_refused_pair);
     RUN_TEST(test_sender_pair_that_the_port_refuses_whole_is_in_no_account);
     RUN_TEST(test_sender_port_that_claims_more_than_two_frames_has_accepted_two);
+    RUN_TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port);
     RUN_TEST(test_sender_remembers_why_the_gate_stopped_a_pair);
     RUN_TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did);
     return UNITY_END();

@@ -71,7 +71,12 @@ def driven(around, program=None, served=True, renewal=Renewal):
         around.end_gateway()
 
 
-def as_an_ordinary_program():
+# Computes for some milliseconds, then sleeps: a guest that computes all the time is itself held up by the machine.
+WORK = "while :; do i=0; while [ $i -lt 3000 ]; do i=$((i+1)); done; sleep 0.02; done"
+
+
+def as_a_hog():
+    """Hogs of the gateway's priority make the loop late, and it stops."""
     os.setpriority(os.PRIO_PROCESS, 0, 0)
 
 
@@ -204,10 +209,10 @@ class FloodLoaded(Flood):
 
 
 class Pair(Measure):
-    """How long the right setpoint comes after the left one on a machine with other work: of this build, and of a program from before."""
+    """How long the right setpoint comes after the left one, beside hogs and programs that every frame wakes: of this build, and of a program from before."""
 
     candidates = ("before", "gateway")
-    hogs = 4
+    hogs, receivers = 2, 4
 
     def begin(self):
         """Pairs come every 5 ms, so that there are enough of them. What drives and the wheels have the gateway's priority: they must not stop it."""
@@ -224,10 +229,13 @@ class Pair(Measure):
 
     def drive(self, program):
         with driven(self.around, program, renewal=Insistence):
-            hogs = [subprocess.Popen(["sh", "-c", "while :; do :; done"], preexec_fn=as_an_ordinary_program) for _ in range(self.hogs)]
+            hogs = [subprocess.Popen(["sh", "-c", WORK], preexec_fn=as_a_hog) for _ in range(self.hogs)]
+            others = [self.around.tool("floor_receive", self.around.interface) for _ in range(self.receivers)]
             try:
                 return self.judge()
             finally:
+                for other in others:
+                    other.end()
                 for hog in hogs:
                     hog.kill()
                     hog.wait()
