@@ -34,8 +34,7 @@ static int32_t speed_of(const iw_can_frame_t *frame) {
     return (int16_t)(frame->data[1] << 8 | frame->data[2]);
 }
 
-static int world_send(void *context, const iw_can_frame_t *frame) {
-    world_t *const self = context;
+static bool send_one(world_t *self, const iw_can_frame_t *frame) {
     const bool taken = self->flights < WORLD_FLIGHT && !self->down;
     self->stats->frames++;
     self->stats->nonzero += (speed_of(frame) != 0) ? 1U : 0U;
@@ -53,7 +52,17 @@ static int world_send(void *context, const iw_can_frame_t *frame) {
         self->flights++;
     }
     oracle_sent(&self->oracle, self->now_us, frame, taken);
-    return taken ? 1 : 0;
+    return taken;
+}
+
+static int world_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    world_t *const self = context;
+    uint32_t accepted = 0;
+    oracle_call(&self->oracle, self->now_us, frames, count);
+    while (accepted < count && send_one(self, &frames[accepted])) {
+        accepted++;
+    }
+    return (int)accepted;
 }
 
 static int world_receive(void *context, iw_can_frame_t *out_frame) {

@@ -110,6 +110,8 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us);
 void oracle_estop(oracle_t *self, int result);
 void oracle_bus(oracle_t *self, iw_time_us_t now_us, iw_bus_state_t state);
 void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
+/// The frames that one call brings; `oracle_sent` follows for each that the port tries.
+void oracle_call(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frames, uint32_t count);
 void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, bool accepted);
 void oracle_purged(oracle_t *self);
 

@@ -2,9 +2,9 @@
 /// @file
 /// Hands a pair to the bus: whole, within the envelope, each frame tracked until its TX confirmation.
 ///
-///     pair -> invert -> encode -> envelope (both frames) -> port (left, then right) -> TX confirmation
+///     pair -> invert -> encode -> envelope (both frames) -> port (both in one call) -> TX confirmation
 ///
-/// Both frames are judged before one of them leaves. If the port takes the left and not the right, the caller is told
+/// Both frames are judged before one of them leaves. If the port accepts the left and not the right, the caller is told
 /// and the next pair must be zero.
 #ifndef IW_TRANSMIT_H
 #define IW_TRANSMIT_H
