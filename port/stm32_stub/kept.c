@@ -8,7 +8,7 @@
 typedef union {
     struct {
         uint32_t power_ons;
-        uint32_t flags; ///< HAS_SETTINGS, HAS_PAIR.
+        uint32_t flags; ///< HAS_SETTINGS, HAS_YAW.
         iw_settings_t settings;
         uint32_t has_learnt;
         iw_learnt_t learnt;
@@ -22,26 +22,29 @@ IW_STATIC_ASSERT(sizeof(record_t) == IW_STORE_WORDS * sizeof(uint32_t), a_record
 #define ROOM_LEAST 2U
 
 #define HAS_SETTINGS 1U ///< There are settings.
-#define HAS_PAIR     2U ///< The settings have the numbers of the pair; else it is a record of version 0.2.
+#define HAS_YAW      4U ///< The settings have the numbers of the pair and of yaw; else it is a record of version 0.2.
 
-/// Settings as version 0.2 kept them: without `pair_mm`, `pair_leak_ms` and `wheel_lag_ms`, which came behind
-/// `blocked_ms`.
+/// Settings as version 0.2 kept them: without `pair_mm`, `pair_leak_ms`, `wheel_lag_ms`, `max_yaw_mrad_s` and
+/// `yaw_accel_mrad_s2`, which came behind `blocked_ms`; and with `track_mm` at the end, which came behind them.
 #define BEFORE_VALUES 26U
 #define BEFORE_PAIR   ((size_t)IW_CONFIG_BLOCKED - IW_CONFIG_PERIOD + 1U)
-#define PAIR_VALUES   (IW_SETTINGS - BEFORE_VALUES)
+#define BEFORE_TRACK  (BEFORE_VALUES - 1U)
+#define TRACK_AT      ((size_t)IW_CONFIG_TRACK - IW_CONFIG_PERIOD)
 #define BEFORE_BYTES  (BEFORE_VALUES * sizeof(uint16_t))
 /// Of the words of its record: settings, whether something is learnt, and that.
 #define BEFORE_AT     2U
 #define BEFORE_LEARNT (BEFORE_AT + BEFORE_BYTES / sizeof(uint32_t))
 
-/// The same settings, with the defaults of the pair.
+/// The same settings, with the defaults of the pair and of yaw.
 static iw_settings_t from_before(const uint32_t *words) {
     iw_config_t standard;
     iw_config_default(&standard);
-    iw_settings_t settings = iw_settings_from(&standard, 0);
-    memcpy(settings.value, words, BEFORE_PAIR * sizeof(uint16_t));
-    memcpy(&settings.value[BEFORE_PAIR + PAIR_VALUES], (const uint8_t *)words + BEFORE_PAIR * sizeof(uint16_t),
-           (BEFORE_VALUES - BEFORE_PAIR) * sizeof(uint16_t));
+    uint16_t before[BEFORE_VALUES];
+    iw_settings_t settings = iw_settings_from(&standard);
+    memcpy(before, words, sizeof before);
+    memcpy(settings.value, before, BEFORE_PAIR * sizeof before[0]);
+    memcpy(&settings.value[TRACK_AT + 1U], &before[BEFORE_PAIR], (BEFORE_TRACK - BEFORE_PAIR) * sizeof before[0]);
+    settings.value[TRACK_AT] = before[BEFORE_TRACK];
     return settings;
 }
 
@@ -54,14 +57,14 @@ static void convert(record_t *record) {
     record->is.has_learnt = before.words[BEFORE_LEARNT];
     record->is.learnt.settings = from_before(&before.words[BEFORE_LEARNT + 1U]);
     memcpy((uint8_t *)&record->is.learnt + rest, learnt + BEFORE_BYTES, sizeof(iw_learnt_t) - rest);
-    record->is.flags |= HAS_PAIR;
+    record->is.flags |= HAS_YAW;
 }
 
 static void read(const iw_kept_t *self, record_t *out_record) {
     if (!iw_store_read(&self->store, out_record->words)) {
         *out_record = (record_t){.words = {0}}; // Converted, it has neither settings nor anything learnt.
     }
-    if ((out_record->is.flags & HAS_PAIR) == 0U) {
+    if ((out_record->is.flags & HAS_YAW) == 0U) {
         convert(out_record);
     }
 }

@@ -6,20 +6,18 @@
 #include <string.h>
 
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
-enum { TYPE = 21, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
+enum { TYPE = 24, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 20U * sizeof(uint16_t),
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * sizeof(uint16_t),
                  the_core_s_numbers_are_side_by_side);
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
-#define TRACK_MIN_MM  50U
-#define TRACK_MAX_MM  5000U
 #define NUMBER_DIGITS 5U
 
 /// How a value is written.
-typedef enum { NUMBER, BYTE, DISTANCE, GEAR, WORDS } kind_t;
+typedef enum { NUMBER, BYTE, GEAR, WORDS } kind_t;
 
 typedef struct {
     const char *section;
@@ -35,7 +33,7 @@ static const row_t rows[] = {
     {"wheels", "rpm_of", RPM_OF, WORDS, {"wheel", "rotor"}},
     {"wheels", "radius_mm", INDEX(RADIUS), NUMBER, {NULL, NULL}},
     {"wheels", "gear_ratio", INDEX(GEAR_TURNS), GEAR, {NULL, NULL}},
-    {"wheels", "track_mm", TRACK, DISTANCE, {NULL, NULL}},
+    {"wheels", "track_mm", INDEX(TRACK), NUMBER, {NULL, NULL}},
     {"wheels", "setpoint_dlc", INDEX(SETPOINT_DLC), NUMBER, {NULL, NULL}},
     {"left", "invert", INVERT_LEFT, WORDS, {"no", "yes"}},
     {"left", "force_unit", UNIT_LEFT, WORDS, {"cN", "dN"}},
@@ -46,6 +44,8 @@ static const row_t rows[] = {
     {"drive", "accel_mm_s2", INDEX(ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "decel_mm_s2", INDEX(DECEL), NUMBER, {NULL, NULL}},
     {"drive", "max_speed_mm_s", INDEX(MAX_SPEED), NUMBER, {NULL, NULL}},
+    {"drive", "max_yaw_mrad_s", INDEX(MAX_YAW), NUMBER, {NULL, NULL}},
+    {"drive", "yaw_accel_mrad_s2", INDEX(YAW_ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "max_current_mA", INDEX(MAX_CURRENT), NUMBER, {NULL, NULL}},
     {"drive", "zero_hold_ms", INDEX(ZERO_HOLD), NUMBER, {NULL, NULL}},
     {"limits", "wheel_silent_ms", INDEX(WHEEL_SILENT), NUMBER, {NULL, NULL}},
@@ -61,7 +61,7 @@ static const row_t rows[] = {
 };
 #define ROWS (sizeof rows / sizeof rows[0])
 
-iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
+iw_settings_t iw_settings_from(const iw_config_t *config) {
     iw_settings_t self;
     memcpy(self.value, (const uint8_t *)config + FIRST, TYPE * sizeof self.value[0]);
     self.value[TYPE] = config->setpoint_type_set ? config->setpoint_type : UNSET;
@@ -71,11 +71,10 @@ iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
         self.value[INVERT_LEFT + side] = config->invert[side] ? 1U : 0U;
         self.value[UNIT_LEFT + side] = (uint16_t)config->force_unit[side];
     }
-    self.value[TRACK] = (uint16_t)track_mm;
     return self;
 }
 
-uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
+void iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
     memcpy((uint8_t *)config + FIRST, self->value, TYPE * sizeof self->value[0]);
     config->setpoint_type_set = self->value[TYPE] != UNSET;
     config->setpoint_type = config->setpoint_type_set ? (uint8_t)self->value[TYPE] : 0U;
@@ -85,7 +84,6 @@ uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
         config->invert[side] = self->value[INVERT_LEFT + side] != 0U;
         config->force_unit[side] = (iw_force_unit_t)self->value[UNIT_LEFT + side];
     }
-    return self->value[TRACK];
 }
 
 static const row_t *find(const char *key) {
@@ -115,8 +113,6 @@ static iw_config_range_t range_of(const row_t *row) {
     switch (row->kind) {
     case BYTE:
         return (iw_config_range_t){0U, UINT8_MAX};
-    case DISTANCE:
-        return (iw_config_range_t){TRACK_MIN_MM, TRACK_MAX_MM};
     default:
         return iw_config_range((iw_config_fault_t)(row->at + 1U));
     }
@@ -180,7 +176,7 @@ bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iw
 bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
     iw_config_t config;
     iw_config_default(&config);
-    (void)iw_settings_to(self, &config);
+    iw_settings_to(self, &config);
     switch (iw_config_check(&config)) {
     case IW_CONFIG_OK:
         return true;

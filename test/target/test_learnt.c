@@ -46,7 +46,7 @@ void tearDown(void) {}
 static iw_settings_t settings_of(const char *key, const char *value) {
     char why[200];
     iwn_text_t text = iwn_text_begin(why, sizeof why);
-    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_settings_t settings = iw_settings_from(&rig.config);
     TEST_ASSERT_TRUE_MESSAGE(key == NULL || iw_settings_set(&settings, key, value, &text), why);
     return settings;
 }
@@ -209,18 +209,23 @@ static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
-/// As version 0.2 wrote it: 26 values, without the three of the pair behind the 14th; then whether something is learnt, and that.
+/// As version 0.2 wrote them: 26 values, without the five of the pair and of yaw behind the 14th, and the track at the end.
+static void values_as_before(uint8_t *out, const iw_settings_t *settings) {
+    memcpy(out, settings->value, 14U * sizeof(uint16_t));
+    memcpy(out + 28U, &settings->value[20], 11U * sizeof(uint16_t));
+    memcpy(out + 50U, &settings->value[19], sizeof(uint16_t));
+}
+
+/// Its record: settings, then whether something is learnt, and that.
 static void write_as_before(iw_kept_t *kept, const iw_settings_t *settings, const iw_learnt_t *learnt) {
     uint32_t words[IW_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
     uint8_t *const rest = (uint8_t *)&words[2];
     if (settings != NULL) {
-        memcpy(rest, settings->value, 14U * sizeof(uint16_t));
-        memcpy(rest + 28U, &settings->value[17], 12U * sizeof(uint16_t));
+        values_as_before(rest, settings);
     }
     if (learnt != NULL) {
         words[15] = 1U;
-        memcpy(rest + 56U, learnt->settings.value, 14U * sizeof(uint16_t));
-        memcpy(rest + 84U, &learnt->settings.value[17], 12U * sizeof(uint16_t));
+        values_as_before(rest + 56U, &learnt->settings);
         memcpy(rest + 108U, learnt->zero, sizeof *learnt - offsetof(iw_learnt_t, zero));
     }
     TEST_ASSERT_TRUE(iw_store_write(&kept->store, words, false));

@@ -35,6 +35,9 @@ typedef struct {
     uint16_t pair_mm;         ///< So far may the pair leave its path, right minus left, 20..150 ...
     uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000. Then it stops.
     uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
+    uint16_t max_yaw_mrad_s;  ///< So fast may the machine turn, 50..10000. A faster command is scaled, both wheels.
+    uint16_t yaw_accel_mrad_s2; ///< Its turning may grow so fast under a drive command, 100..10000.
+    uint16_t track_mm;          ///< Distance of the wheels, 200..1500. It turns yaw into speeds and back.
     uint16_t radius_mm;       ///< Of the wheel, 20..500; the document says "approximately 192".
     uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
     uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
@@ -71,6 +74,9 @@ typedef enum {
     IW_CONFIG_PAIR,
     IW_CONFIG_PAIR_LEAK,
     IW_CONFIG_WHEEL_LAG,
+    IW_CONFIG_MAX_YAW,
+    IW_CONFIG_YAW_ACCEL,
+    IW_CONFIG_TRACK,
     IW_CONFIG_RADIUS,
     IW_CONFIG_GEAR_TURNS,
     IW_CONFIG_GEAR_PER,
