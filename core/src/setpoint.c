@@ -147,8 +147,7 @@ static shares_t common_shares(const axis_t *axes, size_t count) {
     shares_t shares = {FRACTION_ONE, FRACTION_ONE};
     for (size_t i = 0; i < count; i++) {
         shares.all = (axes[i].fraction < shares.all) ? axes[i].fraction : shares.all;
-        shares.braking =
-            (axes[i].braking && axes[i].fraction < shares.braking) ? axes[i].fraction : shares.braking;
+        shares.braking = (axes[i].braking && axes[i].fraction < shares.braking) ? axes[i].fraction : shares.braking;
     }
     return shares;
 }

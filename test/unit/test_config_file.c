@@ -104,7 +104,8 @@ static void test_parse_every_key_reaches_its_field(void) {
         "[wheels]\nsetpoint_type=0\ncurrent_role=setpoint\nrpm_of=rotor\nradius_mm=200\ngear_ratio=27/2\ntrack_mm=600\n"
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
-        "max_yaw_mrad_s=900\nyaw_accel_mrad_s2=1900\nmax_current_mA=1500\nzero_hold_ms=1200\n[limits]\nwheel_silent_ms=60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
+        "max_yaw_mrad_s=900\nyaw_accel_mrad_s2=1900\nmax_current_mA=1500\nzero_hold_ms=1200\n[limits]\nwheel_silent_ms="
+        "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\n"
         "[northbound]\nsocket=/tmp/s\nmode=0600\ngroup=dialout\nmax_clients=4\n[record]\nblackbox_s=0\ndirectory=/"
@@ -127,12 +128,13 @@ static void test_parse_every_key_reaches_its_field(void) {
     TEST_ASSERT_FALSE(core->invert[IW_RIGHT]);
     TEST_ASSERT_EQUAL(IW_FORCE_DN, core->force_unit[IW_LEFT]);
     TEST_ASSERT_EQUAL(IW_FORCE_CN, core->force_unit[IW_RIGHT]);
-    const uint16_t numbers[] = {core->period_ms,      core->lease_ms,       core->accel_mm_s2,  core->decel_mm_s2,
-                                core->max_speed_mm_s, core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms,
-                                core->echo_ms,        core->rest_rpm,       core->rest_ms,      core->follow_mm_s,
-                                core->follow_ms,      core->blocked_ms,     core->pair_mm,      core->pair_leak_ms,
-                                core->wheel_lag_ms,   core->max_yaw_mrad_s, core->yaw_accel_mrad_s2};
-    const uint16_t wanted[] = {10, 300, 500, 2000, 900, 1500, 1200, 60, 70, 3, 250, 310, 510, 1100, 61, 1001, 62, 900, 1900};
+    const uint16_t numbers[] = {
+        core->period_ms,      core->lease_ms,     core->accel_mm_s2,     core->decel_mm_s2,      core->max_speed_mm_s,
+        core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms, core->echo_ms,          core->rest_rpm,
+        core->rest_ms,        core->follow_mm_s,  core->follow_ms,       core->blocked_ms,       core->pair_mm,
+        core->pair_leak_ms,   core->wheel_lag_ms, core->max_yaw_mrad_s,  core->yaw_accel_mrad_s2};
+    const uint16_t wanted[] = {10,  300, 500, 2000, 900, 1500, 1200, 60,  70,  3,
+                               250, 310, 510, 1100, 61,  1001, 62,   900, 1900};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
     TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", config.estop.chip);
