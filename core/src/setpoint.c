@@ -47,9 +47,11 @@ static void clear(iw_setpoint_t *self) {
 }
 
 void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config) {
+    const iw_yaw_machine_t machine = {config->max_yaw_mrad_s, config->yaw_accel_mrad_s2, config->track_mm,
+                                      config->radius_mm};
     memset(self, 0, sizeof *self);
     self->config = config;
-    iw_yaw_init(&self->yaw, config);
+    iw_yaw_init(&self->yaw, &machine);
     self->last_us = IW_NEVER;
     self->due_us = IW_NEVER;
     clear(self);

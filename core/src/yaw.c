@@ -7,15 +7,14 @@
 /// Each wheel's part is cut off to whole um/s, so both together may be beyond by less than this.
 #define ROUNDING_UM_S 2
 
-/// A yaw in mrad as the difference of setpoints in mm; the same for their rates. The ranges keep the product within 32
-/// bits.
-static IW_APART uint32_t difference_of(uint32_t mrad, const iw_config_t *config) {
-    return mrad * config->track_mm * IW_DIVERGE_RADIUS_MM / (config->radius_mm * 1000U);
+/// A yaw in mrad as the difference of setpoints in mm; the same for their rates.
+static IW_APART uint32_t difference_of(uint32_t mrad, const iw_yaw_machine_t *machine) {
+    return mrad * machine->track_mm * IW_DIVERGE_RADIUS_MM / (machine->radius_mm * 1000U);
 }
 
-void iw_yaw_init(iw_yaw_t *self, const iw_config_t *config) {
-    self->most_mm_s = (int32_t)difference_of(config->max_yaw_mrad_s, config);
-    self->growth_mm_s2 = difference_of(config->yaw_accel_mrad_s2, config);
+void iw_yaw_init(iw_yaw_t *self, const iw_yaw_machine_t *machine) {
+    self->most_mm_s = (int32_t)difference_of(machine->max_yaw_mrad_s, machine);
+    self->growth_mm_s2 = difference_of(machine->yaw_accel_mrad_s2, machine);
 }
 
 bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {

@@ -30,14 +30,13 @@ static void test_yaw_bounds_are_those_of_the_real_machine(void) {
         {10000, 10000, 1500, 60, 48000, 48000}, {10000, 10000, 1500, 20, 144000, 144000},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        iw_yaw_t yaw;
         rig.config.max_yaw_mrad_s = cases[i].max_mrad_s;
         rig.config.yaw_accel_mrad_s2 = cases[i].accel_mrad_s2;
         rig.config.track_mm = cases[i].track_mm;
         rig.config.radius_mm = cases[i].radius_mm;
-        iw_yaw_init(&yaw, &rig.config);
-        TEST_ASSERT_EQUAL_INT32(cases[i].most_mm_s, yaw.most_mm_s);
-        TEST_ASSERT_EQUAL_UINT32(cases[i].growth_mm_s2, yaw.growth_mm_s2);
+        setpoint_rig_begin(&rig);
+        TEST_ASSERT_EQUAL_INT32(cases[i].most_mm_s, rig.setpoint.yaw.most_mm_s);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].growth_mm_s2, rig.setpoint.yaw.growth_mm_s2);
     }
 }
 

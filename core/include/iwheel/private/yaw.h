@@ -6,14 +6,22 @@
 ///
 /// Both limits hold for the real machine: a setpoint in mm/s means that speed at IW_DIVERGE_RADIUS_MM, so the real one is
 /// setpoint x `radius_mm` / IW_DIVERGE_RADIUS_MM. Yaw is right minus left by `track_mm`. Configuration and track
-/// become two bounds of that difference once, so that no step divides.
+/// become two bounds of that difference.
 ///
 /// No limit makes a wheel faster than asked, changes its sign, or moves one that was commanded 0. Growth is bounded under
 /// a drive command only: a stop, a command of 0/0 and a yaw that falls know no limit here.
 #ifndef IW_YAW_H
 #define IW_YAW_H
 
-#include "iwheel/config.h"
+#include "iwheel/types.h"
+
+/// What is configured, checked: the ranges of iw_config_t keep every product within 32 bits.
+typedef struct {
+    uint32_t max_yaw_mrad_s;    ///< Of the real machine.
+    uint32_t yaw_accel_mrad_s2; ///< Of the real machine.
+    uint32_t track_mm;          ///< Distance of the wheels.
+    uint32_t radius_mm;         ///< Of the wheels.
+} iw_yaw_machine_t;
 
 /// Bounds of the difference of both setpoints, right minus left.
 typedef struct {
@@ -42,8 +50,8 @@ typedef struct {
     uint32_t whole_um_s;    ///< of this.
 } iw_yaw_cut_t;
 
-/// `config` must be checked.
-void iw_yaw_init(iw_yaw_t *self, const iw_config_t *config);
+/// Once, so that no step divides.
+void iw_yaw_init(iw_yaw_t *self, const iw_yaw_machine_t *machine);
 
 /// Scales both speeds (each within int16) by one factor, so that the curve stays. True if they had to be.
 bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]);
