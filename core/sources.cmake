@@ -22,4 +22,5 @@ set(IWHEEL_CORE_SOURCES
     src/snapshot.c
     src/step.c
     src/watch_pair.c
-    src/wheel.c)
+    src/wheel.c
+    src/yaw.c)

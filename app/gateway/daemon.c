@@ -15,7 +15,7 @@ void gw_daemon_compose(gw_daemon_t *self) {
     self->knowledge.wheels = wheels;
     self->knowledge.log = &self->log;
     self->knowledge.clients = clients;
-    self->knowledge.configured = (gw_configured_t){&config->core, config->track_mm};
+    self->knowledge.configured = (gw_configured_t){&config->core, config->core.track_mm};
     self->knowledge.bus = config->bus.interface;
     self->status = (gw_status_t){
         .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};

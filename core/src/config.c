@@ -26,6 +26,9 @@ static const iw_config_t standard = {
     .pair_mm = 60,
     .pair_leak_ms = 1000,
     .wheel_lag_ms = 60,
+    .max_yaw_mrad_s = 1000,
+    .yaw_accel_mrad_s2 = 2000,
+    .track_mm = 540,
     .radius_mm = 192,
     .gear_turns = 1,
     .gear_per = 1,
@@ -53,6 +56,9 @@ static const iw_config_range_t ranges[] = {
     {20, 150},                          // pair_mm
     {500, 3000},                        // pair_leak_ms
     {10, 300},                          // wheel_lag_ms
+    {50, 10000},                        // max_yaw_mrad_s
+    {100, 10000},                       // yaw_accel_mrad_s2
+    {200, 1500},                        // track_mm
     {60, 400},                          // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per

@@ -100,6 +100,11 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_tim
             return IW_SEND_STOPPED;
         }
     }
+    const iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
+    if (verdict != IW_ENVELOPE_PASS) {
+        self->verdict = verdict;
+        return IW_SEND_STOPPED;
+    }
     return hand_over_both(self, now_us, zero) ? IW_SEND_DONE : IW_SEND_LATER;
 }
 

@@ -6,10 +6,10 @@
 #include <string.h>
 
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
-enum { TYPE = 22, ROLE, TRACK, SWITCHES, SETTINGS_END };
+enum { TYPE = 25, ROLE, SWITCHES, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 21U * sizeof(uint16_t),
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * sizeof(uint16_t),
                  the_core_s_numbers_are_side_by_side);
 
 /// Bits of SWITCHES, in the order of version 0.2, which kept a number for each of the first five.
@@ -17,12 +17,10 @@ enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC 
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
-#define TRACK_MIN_MM  50U
-#define TRACK_MAX_MM  5000U
 #define NUMBER_DIGITS 5U
 
 /// How a value is written.
-typedef enum { NUMBER, BYTE, DISTANCE, GEAR, WORDS, SWITCH } kind_t;
+typedef enum { NUMBER, BYTE, GEAR, WORDS, SWITCH } kind_t;
 
 typedef struct {
     const char *section;
@@ -38,7 +36,7 @@ static const row_t rows[] = {
     {"wheels", "rpm_of", RPM_OF, SWITCH, {"wheel", "rotor"}},
     {"wheels", "radius_mm", INDEX(RADIUS), NUMBER, {NULL, NULL}},
     {"wheels", "gear_ratio", INDEX(GEAR_TURNS), GEAR, {NULL, NULL}},
-    {"wheels", "track_mm", TRACK, DISTANCE, {NULL, NULL}},
+    {"wheels", "track_mm", INDEX(TRACK), NUMBER, {NULL, NULL}},
     {"wheels", "setpoint_dlc", INDEX(SETPOINT_DLC), NUMBER, {NULL, NULL}},
     {"left", "invert", INVERT_LEFT, SWITCH, {"no", "yes"}},
     {"left", "force_unit", UNIT_LEFT, SWITCH, {"cN", "dN"}},
@@ -49,6 +47,8 @@ static const row_t rows[] = {
     {"drive", "accel_mm_s2", INDEX(ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "decel_mm_s2", INDEX(DECEL), NUMBER, {NULL, NULL}},
     {"drive", "max_speed_mm_s", INDEX(MAX_SPEED), NUMBER, {NULL, NULL}},
+    {"drive", "max_yaw_mrad_s", INDEX(MAX_YAW), NUMBER, {NULL, NULL}},
+    {"drive", "yaw_accel_mrad_s2", INDEX(YAW_ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "max_current_mA", INDEX(MAX_CURRENT), NUMBER, {NULL, NULL}},
     {"drive", "min_current_mA", INDEX(MIN_CURRENT), NUMBER, {NULL, NULL}},
     {"drive", "asymmetric_current", ASYMMETRIC, SWITCH, {"no", "yes"}},
@@ -75,12 +75,11 @@ static bool is_on(const iw_settings_t *self, unsigned bit) {
     return (self->value[SWITCHES] & (1U << bit)) != 0U;
 }
 
-iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
+iw_settings_t iw_settings_from(const iw_config_t *config) {
     iw_settings_t self;
     memcpy(self.value, (const uint8_t *)config + FIRST, TYPE * sizeof self.value[0]);
     self.value[TYPE] = config->setpoint_type_set ? config->setpoint_type : UNSET;
     self.value[ROLE] = (uint16_t)config->current_role;
-    self.value[TRACK] = (uint16_t)track_mm;
     self.value[SWITCHES] = 0;
     turn(&self, RPM_OF, config->rpm_of_rotor);
     turn(&self, ASYMMETRIC, config->asymmetric_current);
@@ -99,17 +98,18 @@ iw_settings_t iw_settings_from_before(const uint16_t value[IW_SETTINGS_BEFORE]) 
         INDEX(GEAR_TURNS),  INDEX(GEAR_PER),     INDEX(SETPOINT_DLC), TYPE,           ROLE};
     iw_config_t standard;
     iw_config_default(&standard);
-    iw_settings_t self = iw_settings_from(&standard, value[IW_SETTINGS_BEFORE - 1U]);
+    iw_settings_t self = iw_settings_from(&standard);
     for (size_t i = 0; i < sizeof numbers; i++) {
         self.value[numbers[i]] = value[i];
     }
+    self.value[INDEX(TRACK)] = value[IW_SETTINGS_BEFORE - 1U];
     for (unsigned bit = RPM_OF; bit <= UNIT_RIGHT; bit++) {
         turn(&self, bit, value[sizeof numbers + bit] != 0U);
     }
     return self;
 }
 
-uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
+void iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
     memcpy((uint8_t *)config + FIRST, self->value, TYPE * sizeof self->value[0]);
     config->setpoint_type_set = self->value[TYPE] != UNSET;
     config->setpoint_type = config->setpoint_type_set ? (uint8_t)self->value[TYPE] : 0U;
@@ -120,7 +120,6 @@ uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
         config->invert[side] = is_on(self, INVERT_LEFT + side);
         config->force_unit[side] = is_on(self, UNIT_LEFT + side) ? IW_FORCE_DN : IW_FORCE_CN;
     }
-    return self->value[TRACK];
 }
 
 static const row_t *find(const char *key) {
@@ -150,8 +149,6 @@ static iw_config_range_t range_of(const row_t *row) {
     switch (row->kind) {
     case BYTE:
         return (iw_config_range_t){0U, UINT8_MAX};
-    case DISTANCE:
-        return (iw_config_range_t){TRACK_MIN_MM, TRACK_MAX_MM};
     default:
         return iw_config_range((iw_config_fault_t)(row->at + 1U));
     }
@@ -219,7 +216,7 @@ bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iw
 bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
     iw_config_t config;
     iw_config_default(&config);
-    (void)iw_settings_to(self, &config);
+    iw_settings_to(self, &config);
     switch (iw_config_check(&config)) {
     case IW_CONFIG_OK:
         return true;

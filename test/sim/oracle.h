@@ -71,6 +71,7 @@ typedef struct {
     iw_time_us_t held_us; ///< In LATCHED: zeros are held since then, at the latest a period later.
     iw_time_us_t path_at_us;
     int64_t path_nm;        ///< How far the pair has left its path, without any lag: right minus left, leaking.
+    iw_time_us_t turn_us;   ///< When both wheels were handed a setpoint.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
 

@@ -41,6 +41,12 @@ void oracle_judge_limit(oracle_t *self, iw_time_us_t now_us, size_t side, const 
 void oracle_judge_applied_limits(oracle_t *self, iw_time_us_t now_us, const iw_drive_t *request,
                                  const iw_applied_t *applied);
 
+/// That command would turn the machine faster than configured.
+bool oracle_turns_too_fast(const oracle_t *self, int32_t left_mm_s, int32_t right_mm_s);
+
+/// Right after the step: what was sent turns the machine no faster, and not faster too soon.
+void oracle_judge_turn(oracle_t *self, iw_time_us_t now_us);
+
 /// The public state changed, or may have.
 void oracle_observe(oracle_t *self, iw_time_us_t now_us);
 

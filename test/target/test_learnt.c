@@ -46,7 +46,7 @@ void tearDown(void) {}
 static iw_settings_t settings_of(const char *key, const char *value) {
     char why[200];
     iwn_text_t text = iwn_text_begin(why, sizeof why);
-    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_settings_t settings = iw_settings_from(&rig.config);
     TEST_ASSERT_TRUE_MESSAGE(key == NULL || iw_settings_set(&settings, key, value, &text), why);
     return settings;
 }
@@ -213,7 +213,7 @@ static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
 static void put_as_before(uint8_t *place, const iw_settings_t *settings) {
     iw_config_t config;
     iw_config_default(&config);
-    const uint32_t track_mm = iw_settings_to(settings, &config);
+    iw_settings_to(settings, &config);
     const uint16_t value[26] = {config.period_ms,
                                 config.lease_ms,
                                 config.accel_mm_s2,
@@ -239,7 +239,7 @@ static void put_as_before(uint8_t *place, const iw_settings_t *settings) {
                                 config.invert[IW_RIGHT],
                                 (uint16_t)config.force_unit[IW_LEFT],
                                 (uint16_t)config.force_unit[IW_RIGHT],
-                                (uint16_t)track_mm};
+                                config.track_mm};
     memcpy(place, value, sizeof value);
 }
 

@@ -112,6 +112,7 @@ static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_facto
     };
     rig.config.max_current_mA = 1000;
     rig.config.asymmetric_current = true;
+    rig.config.max_yaw_mrad_s = 10000; // Only the maximum speed is judged here.
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

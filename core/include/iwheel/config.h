@@ -42,10 +42,13 @@ typedef struct {
     uint16_t pair_mm;         ///< So far may the pair leave its path, right minus left, 20..150 ...
     uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000. Then it stops.
     uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
-    uint16_t radius_mm;       ///< Of the wheel, 60..400; the document says "approximately 192".
-    uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
-    uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
-    uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
+    uint16_t max_yaw_mrad_s;  ///< So fast may a machine turn, 50..10000. Faster commands are scaled down by one factor.
+    uint16_t yaw_accel_mrad_s2; ///< So fast may its turning grow under a drive command, 100..10000. No stop is slowed.
+    uint16_t track_mm;     ///< Distance of the wheels, 200..1500. It turns yaw into speeds and back, as the radius.
+    uint16_t radius_mm;    ///< Of the wheel, 60..400; the document says "approximately 192".
+    uint16_t gear_turns;   ///< Rotor turns in `gear_per` wheel turns, 1..1000.
+    uint16_t gear_per;     ///< 1..1000. Together the ratio must lie within 1..100.
+    uint16_t setpoint_dlc; ///< 5..8, zero padded. The document's table has 5 bytes.
 } iw_config_t;
 
 // Fixed by the safety rules.
@@ -79,6 +82,9 @@ typedef enum {
     IW_CONFIG_PAIR,
     IW_CONFIG_PAIR_LEAK,
     IW_CONFIG_WHEEL_LAG,
+    IW_CONFIG_MAX_YAW,
+    IW_CONFIG_YAW_ACCEL,
+    IW_CONFIG_TRACK,
     IW_CONFIG_RADIUS,
     IW_CONFIG_GEAR_TURNS,
     IW_CONFIG_GEAR_PER,

@@ -11,7 +11,7 @@
 ///
 /// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
 ///
-/// R1 to R14 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R17 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
