@@ -73,6 +73,10 @@ typedef struct {
     int64_t path_nm;        ///< How far the pair has left its path, without any lag: right minus left, leaking.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
+    bool rolling_fault;
+    iw_time_us_t turning_us;  ///< Since when a wheel turns although nothing is sent; IW_NEVER: none does.
+    iw_time_us_t turned_us;   ///< When a wheel turned last; IW_NEVER: never.
+    iw_time_us_t setpoint_us; ///< When setpoints were last due; IW_NEVER: never.
 
     int estop;
     iw_bus_state_t bus;

@@ -246,6 +246,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     judge_gaps(self, now_us);
     judge_pair(self, now_us);
     judge_estop_zero(self, now_us, before);
+    oracle_judge_rolling(self, now_us);
     self->step_us = now_us;
     self->timing_bad = self->gateway->facts.timing_contradicted;
 }
