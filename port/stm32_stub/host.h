@@ -25,7 +25,7 @@
 #include "iwheel_northbound/tell.h"
 
 /// The longest line to the host, with its newline: told by the event link.
-#define IW_HOST_LINE_BYTES 4608U
+#define IW_HOST_LINE_BYTES 4480U
 /// The longest line but a snapshot's.
 #define IW_HOST_SMALL_BYTES 1664U
 /// What events leave free of the line, for replies.
@@ -79,6 +79,8 @@ typedef struct {
     uint32_t assumed_changes;
     uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
     bool left_behind;
+    bool rolling;
+    bool rolling_fault;
     bool estop_high;
     bool started;
     char holder_name[IWN_NAME_MAX + 1U];
