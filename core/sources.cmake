@@ -7,6 +7,7 @@ set(IWHEEL_CORE_SOURCES
     src/codec.c
     src/config.c
     src/confirmation.c
+    src/current.c
     src/diverge.c
     src/envelope.c
     src/evidence.c
@@ -21,4 +22,5 @@ set(IWHEEL_CORE_SOURCES
     src/snapshot.c
     src/step.c
     src/watch_pair.c
-    src/wheel.c)
+    src/wheel.c
+    src/yaw.c)

@@ -22,8 +22,7 @@ void pretend_wheels_run(pretend_wheels_t *self) {
     }
 }
 
-static int send(void *context, const iw_can_frame_t *frame) {
-    pretend_wheels_t *self = (pretend_wheels_t *)context;
+static void hear(pretend_wheels_t *self, const iw_can_frame_t *frame) {
     iw_can_frame_t echo = *frame;
     iw_codec_wheel_t told[IW_SIDES];
     if (iw_codec_decode(frame, told) == IW_CODEC_SETPOINT) {
@@ -35,7 +34,14 @@ static int send(void *context, const iw_can_frame_t *frame) {
     }
     echo.kind = IW_CAN_ECHO;
     put(self, &echo);
-    return 1;
+}
+
+static int send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    pretend_wheels_t *self = (pretend_wheels_t *)context;
+    for (uint32_t i = 0; i < count; i++) {
+        hear(self, &frames[i]);
+    }
+    return (int)count;
 }
 
 static int receive(void *context, iw_can_frame_t *out_frame) {

@@ -71,7 +71,7 @@ iw_time_us_t sim_socketcan_next_us(const sim_socketcan_t *self) {
 }
 
 void sim_socketcan_deliver(sim_socketcan_t *self, const sim_delivery_t *delivery) {
-    if (self->is_open && delivery->port != self->port && iw_bus_send(&self->bus, &delivery->frame) <= 0) {
+    if (self->is_open && delivery->port != self->port && iw_bus_send(&self->bus, &delivery->frame, 1) <= 0) {
         self->lost += 1U;
     }
 }

@@ -63,16 +63,34 @@ static void arm_for_command(bridge_t *self, int64_t age_us) {
     (void)snprintf(commands->refusal, sizeof commands->refusal, "%s", refused ? iwc_reason(self->gateway) : "");
 }
 
+/// Counts what is another publisher's than the one that has the wheels.
+static bool is_of_another(bridge_t *self, const ros_command_t *command, const judged_t *judged) {
+    const bool another = self->driver != 0 && self->driver != command->source;
+    self->facts.commands.others += (another && judged->moves) ? 1U : 0U;
+    return another;
+}
+
+static void pass_on(bridge_t *self, const ros_command_t *command, const judged_t *judged) {
+    if (iwc_twist(self->gateway, judged->twist.v_mm_s, judged->twist.yaw_mrad_s, 0, NULL) != IWC_OK) {
+        return;
+    }
+    if (judged->moves && self->leased_us != 0) {
+        self->driver = command->source;
+    }
+    self->facts.commands.unsent--;
+    self->facts.commands.passed++;
+    self->commanded_us = now_us();
+}
+
 static void take_command(bridge_t *self, const ros_command_t *command) {
     const iwc_state_t *state = &self->facts.machine.now;
-    ros_commands_t *commands = &self->facts.commands;
     const judged_t judged = judge_command(self, command);
     const bool quiet = ros_auto_command(&self->auto_arm, judged.moves, self->coming_us);
     const bool zero_of_unknown = judged.age == ROS_AGE_UNKNOWN && !judged.moves;
-    if (!judged.good || (judged.age != ROS_AGE_FRESH && !zero_of_unknown)) {
+    if (!judged.good || (judged.age != ROS_AGE_FRESH && !zero_of_unknown) || is_of_another(self, command, &judged)) {
         return;
     }
-    commands->unsent++; // Until it is.
+    self->facts.commands.unsent++; // Until it is.
     if (bridge_why_not_drive(self)[0] != '\0') {
         return;
     }
@@ -81,11 +99,7 @@ static void take_command(bridge_t *self, const ros_command_t *command) {
         arm_for_command(self, judged.age_us);
         return;
     }
-    if (iwc_twist(self->gateway, judged.twist.v_mm_s, judged.twist.yaw_mrad_s, 0, NULL) == IWC_OK) {
-        commands->unsent--;
-        commands->passed++;
-        self->commanded_us = now_us();
-    }
+    pass_on(self, command, &judged);
 }
 
 static void take_from_ros(bridge_t *self) {
@@ -111,6 +125,7 @@ static void judge_silence(bridge_t *self, int64_t now) {
     self->commanded_us = 0;
     if (self->facts.link != ROS_LINK_GONE && self->facts.machine.now.ours) {
         self->silenced = true;
+        bridge_end_lease(self);
         if (iwc_stop(self->gateway, BRIDGE_ASK_MS) != IWC_OK && iwc_fd(self->gateway) < 0) {
             bridge_lose(self, "it did not answer to stop");
         }

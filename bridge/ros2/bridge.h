@@ -5,6 +5,8 @@
 /// waiting, because to wake another thread would take longer than all the rest. Whoever touches what is below holds `lock`; the thread of
 /// DDS only tries it, and wakes the loop if it is held: so DDS never waits for us.
 ///
+/// The lease belongs to the first publisher that drives after it was granted; what others publish is dropped until the wheels were stopped.
+///
 /// It passes a command on at most once and repeats nothing, so the wheels stop by the gateway's lease however it ends. Silence of its source
 /// makes it stop once, if it holds the lease; a person's stop is passed on always. After any stop somebody arms again.
 #ifndef ROS2_BRIDGE_H
@@ -26,6 +28,8 @@ typedef struct {
     ros_ages_t ages;       ///< By the time at which DDS says that a command or request was sent,
     ros_ages_t stamp_ages; ///< and by the one in a command's header.
     ros_auto_t auto_arm;
+    int64_t leased_us;    ///< When this bridge was granted the lease; 0: it has none.
+    uint64_t driver;      ///< The publisher that has the wheels: the first that drove since then; 0: none has driven.
     bool ledger_due;      ///< Read it out of the next snapshot.
     bool silenced;        ///< The stop that comes is ours: the source was silent.
     bool told_gone;       ///< The log knows already that the gateway is gone.

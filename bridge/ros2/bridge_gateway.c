@@ -6,6 +6,8 @@
 
 #define CONNECT_MS     200
 #define BACKOFF_MAX_US 2000000
+/// A snapshot that came so long after the lease was granted was made after it.
+#define GRANTED_US 200000
 
 int64_t bridge_clock_us(clockid_t clock) {
     struct timespec now;
@@ -19,6 +21,11 @@ static int64_t now_us(void) {
 
 // ---- there and gone -----------------------------------------------------------------------------------------------
 
+void bridge_end_lease(bridge_t *self) {
+    self->leased_us = 0;
+    self->driver = 0;
+}
+
 void bridge_lose(bridge_t *self, const char *why) {
     ros_machine_t *machine = &self->facts.machine;
     if (self->facts.link != ROS_LINK_GONE && machine->now.machine != IWC_LISTENING) {
@@ -27,6 +34,7 @@ void bridge_lose(bridge_t *self, const char *why) {
     iwc_close(self->gateway);
     self->facts.link = ROS_LINK_GONE;
     machine->now.ours = false;
+    bridge_end_lease(self);
     (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
     // Not all at once, where several wait for the same gateway.
     self->retry_us = now_us() + self->backoff_us * 3 / 4 + now_us() % (self->backoff_us / 2);
@@ -67,6 +75,9 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
     }
     self->facts.link = ROS_LINK_UP;
     self->heard_us = now_us();
+    if (self->leased_us != 0 && !machine->now.ours && self->heard_us - self->leased_us > GRANTED_US) {
+        bridge_end_lease(self);
+    }
     if (self->ledger_due) {
         self->ledger_due = false;
         ros_facts_read_ledger(message, machine);
@@ -129,6 +140,7 @@ static void take_stop(bridge_t *self, const iwc_message_t *event) {
     ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
     self->silenced = false;
     self->commanded_us = 0;
+    bridge_end_lease(self);
 }
 
 /// Replies are those to commands: all else is waited for.

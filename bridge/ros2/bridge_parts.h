@@ -18,6 +18,9 @@ iwc_result_t bridge_call(bridge_t *self);
 /// The connection ends here, and the lease with it; `why` is told in /diagnostics.
 void bridge_lose(bridge_t *self, const char *why);
 
+/// Nobody has the wheels by this bridge any more.
+void bridge_end_lease(bridge_t *self);
+
 /// Takes what the gateway has said, and publishes what is new of it.
 void bridge_listen(bridge_t *self);
 

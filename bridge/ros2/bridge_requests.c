@@ -34,6 +34,8 @@ iwc_result_t bridge_arm(bridge_t *self, int64_t age_us, iwc_terms_t *out_terms) 
     const iwc_result_t result = iwc_arm_as(self->gateway, &wanted, ARM_MS, out_terms, NULL);
     self->commanded_us = 0;
     self->silenced = false;
+    bridge_end_lease(self);
+    self->leased_us = (result == IWC_OK) ? bridge_clock_us(CLOCK_MONOTONIC) : 0;
     if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
         bridge_lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
     }
@@ -118,6 +120,8 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
         reason = "this is no request of std_srvs/srv/Trigger: call the service with that type";
     } else if (request->verb == ROS_ARM && bridge_why_not_drive(self)[0] != '\0') {
         reason = bridge_why_not_drive(self);
+    } else if (request->verb == ROS_ARM && self->driver != 0) {
+        reason = "busy: a publisher of cmd_vel has the wheels until they are stopped; call iwheel/stop, then arm again";
     } else if (request->verb == ROS_RESET && !self->settings.drive.allow_reset) {
         reason = "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes in "
                  "ros2.conf";
@@ -134,6 +138,7 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
 void bridge_take_request(bridge_t *self, const ros_request_t *request) {
     if (request->verb == ROS_STOP || request->verb == ROS_ESTOP) {
         ros_auto_person_stopped(&self->auto_arm);
+        bridge_end_lease(self);
     }
     if (self->facts.link == ROS_LINK_GONE) {
         ros_answer(self->ros, request, false, "there is no gateway; see /diagnostics");

@@ -135,6 +135,7 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     add(status, "passed", true, (int64_t)commands->passed);
     add(status, "dropped_late", true, (int64_t)commands->late);
     add(status, "dropped_unknown", true, (int64_t)commands->unknown);
+    add(status, "dropped_others", true, (int64_t)commands->others);
     add(status, "dropped_bad", true, (int64_t)commands->bad);
     add(status, "dropped_unsent", true, (int64_t)commands->unsent);
     add(status, "refused", true, (int64_t)commands->refused);
@@ -146,7 +147,9 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine; it only "
             "watches");
     } else if (commands->publishers > 1U) {
-        say(status, ROS_WARN, "%u publishers of cmd_vel contradict each other; put twist_mux in between",
+        say(status, ROS_WARN,
+            "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
+            "twist_mux in between",
             commands->publishers);
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);

@@ -23,6 +23,7 @@ typedef struct {
     uint64_t passed;                 ///< Handed to the gateway, each once.
     uint64_t late;                   ///< Too old, from the future, or overtaken.
     uint64_t unknown;                ///< Of a writer whose clock is not known yet, and not zero.
+    uint64_t others;                 ///< Of another publisher than the one that has the wheels, and not zero.
     uint64_t bad;                    ///< No numbers, or out of any range.
     uint64_t unsent;                 ///< The gateway was gone or did not read.
     uint64_t refused;                ///< By the gateway.

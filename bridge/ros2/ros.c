@@ -263,6 +263,7 @@ int ros_fd(const ros_t *self) {
 void ros_woken(ros_t *self) {
     uint64_t times;
     (void)!read(self->fd, &times, sizeof times);
+    ros_send_replies(self);
 }
 
 // ---- taking -------------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ typedef bool (*ros_came_t)(void *context);
 ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, FILE *err);
 void ros_close(ros_t *self);
 
-/// Readable when something came. `ros_woken` is called before taking it.
+/// Readable when something came. `ros_woken` is called before taking it, and once a second at least: it also writes the replies that waited.
 int ros_fd(const ros_t *self);
 void ros_woken(ros_t *self);
 

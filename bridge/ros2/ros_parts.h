@@ -3,6 +3,7 @@
 #ifndef ROS2_ROS_PARTS_H
 #define ROS2_ROS_PARTS_H
 
+#include "raw.h"
 #include "ros.h"
 
 #include <dds/dds.h>
@@ -32,6 +33,18 @@ typedef enum {
     WRITERS
 } writer_t;
 
+/// Replies that wait at a time; of more, the oldest leaves at once.
+#define ROS_WAITING 8U
+
+/// A reply whose caller is not known as a reader yet: DDS would send it to nobody.
+typedef struct {
+    bool used;
+    ros_verb_t verb;
+    uint64_t source;  ///< The writer of the request.
+    int64_t until_us; ///< CLOCK_MONOTONIC; then it leaves all the same.
+    ros_raw_t raw;
+} ros_reply_t;
+
 struct ros {
     ros_settings_t settings;
     dds_entity_t domain; ///< 0: not ours.
@@ -41,6 +54,7 @@ struct ros {
     dds_entity_t asks;
     dds_entity_t requests[ROS_VERBS];
     dds_entity_t replies[ROS_VERBS];
+    ros_reply_t waiting[ROS_WAITING]; ///< The oldest first.
     dds_entity_t graph;
     int fd; ///< An eventfd: DDS has something for us.
     ros_came_t came;
@@ -61,6 +75,9 @@ void ros_wake(dds_entity_t reader, void *context);
 
 /// The service of a verb, in the form of every vendor. False: DDS refuses it.
 bool ros_open_service(ros_t *self, ros_verb_t verb);
+
+/// Writes the replies that waited for their callers, or waited long enough.
+void ros_send_replies(ros_t *self);
 
 /// Nothing is a reply any more that leaves from here on.
 void ros_close_services(ros_t *self);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
-#include "raw.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 
@@ -9,10 +8,18 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
 
 /// The longest UDP datagram.
 #define MESSAGE_MAX 65536U
+/// Readers of replies among which the caller's is looked for.
+#define READERS_MAX     256U
+#define CLIENT_ID_SIZE  120U
+#define READER_NO_KEY   0x04U
+#define READER_WITH_KEY 0x07U
+/// So long a reply waits for its reader.
+#define WAIT_US 1000000
 
 static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
 
@@ -109,6 +116,11 @@ static dds_entity_t topic_of(const ros_t *self, ros_verb_t verb, bool is_reply) 
                          is_reply ? "std_srvs::srv::dds_::Trigger_Response_" : "std_srvs::srv::dds_::Trigger_Request_");
 }
 
+static void reader_came(dds_entity_t writer, const dds_publication_matched_status_t status, void *context) {
+    (void)status;
+    ros_wake(writer, context);
+}
+
 /// Request and reply know each other by an id in their user data, as rmw_cyclonedds does it.
 bool ros_open_service(ros_t *self, ros_verb_t verb) {
     char user_data[80];
@@ -123,6 +135,10 @@ bool ros_open_service(ros_t *self, ros_verb_t verb) {
         ros_writer(self, topic_of(self, verb, true), ros_qos(user_data, (int32_t)ROS_MARKS, true, false));
     if (self->replies[verb] > 0) {
         note_writer(self, verb);
+        dds_listener_t *listener = dds_create_listener(self);
+        dds_lset_publication_matched(listener, reader_came);
+        (void)dds_set_listener(self->replies[verb], listener);
+        dds_delete_listener(listener);
     }
     self->requests[verb] = ros_reader(self, topic_of(self, verb, false), ros_qos(user_data, 10, true, false), ros_wake);
     return self->requests[verb] > 0 && self->replies[verb] > 0;
@@ -174,6 +190,102 @@ bool ros_take_request(ros_t *self, ros_request_t *out_request) {
     return take_ask(self, out_request);
 }
 
+// ---- replies ------------------------------------------------------------------------------------------------------------
+
+static int64_t now_us(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+/// By this rmw_cyclonedds says which reader and writer are of one client: "clientid=...;" in their user data. Empty: it says nothing.
+static void client_id(const dds_builtintopic_endpoint_t *endpoint, char id[CLIENT_ID_SIZE]) {
+    void *data = NULL;
+    size_t size = 0;
+    id[0] = '\0';
+    if (dds_qget_userdata(endpoint->qos, &data, &size) && data != NULL) {
+        char *text = data; // CycloneDDS ends it with a zero of its own.
+        char *begin = strstr(text, "clientid=");
+        if (begin != NULL) {
+            (void)snprintf(id, CLIENT_ID_SIZE, "%.*s", (int)strcspn(begin, ";"), begin);
+        }
+        dds_free(data);
+    }
+}
+
+/// Fast DDS names the reader in the request (RTPS 2.2, 9.3.1.2: which kinds of entity are readers).
+static bool names_reader(const ros_caller_t *caller) {
+    const uint8_t kind = caller->guid[ROS_GUID_SIZE - 1U];
+    return caller->form == ROS_FORM_IDENTITY && (kind == READER_NO_KEY || kind == READER_WITH_KEY);
+}
+
+static bool is_reader_of(const dds_builtintopic_endpoint_t *reader, const ros_caller_t *caller,
+                         const dds_builtintopic_endpoint_t *writer) {
+    char ids[2][CLIENT_ID_SIZE];
+    if (names_reader(caller)) {
+        return memcmp(reader->key.v, caller->guid, ROS_GUID_SIZE) == 0;
+    }
+    client_id(reader, ids[0]);
+    client_id(writer, ids[1]);
+    return memcmp(reader->participant_key.v, writer->participant_key.v, ROS_GUID_SIZE) == 0 &&
+           strcmp(ids[0], ids[1]) == 0;
+}
+
+/// DDS finds the two ends of a client one after the other. A caller that is gone need not be waited for.
+static bool can_read(const ros_t *self, const ros_reply_t *reply) {
+    dds_instance_handle_t handles[READERS_MAX];
+    const dds_entity_t replies = self->replies[reply->verb];
+    dds_builtintopic_endpoint_t *writer = dds_get_matched_publication_data(self->requests[reply->verb], reply->source);
+    if (writer == NULL) {
+        return true;
+    }
+    const dds_return_t matched = dds_get_matched_subscriptions(replies, handles, READERS_MAX);
+    bool found = matched > (dds_return_t)READERS_MAX; // Too many to look for it.
+    for (size_t i = 0; !found && (dds_return_t)i < matched; i++) {
+        dds_builtintopic_endpoint_t *reader = dds_get_matched_subscription_data(replies, handles[i]);
+        if (reader != NULL) {
+            found = is_reader_of(reader, &reply->raw.caller, writer);
+            dds_builtintopic_free_endpoint(reader);
+        }
+    }
+    dds_builtintopic_free_endpoint(writer);
+    return found;
+}
+
+static void write_reply(ros_t *self, ros_reply_t *reply) {
+    note_reply(reply->verb, &reply->raw.caller);
+    if (dds_write(self->replies[reply->verb], &reply->raw) != DDS_RETCODE_OK) {
+        forget_reply(reply->verb);
+    }
+    reply->used = false;
+}
+
+static void hold_back(ros_t *self, const ros_reply_t *reply) {
+    size_t at = 0;
+    while (at < ROS_WAITING && self->waiting[at].used) {
+        at++;
+    }
+    if (at == ROS_WAITING) {
+        write_reply(self, &self->waiting[0]);
+        at--;
+        memmove(&self->waiting[0], &self->waiting[1], at * sizeof self->waiting[0]);
+    }
+    self->waiting[at] = *reply;
+}
+
+void ros_send_replies(ros_t *self) {
+    size_t kept = 0;
+    for (size_t i = 0; i < ROS_WAITING && self->waiting[i].used; i++) {
+        ros_reply_t *reply = &self->waiting[i];
+        if (now_us() >= reply->until_us || can_read(self, reply)) {
+            write_reply(self, reply);
+        } else if (kept++ < i) {
+            self->waiting[kept - 1U] = *reply;
+            reply->used = false;
+        }
+    }
+}
+
 void ros_answer(ros_t *self, const ros_request_t *request, bool success, const char *text) {
     if (request->by_topic) {
         (void)snprintf(self->text, sizeof self->text, "%s: %s%s%s", verbs[request->verb], success ? "done" : "refused",
@@ -182,10 +294,13 @@ void ros_answer(ros_t *self, const ros_request_t *request, bool success, const c
         (void)dds_write(self->writers[WRITES_ANSWER], &answer);
         return;
     }
-    ros_raw_t raw = {.size = 0};
-    raw.size = ros_service_write(&request->caller, success, text, raw.bytes, sizeof raw.bytes);
-    note_reply(request->verb, &request->caller);
-    if (dds_write(self->replies[request->verb], &raw) != DDS_RETCODE_OK) {
-        forget_reply(request->verb);
+    ros_reply_t reply = {
+        .used = true, .verb = request->verb, .source = request->source, .until_us = now_us() + WAIT_US};
+    reply.raw.caller = request->caller;
+    reply.raw.size = ros_service_write(&request->caller, success, text, reply.raw.bytes, sizeof reply.raw.bytes);
+    if (can_read(self, &reply)) {
+        write_reply(self, &reply);
+    } else {
+        hold_back(self, &reply);
     }
 }

@@ -14,6 +14,7 @@ static const iw_config_t standard = {
     .decel_mm_s2 = 1500,
     .max_speed_mm_s = 1000,
     .max_current_mA = IW_CURRENT_LIMIT_mA,
+    .min_current_mA = 300,
     .zero_hold_ms = 1500,
     .wheel_silent_ms = 50,
     .echo_ms = 50,
@@ -25,6 +26,9 @@ static const iw_config_t standard = {
     .pair_mm = 60,
     .pair_leak_ms = 1000,
     .wheel_lag_ms = 60,
+    .max_yaw_mrad_s = 1000,
+    .yaw_accel_mrad_s2 = 2000,
+    .track_mm = 540,
     .radius_mm = 192,
     .gear_turns = 1,
     .gear_per = 1,
@@ -40,6 +44,7 @@ static const iw_config_range_t ranges[] = {
     {100, 20000},                       // decel_mm_s2
     {10, 5000},                         // max_speed_mm_s
     {300, IW_CURRENT_LIMIT_mA},         // max_current_mA
+    {300, IW_CURRENT_LIMIT_mA},         // min_current_mA
     {1100, 5000},                       // zero_hold_ms
     {20, 200},                          // wheel_silent_ms
     {20, 200},                          // echo_ms
@@ -51,6 +56,9 @@ static const iw_config_range_t ranges[] = {
     {20, 150},                          // pair_mm
     {500, 3000},                        // pair_leak_ms
     {10, 300},                          // wheel_lag_ms
+    {50, 10000},                        // max_yaw_mrad_s
+    {100, 10000},                       // yaw_accel_mrad_s2
+    {200, 1500},                        // track_mm
     {60, 400},                          // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per

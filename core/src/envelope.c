@@ -4,6 +4,11 @@
 #include "iwheel/codec.h"
 #include "magnitude.h"
 
+/// Both speeds are cut off to whole mm/s: so far may the difference of a pair seem to grow by that alone.
+#define TURN_ROUNDING_MM_S 2U
+/// A setpoint means its speed at this radius: written here again, so that no error is shared.
+#define SETPOINT_RADIUS_MM 192U
+
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
 static uint32_t allowance(uint32_t slope_mm_s2, uint32_t elapsed_us) {
     const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
@@ -47,9 +52,10 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 }
 
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
-    // The document allows -2000 to 2000 mA and does not say what a limit below zero means.
-    const bool negative_limit = config->current_role == IW_ROLE_LIMIT && current_mA < 0;
-    return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
+    // A wheel with a limit near 0 has no torque; the document does not say what a limit below zero means.
+    const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA &&
+                           current_mA < (int32_t)config->max_current_mA;
+    return !low_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
 
 static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_us, iw_side_t side,
@@ -87,4 +93,38 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_
         self->stopped++;
     }
     return verdict;
+}
+
+/// In the machine's frame.
+static int32_t speed_ahead(const iw_config_t *config, iw_side_t side, const uint8_t *data) {
+    const int32_t speed_mm_s = as_the_wheel_reads(data).speed_mm_s;
+    return config->invert[side] ? -speed_mm_s : speed_mm_s;
+}
+
+/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track).
+static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t turn_mm_s) {
+    const iw_config_t *const config = self->config;
+    const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
+    const uint32_t span_mm2 = config->track_mm * SETPOINT_RADIUS_MM;
+    const uint32_t most = self->turn_mm_s + TURN_ROUNDING_MM_S;
+    if ((uint64_t)turn_mm_s * (config->radius_mm * 1000U) > (uint64_t)span_mm2 * config->max_yaw_mrad_s) {
+        return false;
+    }
+    return turn_mm_s <= most || (uint64_t)((turn_mm_s - most) * config->radius_mm) * 1000000000U <=
+                                    (uint64_t)(span_mm2 * config->yaw_accel_mrad_s2) * elapsed;
+}
+
+iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
+                                             iw_time_us_t now_us) {
+    const int32_t turn = speed_ahead(self->config, IW_RIGHT, frame[IW_RIGHT].data) -
+                         speed_ahead(self->config, IW_LEFT, frame[IW_LEFT].data);
+    const uint32_t turn_mm_s = (uint32_t)iw_magnitude(turn);
+    // A pair without yaw passes, as a stop does: this rule holds up no zero.
+    if (!turn_ok(self, iw_age_us(self->turn_us, now_us), turn_mm_s)) {
+        self->stopped++;
+        return IW_ENVELOPE_YAW;
+    }
+    self->turn_us = now_us;
+    self->turn_mm_s = turn_mm_s;
+    return IW_ENVELOPE_PASS;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
+#include "iwheel/private/current.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -114,15 +115,20 @@ static IW_APART bool drive_nonzero(const iw_config_t *config, const iw_drive_t *
 }
 
 /// Too fast is scaled, not refused: the client's direction is right, and a refusal would let the lease run out.
-static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *request) {
+static iw_applied_t limit_drive(const iw_config_t *config, const iw_yaw_t *yaw, const iw_drive_t *request) {
     iw_drive_t drive = *request;
     iw_applied_t applied;
     if (!drive.has_current) {
         drive.current_mA[IW_LEFT] = config->max_current_mA;
         drive.current_mA[IW_RIGHT] = config->max_current_mA;
     }
-    applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s);
+    applied.limited = iw_yaw_limit(yaw, drive.speed_mm_s);
+    applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s) || applied.limited;
     applied.limited = scale_pair(drive.current_mA, config->max_current_mA) || applied.limited;
+    if (config->current_role == IW_ROLE_LIMIT) {
+        const bool zero = drive.speed_mm_s[IW_LEFT] == 0 && drive.speed_mm_s[IW_RIGHT] == 0;
+        applied.limited = iw_current_limit(config, drive.current_mA, zero) || applied.limited;
+    }
     for (size_t side = 0; side < IW_SIDES; side++) {
         applied.pair.wheel[side].speed_mm_s = (int16_t)drive.speed_mm_s[side];
         applied.pair.wheel[side].current_mA = (int16_t)drive.current_mA[side];
@@ -145,7 +151,7 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_clien
     }
     const iw_refusal_t refusal = iw_permit_drive(&self->permit, sent_us, client, nonzero);
     if (refusal == IW_REFUSE_NONE) {
-        *out_applied = limit_drive(config, request);
+        *out_applied = limit_drive(config, &self->setpoint.yaw, request);
         iw_setpoint_command(&self->setpoint, sent_us, &out_applied->pair);
     }
     return refusal;

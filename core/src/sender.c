@@ -41,12 +41,29 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
     return verdict == IW_ENVELOPE_PASS;
 }
 
+static bool account(iw_sender_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted) {
+    self->sent.later += accepted ? 0U : 1U;
+    iw_confirmation_sent(&self->confirmation, side, now_us, &self->frame[side], accepted);
+    return accepted;
+}
+
+/// One wheel alone: only a zero leaves like that.
 static bool hand_over(iw_sender_t *self, iw_side_t side, iw_time_us_t now_us) {
     const iw_can_frame_t *const frame = &self->frame[side];
-    const bool accepted = self->hal->send(self->hal->context, frame) > 0;
-    self->sent.later += accepted ? 0U : 1U;
-    iw_confirmation_sent(&self->confirmation, side, now_us, frame, accepted);
-    return accepted;
+    return account(self, side, now_us, self->hal->send(self->hal->context, frame, 1U) > 0);
+}
+
+/// The pair leaves as one: both frames in one call, so that the process cannot be stopped or killed between them. What
+/// the port refuses on the left does not leave on the right either, unless it is a zero.
+static bool hand_over_as_one(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
+    const int accepted = self->hal->send(self->hal->context, self->frame, IW_SIDES);
+    if (account(self, IW_LEFT, now_us, accepted > 0)) {
+        return account(self, IW_RIGHT, now_us, accepted > 1);
+    }
+    if (zero) {
+        (void)hand_over(self, IW_RIGHT, now_us);
+    }
+    return false;
 }
 
 static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
@@ -58,21 +75,22 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     self->sent.pairs++;
 }
 
-/// Left, then right. What the port refuses on the left does not leave on the right either, unless it is a zero.
+/// Both, or of a zero pair the one that may leave (`iw_sender_ready`).
 static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
     const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
-    bool taken = true;
-    if (left) {
-        taken = hand_over(self, IW_LEFT, now_us);
+    bool accepted = true;
+    if (left && right) {
+        accepted = hand_over_as_one(self, now_us, zero);
+        if (accepted) {
+            measure_gap(self, now_us);
+        }
+    } else if (left) {
+        accepted = hand_over(self, IW_LEFT, now_us);
+    } else if (right) {
+        accepted = hand_over(self, IW_RIGHT, now_us);
     }
-    if (right && (taken || zero)) {
-        taken = hand_over(self, IW_RIGHT, now_us) && taken;
-    }
-    if (taken && left && right) {
-        measure_gap(self, now_us);
-    }
-    return taken;
+    return accepted;
 }
 
 /// Both frames are judged before the first one leaves, else a stopped right frame would leave the left one alone.
@@ -81,6 +99,11 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_tim
         if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side])) {
             return IW_SEND_STOPPED;
         }
+    }
+    const iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
+    if (verdict != IW_ENVELOPE_PASS) {
+        self->verdict = verdict;
+        return IW_SEND_STOPPED;
     }
     return hand_over_both(self, now_us, zero) ? IW_SEND_DONE : IW_SEND_LATER;
 }

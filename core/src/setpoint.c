@@ -2,6 +2,7 @@
 #include "iwheel/private/setpoint.h"
 
 #include "iwheel/codec.h"
+#include "iwheel/private/current.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -17,6 +18,12 @@ typedef struct {
     bool braking; ///< Towards zero.
     uint32_t fraction;
 } axis_t;
+
+/// Which share of their ways the quantities go in this step.
+typedef struct {
+    uint32_t all; ///< Those that do not brake.
+    uint32_t braking;
+} shares_t;
 
 /// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
@@ -35,14 +42,18 @@ static void clear(iw_setpoint_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->speed_um_s[side] = 0;
         self->current_uA[side] = 0;
+        self->limit_mA[side] = (int16_t)self->config->max_current_mA;
     }
     self->from_zero = true;
     forget_command(self);
 }
 
 void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config) {
+    const iw_yaw_machine_t machine = {config->max_yaw_mrad_s, config->yaw_accel_mrad_s2, config->track_mm,
+                                      config->radius_mm};
     memset(self, 0, sizeof *self);
     self->config = config;
+    iw_yaw_init(&self->yaw, &machine);
     self->last_us = IW_NEVER;
     self->due_us = IW_NEVER;
     clear(self);
@@ -135,18 +146,55 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
-/// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.
-static void advance_together(const axis_t *axes, size_t count) {
-    uint32_t braking = FRACTION_ONE;
-    uint32_t all = FRACTION_ONE;
+/// One common share of all ways; braking quantities do not wait for accelerating ones.
+static shares_t common_shares(const axis_t *axes, size_t count) {
+    shares_t shares = {FRACTION_ONE, FRACTION_ONE};
     for (size_t i = 0; i < count; i++) {
-        all = (axes[i].fraction < all) ? axes[i].fraction : all;
-        braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
+        shares.all = (axes[i].fraction < shares.all) ? axes[i].fraction : shares.all;
+        shares.braking = (axes[i].braking && axes[i].fraction < shares.braking) ? axes[i].fraction : shares.braking;
     }
+    return shares;
+}
+
+static int32_t part_of_way(const axis_t *axis, const shares_t *shares) {
+    const int64_t share = axis->braking ? shares->braking : shares->all;
+    return (int32_t)(share * (axis->aim - *axis->value) / (int64_t)FRACTION_ONE);
+}
+
+/// What the shares would do to the difference of both wheels, right minus left.
+static iw_yaw_step_t yaw_step(const iw_setpoint_t *self, const axis_t *axes, const shares_t *shares) {
+    iw_yaw_step_t step = {self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT], 0, 0};
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const int32_t part = part_of_way(&axes[side], shares);
+        const int32_t change = (side == IW_LEFT) ? -part : part;
+        if (axes[side].braking) {
+            step.braking_um_s += change;
+        } else {
+            step.faster_um_s += change;
+        }
+    }
+    return step;
+}
+
+static IW_APART uint32_t cut_share(uint32_t share, const iw_yaw_cut_t *cut) {
+    return (uint32_t)((uint64_t)share * fraction_of(cut->part_um_s, cut->whole_um_s) / FRACTION_ONE);
+}
+
+/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts.
+static void limit_yaw(const iw_setpoint_t *self, const axis_t *axes, uint32_t us, shares_t *shares) {
+    const iw_yaw_step_t step = yaw_step(self, axes, shares);
+    const iw_yaw_cut_t cut = iw_yaw_cut(&self->yaw, &step, ramp_step(self->yaw.growth_mm_s2, us));
+    if (cut.kind == IW_YAW_CUT_FASTER) {
+        shares->all = cut_share(shares->all, &cut);
+    } else if (cut.kind == IW_YAW_CUT_BRAKING) {
+        shares->braking = cut_share(shares->braking, &cut);
+        shares->all = 0;
+    }
+}
+
+static void move(const axis_t *axes, size_t count, const shares_t *shares) {
     for (const axis_t *axis = axes; axis < axes + count; axis++) {
-        const int64_t share = axis->braking ? braking : all;
-        const int32_t way = axis->aim - *axis->value;
-        *axis->value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
+        *axis->value += part_of_way(axis, shares);
     }
 }
 
@@ -164,7 +212,8 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     // After a second every ramp has ended.
     const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? elapsed_us : IW_WHEEL_WATCHDOG_US;
     const uint32_t granted_us = 2U * config->period_ms * IW_US_PER_MS;
-    const uint32_t away = ramp_step(config->accel_mm_s2, (us < granted_us) ? us : granted_us);
+    const uint32_t away_us = (us < granted_us) ? us : granted_us;
+    const uint32_t away = ramp_step(config->accel_mm_s2, away_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     axis_t axes[AXES];
@@ -179,10 +228,13 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
             axes[IW_SIDES + side].value = &self->current_uA[side];
             plan(&axes[IW_SIDES + side], target[side].current_mA * 1000, current_away, current_towards);
         }
-        advance_together(axes, AXES);
-    } else {
-        advance_together(axes, IW_SIDES);
     }
+    const size_t count = ramps_current ? AXES : IW_SIDES;
+    shares_t shares = common_shares(axes, count);
+    if (target[IW_LEFT].speed_mm_s != 0 || target[IW_RIGHT].speed_mm_s != 0) { // A stop is not for it to slow.
+        limit_yaw(self, axes, away_us, &shares);
+    }
+    move(axes, count, &shares);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
@@ -192,8 +244,12 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
 }
 
 iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us) {
+    const uint32_t elapsed_us = iw_age_us(self->last_us, now_us);
     if (!self->from_zero && !(arrived(self, IW_LEFT) && arrived(self, IW_RIGHT))) {
-        advance(self, iw_age_us(self->last_us, now_us));
+        advance(self, elapsed_us);
+    }
+    if (!self->from_zero) { // A first zero has the maximum.
+        iw_current_follow(self->limit_mA, &self->target, elapsed_us);
     }
     self->from_zero = false;
     self->due_us = next_on_grid(self, now_us);
@@ -206,7 +262,7 @@ iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         pair.wheel[side].speed_mm_s = (int16_t)(self->speed_um_s[side] / 1000);
         pair.wheel[side].current_mA = (self->config->current_role == IW_ROLE_LIMIT)
-                                          ? self->target.wheel[side].current_mA
+                                          ? self->limit_mA[side]
                                           : (int16_t)(self->current_uA[side] / 1000);
     }
     return pair;

@@ -210,7 +210,7 @@ static void do_twist(iw_host_t *self, iw_host_client_t *client, const iwn_quote_
     }
     const int64_t v_mm_s = (v > limit) ? limit : (v < -limit) ? -limit : v;
     const int64_t yaw_mrad_s = (yaw > limit) ? limit : (yaw < -limit) ? -limit : yaw;
-    const int64_t rim_mm_s = yaw_mrad_s * (int64_t)self->place.track_mm / 2000;
+    const int64_t rim_mm_s = yaw_mrad_s * (int64_t)iw_host_look(self)->config->track_mm / 2000;
     const iw_drive_t wanted = {.speed_mm_s = {saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)}};
     drive(self, client, quote, &wanted);
 }

@@ -96,8 +96,9 @@ static bool withdraw_id(iw_bxcan_t *self, uint32_t id, iw_bxcan_outgoing_t *heir
     return done;
 }
 
-/// Transmit mailbox registers, bxCAN 9.3: TIR last, as it makes the request.
-static int load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, iw_bxcan_outgoing_t *heir) {
+/// Transmit mailbox registers, bxCAN 9.3: all but TIR, which makes the request. Returns the mailbox, or
+/// IW_BXCAN_MAILBOXES if none is free.
+static uint32_t load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, iw_bxcan_outgoing_t *heir) {
     for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
         if (self->outgoing[i].owed == 0U) {
             iw_bxcan_mailbox_t *const mailbox = &self->config.registers->tx[i];
@@ -108,25 +109,56 @@ static int load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, iw_b
             iw_register_write(&mailbox->TDTR, frame->dlc);
             iw_register_write(&mailbox->TDLR, word_of(&frame->data[0]));
             iw_register_write(&mailbox->TDHR, word_of(&frame->data[4]));
-            iw_register_write(&mailbox->TIR, (frame->id << IW_IR_STID_SHIFT) | IW_TIR_TXRQ);
-            return 1;
+            return i;
         }
     }
-    return 0;
+    return IW_BXCAN_MAILBOXES;
 }
 
-int iw_bxcan_send(void *context, const iw_can_frame_t *frame) {
-    iw_bxcan_t *const self = context;
-    if (self->phase != IW_BXCAN_RUNNING || self->config.silent || frame->id > IW_CAN_ID_MASK ||
-        frame->dlc > IW_CAN_DATA_MAX || is_bus_off(self)) {
-        return -1;
-    }
+/// Takes the place of what waits with this id. The interrupt is masked for each frame apart: what was sent while the
+/// first one was placed frees its mailbox before the second one needs it.
+static uint32_t place(iw_bxcan_t *self, const iw_can_frame_t *frame) {
     iw_bxcan_outgoing_t heir;
     heir.owed = 0;
     mask_transmit(self);
-    const int result = withdraw_id(self, frame->id, &heir) ? load_free_mailbox(self, frame, &heir) : 0;
+    const bool withdrawn = withdraw_id(self, frame->id, &heir);
+    const uint32_t mailbox = withdrawn ? load_free_mailbox(self, frame, &heir) : IW_BXCAN_MAILBOXES;
     unmask_transmit(self);
-    return result;
+    return mailbox;
+}
+
+static bool can_be_sent(const iw_bxcan_t *self, const iw_can_frame_t *frames, uint32_t count) {
+    bool good = self->phase == IW_BXCAN_RUNNING && !self->config.silent && !is_bus_off(self);
+    for (uint32_t i = 0; i < count; i++) {
+        good = good && frames[i].id <= IW_CAN_ID_MASK && frames[i].dlc <= IW_CAN_DATA_MAX;
+    }
+    return good;
+}
+
+/// Every mailbox is filled before the first one is requested. The controller has no request for two mailboxes: TXRQ is
+/// a bit of each TIR (bxCAN 9.3), and on an idle bus the left frame begins with the first write. The second write comes
+/// a few cycles later, long before that frame ends, so the right one is next in this controller. Not guaranteed:
+/// another node's lower id goes between, a frame that fails is repeated first, and a reset of the CPU between both
+/// writes leaves the left one alone.
+int iw_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    iw_bxcan_t *const self = context;
+    uint32_t mailbox[IW_SIDES];
+    uint32_t filled = 0;
+    if (!can_be_sent(self, frames, count)) {
+        return -1;
+    }
+    while (filled < count && filled < IW_SIDES) {
+        mailbox[filled] = place(self, &frames[filled]);
+        if (mailbox[filled] == IW_BXCAN_MAILBOXES) {
+            break;
+        }
+        filled++;
+    }
+    for (uint32_t i = 0; i < filled; i++) {
+        iw_register_t *const tir = &self->config.registers->tx[mailbox[i]].TIR;
+        iw_register_write(tir, (frames[i].id << IW_IR_STID_SHIFT) | IW_TIR_TXRQ);
+    }
+    return (int)filled;
 }
 
 /// True once after frames were lost: the controller's report of it, which the core counts.

@@ -91,9 +91,10 @@ typedef struct {
 /// frames come in.
 void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config);
 
-/// > 0: in a mailbox. 0: no mailbox is free, or two frames of this id are waiting. < 0: not RUNNING, silent, or not a
-/// data frame with an 11-bit id. May wait for the end of a frame on the bus (160 us) when it replaces one.
-int iw_bxcan_send(void *context, const iw_can_frame_t *frame);
+/// > 0: so many are in mailboxes, and requested right after each other once all of them are. 0: for the first one no
+/// mailbox is free, or two frames of its id are waiting. < 0: not RUNNING, silent, or one is not a data frame with an
+/// 11-bit id. May wait for the end of a frame on the bus (160 us) for each frame that it replaces.
+int iw_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count);
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame);
 iw_bus_state_t iw_bxcan_bus_state(void *context);
 /// Aborts all mailboxes and waits for their end, at most `poll_limit` reads. Echoes that were not delivered yet never

@@ -28,7 +28,6 @@ static iw_host_t host;
 static iw_kept_t kept;
 static bool is_begun;
 static bool is_complete; // It is configured well enough to send.
-static uint32_t track_mm = IWHEEL_TRACK_MM;
 
 const char *iw_commander_words(void) {
     return "is driven over the serial line";
@@ -47,8 +46,9 @@ void iw_commander_open(bool power_on, bool in_motion) {
 
 void iw_commander_configure(iw_config_t *config) {
     iw_settings_t settings;
+    config->track_mm = IWHEEL_TRACK_MM;
     if (iw_kept_settings(&kept, &settings)) {
-        track_mm = iw_settings_to(&settings, config);
+        iw_settings_to(&settings, config);
     }
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
@@ -75,8 +75,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .settings = iw_settings_from(&gateway->config, track_mm),
-        .track_mm = track_mm,
+        .settings = iw_settings_from(&gateway->config),
         .rate_max_hz = RATE_MAX_HZ,
         .boot = iw_boot_id(kept.power_ons),
     };

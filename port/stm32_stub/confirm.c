@@ -16,13 +16,13 @@ static bool is_near(uint32_t found, uint32_t wanted) {
 static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_settings_t *wanted) {
     iw_config_t one;
     iw_config_t other;
-    const uint32_t track_mm = iw_settings_to(found, &one);
-    const uint32_t wanted_mm = iw_settings_to(wanted, &other);
+    iw_settings_to(found, &one);
+    iw_settings_to(wanted, &other);
     switch (item) {
     case IW_LEDGER_WHEEL_RADIUS:
         return is_near(one.radius_mm, other.radius_mm);
     case IW_LEDGER_TRACK:
-        return is_near(track_mm, wanted_mm);
+        return is_near(one.track_mm, other.track_mm);
     case IW_LEDGER_GEAR_RATIO:
         return (uint32_t)one.gear_turns * other.gear_per == (uint32_t)other.gear_turns * one.gear_per;
     default:

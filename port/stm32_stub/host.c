@@ -225,7 +225,7 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->heard_us = now_us;
     self->linked_us = now_us;
     iw_config_t config;
-    (void)iw_settings_to(&place->settings, &config);
+    iw_settings_to(&place->settings, &config);
     self->lease_us = config.lease_ms * IW_US_PER_MS;
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);

@@ -94,7 +94,6 @@ typedef struct {
     uint32_t bitrate_hz; ///< Of the bus.
     uint32_t sample_point_permille;
     iw_settings_t settings; ///< In force.
-    uint32_t track_mm;      ///< Between the wheels, for twist.
     uint32_t rate_max_hz;   ///< Of snapshots that the serial line carries beside replies.
     uint64_t boot;          ///< Another one at every start.
 } iw_host_place_t;

@@ -22,27 +22,17 @@ IW_STATIC_ASSERT(sizeof(record_t) == IW_STORE_WORDS * sizeof(uint32_t), a_record
 #define ROOM_LEAST 2U
 
 #define HAS_SETTINGS 1U ///< There are settings.
-#define HAS_PAIR     2U ///< The settings have the numbers of the pair; else it is a record of version 0.2.
+#define HAS_PAIR     2U ///< As this version writes it; else it is a record of version 0.2.
 
-/// Settings as version 0.2 kept them: without `pair_mm`, `pair_leak_ms` and `wheel_lag_ms`, which came behind
-/// `blocked_ms`.
-#define BEFORE_VALUES 26U
-#define BEFORE_PAIR   ((size_t)IW_CONFIG_BLOCKED - IW_CONFIG_PERIOD + 1U)
-#define PAIR_VALUES   (IW_SETTINGS - BEFORE_VALUES)
-#define BEFORE_BYTES  (BEFORE_VALUES * sizeof(uint16_t))
-/// Of the words of its record: settings, whether something is learnt, and that.
+#define BEFORE_BYTES (IW_SETTINGS_BEFORE * sizeof(uint16_t))
+/// Of the words of the record of version 0.2: settings, whether something is learnt, and that.
 #define BEFORE_AT     2U
 #define BEFORE_LEARNT (BEFORE_AT + BEFORE_BYTES / sizeof(uint32_t))
 
-/// The same settings, with the defaults of the pair.
 static iw_settings_t from_before(const uint32_t *words) {
-    iw_config_t standard;
-    iw_config_default(&standard);
-    iw_settings_t settings = iw_settings_from(&standard, 0);
-    memcpy(settings.value, words, BEFORE_PAIR * sizeof(uint16_t));
-    memcpy(&settings.value[BEFORE_PAIR + PAIR_VALUES], (const uint8_t *)words + BEFORE_PAIR * sizeof(uint16_t),
-           (BEFORE_VALUES - BEFORE_PAIR) * sizeof(uint16_t));
-    return settings;
+    uint16_t value[IW_SETTINGS_BEFORE];
+    memcpy(value, words, sizeof value);
+    return iw_settings_from_before(value);
 }
 
 /// What a record of version 0.2 holds, in its new places.

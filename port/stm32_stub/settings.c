@@ -6,47 +6,52 @@
 #include <string.h>
 
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
-enum { TYPE = 21, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
+enum { TYPE = 25, ROLE, SWITCHES, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 20U * sizeof(uint16_t),
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * sizeof(uint16_t),
                  the_core_s_numbers_are_side_by_side);
+
+/// Bits of SWITCHES, in the order of version 0.2, which kept a number for each of the first five.
+enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC };
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
-#define TRACK_MIN_MM  50U
-#define TRACK_MAX_MM  5000U
 #define NUMBER_DIGITS 5U
 
 /// How a value is written.
-typedef enum { NUMBER, BYTE, DISTANCE, GEAR, WORDS } kind_t;
+typedef enum { NUMBER, BYTE, GEAR, WORDS, SWITCH } kind_t;
 
 typedef struct {
     const char *section;
     const char *key;
     uint8_t at;
     uint8_t kind;
-    const char *word[2]; ///< Of WORDS: for 0 and 1; those of the role for 1 and 2.
+    const char *word[2]; ///< Of SWITCH: for 0 and 1; of WORDS, the role: for 1 and 2.
 } row_t;
 
 static const row_t rows[] = {
     {"wheels", "setpoint_type", TYPE, BYTE, {NULL, NULL}},
     {"wheels", "current_role", ROLE, WORDS, {"limit", "setpoint"}},
-    {"wheels", "rpm_of", RPM_OF, WORDS, {"wheel", "rotor"}},
+    {"wheels", "rpm_of", RPM_OF, SWITCH, {"wheel", "rotor"}},
     {"wheels", "radius_mm", INDEX(RADIUS), NUMBER, {NULL, NULL}},
     {"wheels", "gear_ratio", INDEX(GEAR_TURNS), GEAR, {NULL, NULL}},
-    {"wheels", "track_mm", TRACK, DISTANCE, {NULL, NULL}},
+    {"wheels", "track_mm", INDEX(TRACK), NUMBER, {NULL, NULL}},
     {"wheels", "setpoint_dlc", INDEX(SETPOINT_DLC), NUMBER, {NULL, NULL}},
-    {"left", "invert", INVERT_LEFT, WORDS, {"no", "yes"}},
-    {"left", "force_unit", UNIT_LEFT, WORDS, {"cN", "dN"}},
-    {"right", "invert", INVERT_RIGHT, WORDS, {"no", "yes"}},
-    {"right", "force_unit", UNIT_RIGHT, WORDS, {"cN", "dN"}},
+    {"left", "invert", INVERT_LEFT, SWITCH, {"no", "yes"}},
+    {"left", "force_unit", UNIT_LEFT, SWITCH, {"cN", "dN"}},
+    {"right", "invert", INVERT_RIGHT, SWITCH, {"no", "yes"}},
+    {"right", "force_unit", UNIT_RIGHT, SWITCH, {"cN", "dN"}},
     {"drive", "period_ms", INDEX(PERIOD), NUMBER, {NULL, NULL}},
     {"drive", "lease_ms", INDEX(LEASE), NUMBER, {NULL, NULL}},
     {"drive", "accel_mm_s2", INDEX(ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "decel_mm_s2", INDEX(DECEL), NUMBER, {NULL, NULL}},
     {"drive", "max_speed_mm_s", INDEX(MAX_SPEED), NUMBER, {NULL, NULL}},
+    {"drive", "max_yaw_mrad_s", INDEX(MAX_YAW), NUMBER, {NULL, NULL}},
+    {"drive", "yaw_accel_mrad_s2", INDEX(YAW_ACCEL), NUMBER, {NULL, NULL}},
     {"drive", "max_current_mA", INDEX(MAX_CURRENT), NUMBER, {NULL, NULL}},
+    {"drive", "min_current_mA", INDEX(MIN_CURRENT), NUMBER, {NULL, NULL}},
+    {"drive", "asymmetric_current", ASYMMETRIC, SWITCH, {"no", "yes"}},
     {"drive", "zero_hold_ms", INDEX(ZERO_HOLD), NUMBER, {NULL, NULL}},
     {"limits", "wheel_silent_ms", INDEX(WHEEL_SILENT), NUMBER, {NULL, NULL}},
     {"limits", "echo_ms", INDEX(ECHO), NUMBER, {NULL, NULL}},
@@ -61,31 +66,60 @@ static const row_t rows[] = {
 };
 #define ROWS (sizeof rows / sizeof rows[0])
 
-iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
+static void turn(iw_settings_t *self, unsigned bit, bool on) {
+    const uint16_t mask = (uint16_t)(1U << bit);
+    self->value[SWITCHES] = (uint16_t)(on ? self->value[SWITCHES] | mask : self->value[SWITCHES] & ~mask);
+}
+
+static bool is_on(const iw_settings_t *self, unsigned bit) {
+    return (self->value[SWITCHES] & (1U << bit)) != 0U;
+}
+
+iw_settings_t iw_settings_from(const iw_config_t *config) {
     iw_settings_t self;
     memcpy(self.value, (const uint8_t *)config + FIRST, TYPE * sizeof self.value[0]);
     self.value[TYPE] = config->setpoint_type_set ? config->setpoint_type : UNSET;
     self.value[ROLE] = (uint16_t)config->current_role;
-    self.value[RPM_OF] = config->rpm_of_rotor ? 1U : 0U;
+    self.value[SWITCHES] = 0;
+    turn(&self, RPM_OF, config->rpm_of_rotor);
+    turn(&self, ASYMMETRIC, config->asymmetric_current);
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        self.value[INVERT_LEFT + side] = config->invert[side] ? 1U : 0U;
-        self.value[UNIT_LEFT + side] = (uint16_t)config->force_unit[side];
+        turn(&self, INVERT_LEFT + side, config->invert[side]);
+        turn(&self, UNIT_LEFT + side, config->force_unit[side] != IW_FORCE_CN);
     }
-    self.value[TRACK] = (uint16_t)track_mm;
     return self;
 }
 
-uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
+iw_settings_t iw_settings_from_before(const uint16_t value[IW_SETTINGS_BEFORE]) {
+    static const uint8_t numbers[] = {
+        INDEX(PERIOD),      INDEX(LEASE),        INDEX(ACCEL),        INDEX(DECEL),   INDEX(MAX_SPEED),
+        INDEX(MAX_CURRENT), INDEX(ZERO_HOLD),    INDEX(WHEEL_SILENT), INDEX(ECHO),    INDEX(REST_RPM),
+        INDEX(REST),        INDEX(FOLLOW_SPEED), INDEX(FOLLOW),       INDEX(BLOCKED), INDEX(RADIUS),
+        INDEX(GEAR_TURNS),  INDEX(GEAR_PER),     INDEX(SETPOINT_DLC), TYPE,           ROLE};
+    iw_config_t standard;
+    iw_config_default(&standard);
+    iw_settings_t self = iw_settings_from(&standard);
+    for (size_t i = 0; i < sizeof numbers; i++) {
+        self.value[numbers[i]] = value[i];
+    }
+    self.value[INDEX(TRACK)] = value[IW_SETTINGS_BEFORE - 1U];
+    for (unsigned bit = RPM_OF; bit <= UNIT_RIGHT; bit++) {
+        turn(&self, bit, value[sizeof numbers + bit] != 0U);
+    }
+    return self;
+}
+
+void iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
     memcpy((uint8_t *)config + FIRST, self->value, TYPE * sizeof self->value[0]);
     config->setpoint_type_set = self->value[TYPE] != UNSET;
     config->setpoint_type = config->setpoint_type_set ? (uint8_t)self->value[TYPE] : 0U;
     config->current_role = (iw_current_role_t)self->value[ROLE];
-    config->rpm_of_rotor = self->value[RPM_OF] != 0U;
+    config->rpm_of_rotor = is_on(self, RPM_OF);
+    config->asymmetric_current = is_on(self, ASYMMETRIC);
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        config->invert[side] = self->value[INVERT_LEFT + side] != 0U;
-        config->force_unit[side] = (iw_force_unit_t)self->value[UNIT_LEFT + side];
+        config->invert[side] = is_on(self, INVERT_LEFT + side);
+        config->force_unit[side] = is_on(self, UNIT_LEFT + side) ? IW_FORCE_DN : IW_FORCE_CN;
     }
-    return self->value[TRACK];
 }
 
 static const row_t *find(const char *key) {
@@ -115,8 +149,6 @@ static iw_config_range_t range_of(const row_t *row) {
     switch (row->kind) {
     case BYTE:
         return (iw_config_range_t){0U, UINT8_MAX};
-    case DISTANCE:
-        return (iw_config_range_t){TRACK_MIN_MM, TRACK_MAX_MM};
     default:
         return iw_config_range((iw_config_fault_t)(row->at + 1U));
     }
@@ -152,8 +184,12 @@ static bool set_number(iw_settings_t *self, const row_t *row, const char *value,
     return true;
 }
 
-static uint16_t first_word(const row_t *row) {
-    return (row->at == ROLE) ? (uint16_t)IW_ROLE_LIMIT : 0U;
+static void set_word(iw_settings_t *self, const row_t *row, unsigned word) {
+    if (row->kind == SWITCH) {
+        turn(self, row->at, word != 0U);
+    } else {
+        self->value[row->at] = (uint16_t)(IW_ROLE_LIMIT + word);
+    }
 }
 
 bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
@@ -164,12 +200,12 @@ bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iw
                       "northbound and record are a daemon's, here they are built in");
         return false;
     }
-    if (row->kind != WORDS) {
+    if (row->kind < WORDS) {
         return set_number(self, row, value, why);
     }
-    for (uint16_t i = 0; i < 2U; i++) {
+    for (unsigned i = 0; i < 2U; i++) {
         if (strcmp(value, row->word[i]) == 0) {
-            self->value[row->at] = (uint16_t)(first_word(row) + i);
+            set_word(self, row, i);
             return true;
         }
     }
@@ -180,7 +216,7 @@ bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iw
 bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
     iw_config_t config;
     iw_config_default(&config);
-    (void)iw_settings_to(self, &config);
+    iw_settings_to(self, &config);
     switch (iw_config_check(&config)) {
     case IW_CONFIG_OK:
         return true;
@@ -204,10 +240,14 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
 }
 
 static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[IW_SETTINGS_TEXT]) {
-    const uint16_t value = self->value[row->at];
-    const unsigned word = (unsigned)value - first_word(row);
     iwn_text_t text = iwn_text_begin(out_text, IW_SETTINGS_TEXT);
+    if (row->kind == SWITCH) {
+        IWN_TEXT_JOIN(&text, row->word[is_on(self, row->at) ? 1 : 0]);
+        return true;
+    }
+    const uint16_t value = self->value[row->at];
     if (row->kind == WORDS) {
+        const unsigned word = (unsigned)value - IW_ROLE_LIMIT;
         IWN_TEXT_JOIN(&text, (word < 2U) ? row->word[word] : "");
         return word < 2U;
     }

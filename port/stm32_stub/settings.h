@@ -10,16 +10,21 @@
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/text.h"
 
-#define IW_SETTINGS 29U
+#define IW_SETTINGS 28U
+/// Version 0.2 had so many, in its own order.
+#define IW_SETTINGS_BEFORE 26U
 
 typedef struct {
     uint16_t value[IW_SETTINGS];
 } iw_settings_t;
 
-iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm);
+iw_settings_t iw_settings_from(const iw_config_t *config);
 
-/// What the core is given; its other fields are left alone. Returns the distance between the wheels in mm.
-uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config);
+/// Those that version 0.2 kept, with the defaults of the keys that came since.
+iw_settings_t iw_settings_from_before(const uint16_t value[IW_SETTINGS_BEFORE]);
+
+/// What the core is given; its other fields are left alone.
+void iw_settings_to(const iw_settings_t *self, iw_config_t *config);
 
 /// One key. False, with nothing changed and the reason and the cure in `why`, if there is no such key or it cannot have
 /// that value.

@@ -329,6 +329,13 @@ static void hash(uint64_t value) {
     self.result->hash = (self.result->hash ^ value) * UINT64_C(1099511628211);
 }
 
+void judge_call(const iw_can_frame_t *first, unsigned count) {
+    const int16_t speed = (int16_t)(first->data[1] << 8 | first->data[2]);
+    if (speed != 0 && (count != IW_SIDES || first->id != 266U)) {
+        judge_break(5, "%d mm/s for one wheel in a call of its own", speed);
+    }
+}
+
 void judge_frame(const iw_can_frame_t *frame, bool accepted) {
     const unsigned number = (frame->id == 266U) ? IW_LEFT : IW_RIGHT;
     side_t *side = &self.side[number];

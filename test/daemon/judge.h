@@ -19,6 +19,8 @@ void judge_break(uint32_t rule, const char *format, ...) __attribute__((format(p
 
 void judge_life(void);           ///< The process starts,
 void judge_death(bool in_order); ///< and ends, killed or not.
+/// The frames of one call; `judge_frame` follows for each that the kernel tries.
+void judge_call(const iw_can_frame_t *first, unsigned count);
 void judge_frame(const iw_can_frame_t *frame, bool accepted);
 void judge_on_bus(const iw_can_frame_t *frame); ///< One of the gateway's own, or of another.
 void judge_foreign_on_bus(void);

@@ -154,6 +154,8 @@ typedef struct {
 } vk_fd_t;
 
 vk_fd_t *vk_fd(int fd);
+/// The error that waits at this CAN socket, and does not any more; 0: none.
+int vk_take_can_error(int fd);
 
 /// Begins a call. False: it fails, errno is one of `errors` (ended by 0; NULL: it cannot).
 bool vk_call(const char *name, const int *errors);

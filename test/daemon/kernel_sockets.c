@@ -299,27 +299,14 @@ static int take_error(can_queue_t *queue) {
     return error;
 }
 
-static ssize_t give_can(can_queue_t *queue, const void *bytes, size_t size) {
-    static const int errors[] = {ENOBUFS, EAGAIN, EINTR, 0};
-    struct can_frame raw;
-    memcpy(&raw, bytes, sizeof raw);
-    iw_can_frame_t frame = {.id = raw.can_id, .dlc = raw.len};
-    memcpy(frame.data, raw.data, sizeof frame.data);
-    const int fault = vk_call("send", errors) ? take_error(queue) : errno;
-    if (fault != 0) {
-        world_sent(&frame, false);
-    }
-    const int error = (fault != 0) ? fault : world_send(&frame);
-    errno = error; // Those who judge have looked at files since.
-    return vk_done((error == 0) ? (long)size : -1);
+int vk_take_can_error(int fd) {
+    return take_error(&queues[vk_fd(fd)->number & 1]);
 }
 
 ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags) {
     vk_fd_t *entry = vk_fd(fd);
     (void)flags;
     switch (entry->kind) {
-    case VK_CAN:
-        return give_can(&queues[entry->number & 1], bytes, size);
     case VK_STREAM:
         return give_stream(&vk.stream[entry->number], bytes, size);
     case VK_CHILD:

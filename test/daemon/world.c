@@ -228,6 +228,10 @@ void world_sent(const iw_can_frame_t *frame, bool accepted) {
     aim();
 }
 
+void world_call(const iw_can_frame_t *first, unsigned count) {
+    judge_call(first, count);
+}
+
 int world_send(const iw_can_frame_t *frame) {
     const sim_port_t *port = &world.sim.bus.port[world.port];
     const int error = !vk.link.exists ? ENXIO : !vk.link.up ? ENETDOWN : (port->count >= port->depth) ? ENOBUFS : 0;

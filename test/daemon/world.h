@@ -110,6 +110,7 @@ iw_time_us_t world_next_us(void);
 /// Does what is due by now.
 void world_run(void);
 /// The gateway hands a frame over. 0 or the errno that it gets.
+void world_call(const iw_can_frame_t *first, unsigned count); ///< So many frames come in one call.
 int world_send(const iw_can_frame_t *frame);
 /// It has tried to.
 void world_sent(const iw_can_frame_t *frame, bool accepted);

@@ -75,6 +75,7 @@ int __wrap_connect(int fd, const struct sockaddr *address, socklen_t length);
 int __wrap_getsockopt(int fd, int level, int name, void *out_value, socklen_t *length);
 int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t length);
 ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags);
+int __wrap_sendmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags);
 ssize_t __wrap_sendto(int fd, const void *bytes, size_t size, int flags, const struct sockaddr *to, socklen_t length);
 ssize_t __wrap_recv(int fd, void *out, size_t size, int flags);
 int __wrap_recvmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags, struct timespec *timeout);

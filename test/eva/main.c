@@ -48,11 +48,14 @@ static iw_time_us_t any_time(void) {
 
 // ---- the HAL ----
 
-static int send_frame(void *context, const iw_can_frame_t *frame) {
+static int send_frames(void *context, const iw_can_frame_t *frames, uint32_t count) {
     (void)context;
-    uint32_t read = frame->id + frame->dlc + frame->kind;
-    for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
-        read += frame->data[i];
+    uint32_t read = 0;
+    for (uint32_t frame = 0; frame < count; frame++) {
+        read += frames[frame].id + frames[frame].dlc + frames[frame].kind;
+        for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
+            read += frames[frame].data[i];
+        }
     }
     (void)read;
     return any_i32();
@@ -84,7 +87,7 @@ static int estop_pressed(void *context) {
     return any_i32();
 }
 
-static const iw_hal_t hal = {send_frame, receive_frame, bus_state, purge, estop_pressed, NULL};
+static const iw_hal_t hal = {send_frames, receive_frame, bus_state, purge, estop_pressed, NULL};
 
 // ---- the configuration ----
 
@@ -112,6 +115,7 @@ static void any_config(iw_config_t *out_config) {
     out_config->decel_mm_s2 = any_within(IW_CONFIG_DECEL);
     out_config->max_speed_mm_s = any_within(IW_CONFIG_MAX_SPEED);
     out_config->max_current_mA = any_within(IW_CONFIG_MAX_CURRENT);
+    out_config->min_current_mA = any_within(IW_CONFIG_MIN_CURRENT);
     out_config->zero_hold_ms = any_within(IW_CONFIG_ZERO_HOLD);
     out_config->wheel_silent_ms = any_within(IW_CONFIG_WHEEL_SILENT);
     out_config->echo_ms = any_within(IW_CONFIG_ECHO);

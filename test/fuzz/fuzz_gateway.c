@@ -16,7 +16,7 @@ typedef struct {
     uint32_t received;
     iw_bus_state_t bus;
     int estop;
-    bool takes;
+    uint32_t accepts; ///< Frames of one call.
     bool purges;
     bool cut;
     bool arm_after_cut;
@@ -27,8 +27,7 @@ static int32_t word_at(const uint8_t *bytes) {
     return (int16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-static int world_send(void *context, const iw_can_frame_t *frame) {
-    world_t *const world = context;
+static bool judge_setpoint(world_t *world, const iw_can_frame_t *frame) {
     const iw_config_t *const config = &world->config;
     const int32_t speed = word_at(&frame->data[1]);
     const int32_t current = word_at(&frame->data[3]);
@@ -40,7 +39,18 @@ static int world_send(void *context, const iw_can_frame_t *frame) {
     fuzz_require(world->bus >= IW_BUS_PASSIVE, "nothing leaves while the bus is down");
     fuzz_require(!config->listen_only, "nothing leaves in listen-only");
     world->moved = world->moved || !zero;
-    return world->takes ? 1 : 0;
+    return zero;
+}
+
+/// What moves leaves to both wheels in one call, the left one first. A port that accepts one of two is among the worlds.
+static int world_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    world_t *const world = context;
+    const bool pair = count == 2U && frames[0].id == IW_ID_LEFT_SETPOINT && frames[1].id == IW_ID_RIGHT_SETPOINT;
+    fuzz_require(pair || count == 1U, "one frame, or the left one and the right one");
+    for (uint32_t i = 0; i < count; i++) {
+        fuzz_require(judge_setpoint(world, &frames[i]) || pair, "no wheel moves without the other");
+    }
+    return (int)((count < world->accepts) ? count : world->accepts);
 }
 
 static void cut(world_t *world) {
@@ -96,7 +106,7 @@ static void begin(world_t *world, fuzz_bytes_t *bytes) {
     world->config.period_ms = (uint16_t)(5U + fuzz_byte(bytes) % 60U);
     world->config.rest_ms = 50;
     world->bus = IW_BUS_ACTIVE;
-    world->takes = true;
+    world->accepts = IW_SIDES;
     world->cut = true;
     world->now_us = 1000;
     if (iw_gateway_init(&world->gateway, &world->config, &hal, world->now_us, (flags & 0x20U) != 0U) != IW_CONFIG_OK) {
@@ -280,7 +290,7 @@ static void act(world_t *world, fuzz_bytes_t *bytes) {
         break;
     case 7:
         world->bus = (value > 200U) ? (iw_bus_state_t)(value % 4U) : IW_BUS_ACTIVE;
-        world->takes = (value & 7U) != 7U;
+        world->accepts = ((value & 7U) >= 6U) ? 7U - (value & 7U) : IW_SIDES;
         world->purges = (value & 8U) != 0U;
         break;
     case 8:

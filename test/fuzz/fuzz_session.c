@@ -166,8 +166,7 @@ static void prepare(void) {
                                    .estop = "PB0",
                                    .bitrate_hz = 1000000,
                                    .sample_point_permille = 625,
-                                   .settings = iw_settings_from(&rig.config, 540),
-                                   .track_mm = 540,
+                                   .settings = iw_settings_from(&rig.config),
                                    .rate_max_hz = 10,
                                    .boot = BOOT};
     iw_host_init(&host, &place, rig.now_us);

@@ -34,8 +34,7 @@ static int32_t speed_of(const iw_can_frame_t *frame) {
     return (int16_t)(frame->data[1] << 8 | frame->data[2]);
 }
 
-static int world_send(void *context, const iw_can_frame_t *frame) {
-    world_t *const self = context;
+static bool send_one(world_t *self, const iw_can_frame_t *frame) {
     const bool taken = self->flights < WORLD_FLIGHT && !self->down;
     self->stats->frames++;
     self->stats->nonzero += (speed_of(frame) != 0) ? 1U : 0U;
@@ -53,7 +52,17 @@ static int world_send(void *context, const iw_can_frame_t *frame) {
         self->flights++;
     }
     oracle_sent(&self->oracle, self->now_us, frame, taken);
-    return taken ? 1 : 0;
+    return taken;
+}
+
+static int world_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    world_t *const self = context;
+    uint32_t accepted = 0;
+    oracle_call(&self->oracle, self->now_us, frames, count);
+    while (accepted < count && send_one(self, &frames[accepted])) {
+        accepted++;
+    }
+    return (int)accepted;
 }
 
 static int world_receive(void *context, iw_can_frame_t *out_frame) {
@@ -176,7 +185,8 @@ static iw_time_us_t sent_us(const world_t *self) {
 }
 
 static bool drive(world_t *self) {
-    const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 0}, false};
+    // A limit that is too low on the left, and lower than the maximum on both.
+    const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 1200}, true};
     const oracle_asked_t asked = {self->now_us, sent_us(self), self->client};
     const bool aged = asked.sent_us < self->now_us;
     iw_applied_t applied = {0};

@@ -7,16 +7,18 @@
 #define AGE_US          (200U * (uint64_t)S)
 #define DRIVE_PERIOD_US (50U * MS)
 
-static int send_frame(void *context, const iw_can_frame_t *frame) {
+static int send_frames(void *context, const iw_can_frame_t *frames, uint32_t count) {
     machine_t *const self = context;
-    if (self->count >= WAITING_MAX) {
-        return 0;
+    for (uint32_t i = 0; i < count; i++) {
+        if (self->count >= WAITING_MAX) {
+            return (int)i;
+        }
+        iw_can_frame_t *const echo = &self->waiting[(self->first + self->count++) % WAITING_MAX];
+        *echo = frames[i];
+        echo->kind = IW_CAN_ECHO;
+        sim_pair_hear(&self->pair, self->now_us, &frames[i]);
     }
-    iw_can_frame_t *const echo = &self->waiting[(self->first + self->count++) % WAITING_MAX];
-    *echo = *frame;
-    echo->kind = IW_CAN_ECHO;
-    sim_pair_hear(&self->pair, self->now_us, frame);
-    return 1;
+    return (int)count;
 }
 
 static int receive_frame(void *context, iw_can_frame_t *out_frame) {
@@ -56,7 +58,7 @@ void machine_config(iw_config_t *out_config, uint16_t pair_mm) {
 void machine_init(machine_t *self, const sim_pair_config_t *pair, const iw_config_t *config, uint64_t seed) {
     sim_pair_config_t aged = *pair;
     memset(self, 0, sizeof *self);
-    const iw_hal_t hal = {send_frame, receive_frame, bus_state, purge, estop_pressed, self};
+    const iw_hal_t hal = {send_frames, receive_frame, bus_state, purge, estop_pressed, self};
     const iw_bus_facts_t facts = {false, true};
     aged.age_us = AGE_US;
     self->now_us = self->wake_us = START_US;

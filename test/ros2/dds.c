@@ -102,11 +102,73 @@ static void test_dds_client_that_disposes_and_goes_is_no_request(void) {
     TEST_ASSERT_FALSE(await_request(&request, 200));
 }
 
+/// A reader of replies that is there only now, where the request was written before.
+static dds_entity_t reader_of(const char *service) {
+    char name[64];
+    (void)snprintf(name, sizeof name, "rr/iwheel/%sReply", service);
+    const dds_entity_t topic = ros_raw_topic(peer, name, "std_srvs::srv::dds_::Trigger_Response_");
+    dds_qos_t *qos = dds_create_qos();
+    dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_SECS(1));
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 20);
+    const dds_entity_t reader = dds_create_reader(peer, topic, qos, NULL);
+    dds_delete_qos(qos);
+    return reader;
+}
+
+/// The number of replies that come in this time.
+static unsigned count_replies(dds_entity_t reader, unsigned for_ms) {
+    unsigned count = 0;
+    for (unsigned ms = 0; ms < for_ms; ms += 5U) {
+        ros_raw_t raw;
+        void *sample = &raw;
+        dds_sample_info_t info;
+        ros_woken(ros);
+        count += (dds_take(reader, &sample, &info, 1, 1) == 1) ? 1U : 0U;
+        dds_sleepfor(DDS_MSECS(5));
+    }
+    return count;
+}
+
+static void test_dds_reply_waits_for_the_reader_of_its_caller(void) {
+    static const ros_raw_t raw = {.size = 5, .bytes = {0, 1}};
+    ros_request_t request;
+    const dds_entity_t writer = client_of("arm");
+    for (unsigned i = 0; i < 3U; i++) {
+        TEST_ASSERT_EQUAL_INT32(DDS_RETCODE_OK, dds_write(writer, &raw));
+        TEST_ASSERT_TRUE(await_request(&request, 2000));
+        ros_answer(ros, &request, true, "armed");
+    }
+    TEST_ASSERT_EQUAL_UINT(3, count_replies(reader_of("arm"), 500));
+    (void)dds_delete(peer);
+}
+
+static void test_dds_replies_to_callers_without_a_reader_leave_in_the_end(void) {
+    static const ros_raw_t raw = {.size = 5, .bytes = {0, 1}};
+    ros_request_t request;
+    const dds_entity_t writer = client_of("arm");
+    for (unsigned i = 0; i < 12U; i++) { // More than wait at a time.
+        TEST_ASSERT_EQUAL_INT32(DDS_RETCODE_OK, dds_write(writer, &raw));
+        TEST_ASSERT_TRUE(await_request(&request, 2000));
+        ros_answer(ros, &request, true, "armed");
+    }
+    dds_sleepfor(DDS_MSECS(1050));
+    ros_woken(ros); // Nobody hears these.
+    const dds_entity_t reader = reader_of("arm");
+    TEST_ASSERT_EQUAL_UINT(0, count_replies(reader, 300));
+    TEST_ASSERT_EQUAL_INT32(DDS_RETCODE_OK, dds_write(writer, &raw));
+    TEST_ASSERT_TRUE(await_request(&request, 2000));
+    ros_answer(ros, &request, true, "armed");
+    TEST_ASSERT_EQUAL_UINT(1, count_replies(reader, 500));
+    (void)dds_delete(peer);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_dds_node_on_loopback_is_not_reached_from_outside);
     RUN_TEST(test_dds_node_on_a_network_is_reached_from_outside);
     RUN_TEST(test_dds_sample_that_cannot_be_read_is_a_request);
     RUN_TEST(test_dds_client_that_disposes_and_goes_is_no_request);
+    RUN_TEST(test_dds_reply_waits_for_the_reader_of_its_caller);
+    RUN_TEST(test_dds_replies_to_callers_without_a_reader_leave_in_the_end);
     return UNITY_END();
 }

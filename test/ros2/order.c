@@ -327,6 +327,80 @@ static void test_ros_arm_while_a_dropped_command_moves_is_refused(void) {
     arm();
 }
 
+// ---- two publishers -------------------------------------------------------------------------------------------------
+
+static void command_comes_of(uint64_t source, double v_m_s) {
+    command_comes(v_m_s);
+    command.source = source;
+    pass(20);
+}
+
+static void test_ros_one_person_drives_of_two_that_publish(void) {
+    arm();
+    for (unsigned i = 0; i < 20U; i++) {
+        command_comes_of(1, 0.3);
+        command_comes_of(2, -0.3);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    }
+    TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.passed);
+    TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.others);
+    TEST_ASSERT_GREATER_THAN_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
+    arm();
+    command_comes_of(2, 0.0); // Zeros take nothing.
+    command_comes_of(1, 0.3);
+    for (unsigned i = 0; i < 50U; i++) { // The first one's zeros keep the lease; the second one's keep nothing.
+        command_comes_of(1, 0.0);
+        command_comes_of(2, 0.0);
+    }
+    TEST_ASSERT_EQUAL_UINT64(52, bridge.facts.commands.passed);
+    request_comes(ROS_ARM);
+    command_comes_of(1, 0.0);
+    TEST_ASSERT_TRUE(answered && !success); // Busy.
+    command_comes_of(2, 0.3);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    request_comes(ROS_STOP);
+    pass(3000);
+    arm();
+    command_comes_of(2, 0.3);
+    command_comes_of(2, 0.3);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_one_person_without_the_lease_has_nothing(void) {
+    command_comes_of(1, 0.3); // Not armed: refused, and nobody's.
+    pass(1000);
+    arm();
+    for (unsigned i = 0; i < 3U; i++) {
+        command_comes_of(2, 0.3);
+    }
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    pass(3000); // The lease ends by itself.
+    TEST_ASSERT_EQUAL_UINT64(0, bridge.driver);
+    arm();
+    for (unsigned i = 0; i < 3U; i++) {
+        command_comes_of(1, 0.3);
+    }
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_lease_that_ended_unseen_is_nobodys(void) {
+    arm();
+    command_comes_of(1, 0.3);
+    command_comes_of(1, 0.0);
+    pass(3000);
+    arm();
+    command_comes_of(1, 0.001); // Less than a wheel can be told, and not zero.
+    bridge.driver = 1;
+    const int other = daemon_rig_connect();
+    daemon_rig_ask(other, "{\"cmd\":\"stop\",\"id\":1}");
+    pass(400);
+    TEST_ASSERT_EQUAL_UINT64(0, bridge.driver);
+    (void)close(other);
+}
+
 // ---- writers on other machines ----------------------------------------------------------------------------------------
 
 static void on_a_network(bool synchronised) {
@@ -442,6 +516,10 @@ int main(void) {
     RUN_TEST(test_ros_reset_means_a_stop_that_was_shown_for_a_second);
     RUN_TEST(test_ros_arm_from_before_a_stop_is_refused_by_the_gateway);
     RUN_TEST(test_ros_arm_while_a_dropped_command_moves_is_refused);
+    RUN_TEST(test_ros_one_person_drives_of_two_that_publish);
+    RUN_TEST(test_ros_one_person_keeps_the_wheels_until_they_are_stopped);
+    RUN_TEST(test_ros_one_person_without_the_lease_has_nothing);
+    RUN_TEST(test_ros_lease_that_ended_unseen_is_nobodys);
     RUN_TEST(test_ros_other_machine_may_not_arm_without_synchronised_clocks);
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
     RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);

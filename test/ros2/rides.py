@@ -125,10 +125,12 @@ def wheel_offline(t):
 def services(t):
     ride = Ride(t)
     stream = ride.driving()
+    ride.peer.client("iwheel/stop")  # To find each other is not part of what is timed.
     t_us = now_us()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
     time.sleep(0.15)  # The answer can come before the next setpoint.
-    t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 100)
+    ms = t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # As docs/safety.md allows a bridge.
+    t.figure(f"ramp after {ms or 0:.0f} ms")
     ride.silence()
     t.check(ride.still(), "the stream goes on, the wheels do not")
     refused = ride.peer.call("iwheel/arm")
@@ -194,11 +196,11 @@ def hostile_publishers(t):
     flood.stop()
     t.check(ride.moving(), "a flood drives as a stream does")
     count = len(ride.tap.twists)
-    # Each a second old, in order: all from the past.
+    # Each a second old, in order: all from the past. Known by its speed: the last one of the flood may still be on its way.
     old = Stream(writer, lambda: (ride.peer.twist(0.3), time.time_ns() - 10**9), 0.02)
     time.sleep(0.8)
     old.stop()
-    t.check(len(ride.tap.twists) == count, "what is old is dropped")
+    t.check(not [v for _, v, _ in ride.tap.twists if v == 300], "what is old is dropped")
     t.check(ride.await_diagnosis("cmd_vel", "came too late", 2) == 1, "and told")
     t.check(not ride.moving(now_us() - 100_000), "the wheels have stopped meanwhile")
     t.check(ride.bridge.resident_kB() < 40_000, f"{ride.bridge.resident_kB()} kB")
@@ -523,11 +525,10 @@ def names(t):
             time.sleep(0.6)
             t.check(ride.moving(), "drives in its namespace")
             stream.stop()
-            count = len(ride.tap.twists)
-            stream = Stream(writer, lambda: ride.peer.twist_stamped(0.3, time.time_ns() - 10**9), 0.05)
+            stream = Stream(writer, lambda: ride.peer.twist_stamped(0.2, time.time_ns() - 10**9), 0.05)
             time.sleep(0.4)
             stream.stop()
-            t.check(len(ride.tap.twists) == count, "what was stamped a second ago is dropped")
+            t.check(not [v for _, v, _ in ride.tap.twists if v == 200], "what was stamped a second ago is dropped")
             ride.silence()
             t.judge(ride.rig)
         ride.bridge.end()

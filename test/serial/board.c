@@ -162,8 +162,7 @@ static void begin(char **arguments, bool restarted) {
                                    .estop = "PA0",
                                    .bitrate_hz = 500000,
                                    .sample_point_permille = 875,
-                                   .settings = iw_settings_from(&config.core, 540),
-                                   .track_mm = 540,
+                                   .settings = iw_settings_from(&config.core),
                                    .rate_max_hz = 10,
                                    .boot = boot};
     iw_host_init(&host, &place, wheels.now_us);

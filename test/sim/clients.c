@@ -43,6 +43,13 @@ static int32_t current_for(const rig_t *rig, int32_t speed) {
 
 static iw_drive_t drive_of(const rig_t *rig, const request_t *request) {
     iw_drive_t drive = {{request->a, request->b}, {0, 0}, false};
+    // Every third command of 400 ms has limits of its own, every second of those unequal ones: from none to all there is.
+    const uint32_t turn = (uint32_t)(rig->now_us / (400U * MS)) + request->id;
+    if (rig->scenario->config.current_role == IW_ROLE_LIMIT) {
+        drive.has_current = turn % 3U == 0U;
+        drive.current_mA[IW_LEFT] = (int32_t)(turn * 523U % 2001U);
+        drive.current_mA[IW_RIGHT] = (turn % 2U == 0U) ? drive.current_mA[IW_LEFT] : (int32_t)(turn * 787U % 2001U);
+    }
     if (rig->scenario->config.current_role == IW_ROLE_SETPOINT) {
         drive.has_current = true;
         drive.current_mA[IW_LEFT] = current_for(rig, request->a);

@@ -312,10 +312,6 @@ static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, i
         (current > 0) != (current_wanted > 0)) {
         oracle_break(self, now_us, 306, "%d mA although %d mA were wanted", current, current_wanted);
     }
-    if (self->config->current_role == IW_ROLE_LIMIT && current != self->target.wheel[side].current_mA) {
-        oracle_break(self, now_us, 303, "limit %d mA although %d mA were wanted", current,
-                     self->target.wheel[side].current_mA);
-    }
 }
 
 static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t current) {
@@ -340,14 +336,36 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
     }
 }
 
+static bool is_zero(const oracle_t *self, const iw_can_frame_t *frame) {
+    return word(&frame->data[1]) == 0 && (word(&frame->data[3]) == 0 || self->config->current_role == IW_ROLE_LIMIT);
+}
+
+void oracle_call(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frames, uint32_t count) {
+    if (count == IW_SIDES && frames[0].id == 266U && frames[1].id == 298U) {
+        return;
+    }
+    if (count != 1U) {
+        oracle_break(self, now_us, 608, "a call of %u frames that is no pair", (unsigned)count);
+        return;
+    }
+    const oracle_wheel_t *const other = &self->wheel[(frames[0].id == 298U) ? IW_LEFT : IW_RIGHT];
+    if (!is_zero(self, &frames[0])) {
+        oracle_break(self, now_us, 608, "%d mm/s for one wheel in a call of its own", word(&frames[0].data[1]));
+    }
+    if (other->pending == 0U && !other->tried_now) {
+        oracle_break(self, now_us, 609, "a zero for one wheel, and none for the other, which waits for no echo");
+    }
+}
+
 void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, bool accepted) {
     const size_t side = (frame->id == 298U) ? IW_RIGHT : IW_LEFT;
     oracle_wheel_t *const wheel = &self->wheel[side];
     const int32_t speed = word(&frame->data[1]);
     const int32_t current = word(&frame->data[3]);
-    const bool zero = speed == 0 && (current == 0 || self->config->current_role == IW_ROLE_LIMIT);
+    const bool zero = is_zero(self, frame);
     judge_form(self, now_us, frame);
     judge_state(self, now_us, zero, current);
+    oracle_judge_limit(self, now_us, side, &(iw_command_t){(int16_t)speed, (int16_t)current});
     if (!zero) {
         judge_permission(self, now_us, side, speed, current);
         judge_change(self, now_us, wheel, speed, current);

@@ -71,6 +71,7 @@ typedef struct {
     iw_time_us_t held_us; ///< In LATCHED: zeros are held since then, at the latest a period later.
     iw_time_us_t path_at_us;
     int64_t path_nm;        ///< How far the pair has left its path, without any lag: right minus left, leaking.
+    iw_time_us_t turn_us;   ///< When both wheels were handed a setpoint.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
 
@@ -110,6 +111,8 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us);
 void oracle_estop(oracle_t *self, int result);
 void oracle_bus(oracle_t *self, iw_time_us_t now_us, iw_bus_state_t state);
 void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
+/// The frames that one call brings; `oracle_sent` follows for each that the port tries.
+void oracle_call(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frames, uint32_t count);
 void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, bool accepted);
 void oracle_purged(oracle_t *self);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What the parts of the oracle share: what it sees and what follows (oracle.c), requests (oracle_requests.c).
+/// What the parts of the oracle share: what it sees and what follows (oracle.c), requests (oracle_requests.c),
+/// limits of current (oracle_currents.c).
 #ifndef SIM_TEST_ORACLE_PARTS_H
 #define SIM_TEST_ORACLE_PARTS_H
 
@@ -34,6 +35,17 @@ void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
 
 /// Both wheels were heard, and stood for that long.
 bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us);
+
+/// A current that is a limit, before the wheel's own record of it; the answer to a drive.
+void oracle_judge_limit(oracle_t *self, iw_time_us_t now_us, size_t side, const iw_command_t *command);
+void oracle_judge_applied_limits(oracle_t *self, iw_time_us_t now_us, const iw_drive_t *request,
+                                 const iw_applied_t *applied);
+
+/// That command would turn the machine faster than configured.
+bool oracle_turns_too_fast(const oracle_t *self, int32_t left_mm_s, int32_t right_mm_s);
+
+/// Right after the step: what was sent turns the machine no faster, and not faster too soon.
+void oracle_judge_turn(oracle_t *self, iw_time_us_t now_us);
 
 /// The public state changed, or may have.
 void oracle_observe(oracle_t *self, iw_time_us_t now_us);

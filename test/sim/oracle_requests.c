@@ -63,15 +63,34 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
     oracle_observe(self, now_us);
 }
 
+/// No limit makes a wheel faster than asked, changes its sign, or moves one that was commanded 0.
+static bool is_beyond(int32_t applied, int32_t asked) {
+    return abs(applied) > abs(asked) || (applied != 0 && (applied < 0) != (asked < 0));
+}
+
 static void judge_applied(oracle_t *self, iw_time_us_t now_us, const iw_drive_t *request, const iw_applied_t *applied) {
     const int32_t left = applied->pair.wheel[IW_LEFT].speed_mm_s;
     const int32_t right = applied->pair.wheel[IW_RIGHT].speed_mm_s;
     const int32_t *const asked = request->speed_mm_s;
     const int64_t largest = (abs(asked[0]) > abs(asked[1])) ? abs(asked[0]) : abs(asked[1]);
     const int64_t skew = (int64_t)left * asked[1] - (int64_t)right * asked[0];
-    const bool within = largest <= self->config->max_speed_mm_s;
+    const bool within =
+        largest <= self->config->max_speed_mm_s && !oracle_turns_too_fast(self, asked[IW_LEFT], asked[IW_RIGHT]);
+    const bool slowed = left != asked[IW_LEFT] || right != asked[IW_RIGHT];
+    if (oracle_turns_too_fast(self, left, right)) {
+        oracle_break(self, now_us, 337, "asked for %d %d mm/s, applied %d %d: turns too fast", asked[0], asked[1], left,
+                     right);
+    }
+    if (slowed && !applied->limited) {
+        oracle_break(self, now_us, 338, "asked for %d %d mm/s, applied %d %d, not called limited", asked[0], asked[1],
+                     left, right);
+    }
+    if (is_beyond(left, asked[IW_LEFT]) || is_beyond(right, asked[IW_RIGHT])) {
+        oracle_break(self, now_us, 339, "asked for %d %d mm/s, applied %d %d: faster, or the other way", asked[0],
+                     asked[1], left, right);
+    }
     if (abs(left) > self->config->max_speed_mm_s || abs(right) > self->config->max_speed_mm_s ||
-        llabs(skew) > 2 * largest || (within && (left != asked[0] || right != asked[1]))) {
+        llabs(skew) > 2 * largest || (within && slowed)) {
         oracle_break(self, now_us, 330, "asked for %d %d mm/s, applied %d %d", asked[0], asked[1], left, right);
     }
 }
@@ -96,6 +115,7 @@ void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t 
             oracle_break(self, now_us, 332, "a drive out of range was accepted");
         }
         judge_applied(self, now_us, request, applied);
+        oracle_judge_applied_limits(self, now_us, request, applied);
         // What was overtaken by a newer one takes nothing from it; the first one replaces what the arm granted.
         const iw_time_us_t until_us = sent_us + oracle_us(self->config->lease_ms);
         self->lease_until_us = (self->fresh && self->lease_until_us > until_us) ? self->lease_until_us : until_us;

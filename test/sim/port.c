@@ -54,8 +54,7 @@ static int hand(rig_t *rig, const iw_can_frame_t *frame) {
     return 1;
 }
 
-static int port_send(void *context, const iw_can_frame_t *frame) {
-    rig_t *const rig = context;
+static int send_one(rig_t *rig, const iw_can_frame_t *frame) {
     const int result = hand(rig, frame);
     uint64_t bytes = 0;
     for (unsigned i = 0; i < IW_CAN_DATA_MAX; i++) {
@@ -73,6 +72,18 @@ static int port_send(void *context, const iw_can_frame_t *frame) {
     }
     oracle_sent(&rig->oracle, rig->now_us, frame, result > 0);
     return result;
+}
+
+static int port_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    rig_t *const rig = context;
+    oracle_call(&rig->oracle, rig->now_us, frames, count);
+    for (uint32_t i = 0; i < count; i++) {
+        const int result = send_one(rig, &frames[i]);
+        if (result <= 0) {
+            return (i > 0U) ? (int)i : result;
+        }
+    }
+    return (int)count;
 }
 
 static int port_receive(void *context, iw_can_frame_t *out_frame) {

@@ -88,6 +88,13 @@ static uint32_t log_span(sim_random_t *random, uint32_t low, uint32_t high) {
     return (base < high / 2U) ? between(random, base, 2U * base) : between(random, base, high);
 }
 
+/// By seed: as configured by default; so that both, one, or hardly any limit is met.
+static const struct {
+    uint16_t max_mrad_s;
+    uint16_t accel_mrad_s2;
+    uint16_t track_mm;
+} yaws[] = {{1000, 2000, 540}, {300, 500, 400}, {1500, 8000, 700}, {5000, 10000, 1500}};
+
 static void draw_config(scenario_t *self, sim_random_t *random) {
     iw_config_t *const config = &self->config;
     iw_config_default(config);
@@ -108,6 +115,11 @@ static void draw_config(scenario_t *self, sim_random_t *random) {
     // What is slower by so much needs limits to match.
     config->wheel_lag_ms = (uint16_t)(60U + self->slow_permille * 2U / 1000U);
     config->pair_mm = (uint16_t)(60U + self->seed % 4U * 30U);
+    config->min_current_mA = (uint16_t)(300U + self->seed % 5U * 200U);
+    config->asymmetric_current = self->seed % 7U == 3U;
+    config->max_yaw_mrad_s = yaws[self->seed / 4U % 4U].max_mrad_s;
+    config->yaw_accel_mrad_s2 = yaws[self->seed / 4U % 4U].accel_mrad_s2;
+    config->track_mm = yaws[self->seed / 4U % 4U].track_mm;
     if (self->slow_permille > 1000U) {
         config->wheel_silent_ms = (uint16_t)between(random, self->slow_permille * 4U / 1000U * 3U, 200);
     } else if (chance(random, 50)) {

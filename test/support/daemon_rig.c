@@ -77,10 +77,8 @@ iw_time_us_t iw_bus_next_us(const iw_backend_store_t *self) {
     return IW_NEVER;
 }
 
-int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frame) {
-    daemon_rig_t *rig = &daemon_rig;
+static int send_one(daemon_rig_t *rig, const iw_can_frame_t *frame) {
     const iw_side_t side = (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
-    (void)self;
     if (rig->bus < IW_BUS_PASSIVE) {
         return -1;
     }
@@ -96,6 +94,17 @@ int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frame) {
     rig->sent_waits = rig->waits;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
     return 1;
+}
+
+int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frames, uint32_t count) {
+    (void)self;
+    for (uint32_t i = 0; i < count; i++) {
+        const int result = send_one(&daemon_rig, &frames[i]);
+        if (result <= 0) {
+            return (i > 0U) ? (int)i : result;
+        }
+    }
+    return (int)count;
 }
 
 int iw_bus_receive(iw_backend_store_t *self, iw_can_frame_t *out_frame) {

@@ -27,8 +27,7 @@ void fake_bus_init(fake_bus_t *self, iw_time_us_t now_us) {
     }
 }
 
-static int fake_send(void *context, const iw_can_frame_t *frame) {
-    fake_bus_t *const self = context;
+static int send_one(fake_bus_t *self, const iw_can_frame_t *frame) {
     const iw_side_t side = side_of(frame);
     const int result = (self->flights < FAKE_BUS_FLIGHT_MAX) ? self->send_result[side] : 0;
     if (self->listener != NULL) {
@@ -46,6 +45,20 @@ static int fake_send(void *context, const iw_can_frame_t *frame) {
     self->flight[self->flights].at_us = self->now_us;
     self->flights++;
     return result;
+}
+
+static int fake_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    fake_bus_t *const self = context;
+    self->calls++;
+    for (uint32_t i = 0; i < count; i++) {
+        self->call_frame = i;
+        self->call_frames = count;
+        const int result = send_one(self, &frames[i]);
+        if (result <= 0) {
+            return (i > 0U) ? (int)i : result;
+        }
+    }
+    return (int)(count + self->boast);
 }
 
 static int fake_receive(void *context, iw_can_frame_t *out_frame) {

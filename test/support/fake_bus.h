@@ -36,6 +36,7 @@ typedef struct {
     int estop_level; ///< What `estop_pressed` answers.
     bool estop_edge; ///< An edge since the last call: told once.
     uint32_t flood;  ///< So many frames of an unknown id come before the others.
+    uint32_t boast;  ///< `send` answers that it accepted so many more frames than it was passed.
     fake_bus_listener_t listener;
     void *listener_context;
 
@@ -43,6 +44,9 @@ typedef struct {
     iw_time_us_t now_us;
     uint32_t sent;                  ///< Frames accepted.
     uint32_t refused;               ///< Frames not accepted.
+    uint32_t calls;                 ///< Of `send`.
+    uint32_t call_frame;            ///< Position of the frame in its call, for the listener ...
+    uint32_t call_frames;           ///< ... and how many frames the call has.
     uint32_t purges;                ///< Calls of `purge`.
     uint32_t lost;                  ///< Frames that found the receive queue full.
     iw_can_frame_t last[IW_SIDES];  ///< Last setpoint accepted for each wheel.

@@ -104,10 +104,10 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
     return error;
 }
 
-int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
+int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count) {
     (void)self;
-    (void)frame;
-    return fake_interface.send_result;
+    (void)frames;
+    return (fake_interface.send_result > 0) ? (int)count : fake_interface.send_result;
 }
 
 int iw_netlink_open(iw_netlink_t *self) {

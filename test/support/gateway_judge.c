@@ -69,6 +69,9 @@ static void judge_frame(void *context, const iw_can_frame_t *frame, bool accepte
     blame(self, self->tried[side], "7: two setpoints for one wheel in one step");
     blame(self, side == IW_LEFT && self->tried[IW_RIGHT], "right before left");
     blame(self, self->bus->unechoed[side] >= (zero ? 2U : 1U), "6: too many un-echoed setpoints");
+    blame(self, !zero && self->bus->call_frames != IW_SIDES, "5: motion for one wheel in a call of its own");
+    blame(self, self->bus->call_frame != ((self->bus->call_frames == IW_SIDES && side == IW_RIGHT) ? 1U : 0U),
+          "5: right before left in one call");
     if (!zero) {
         judge_slope(self, side, command.speed_mm_s);
         judge_right_to_move(self, side, command.speed_mm_s);

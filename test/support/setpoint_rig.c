@@ -13,6 +13,11 @@ void setpoint_rig_begin(setpoint_rig_t *self) {
 
 void setpoint_rig_init(setpoint_rig_t *self) {
     fixture_config(&self->config);
+    // So wide that no ramp meets them: unit_yaw judges the limits of yaw.
+    self->config.max_yaw_mrad_s = 10000;
+    self->config.yaw_accel_mrad_s2 = 10000;
+    self->config.track_mm = 1500;
+    self->config.radius_mm = 60;
     setpoint_rig_begin(self);
 }
 

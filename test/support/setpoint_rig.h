@@ -12,7 +12,7 @@ typedef struct {
     iw_time_us_t now_us;
 } setpoint_rig_t;
 
-/// In silence, with the configuration of the fixture.
+/// In silence, with the configuration of the fixture, but limits of yaw that no ramp meets.
 void setpoint_rig_init(setpoint_rig_t *self);
 
 /// Anew, with the configuration that is there.

@@ -5,10 +5,12 @@
 
 #include <string.h>
 
-static int port_send(void *context, const iw_can_frame_t *frame) {
+static int port_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     world_rig_t *rig = (world_rig_t *)context;
-    sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
-    return 1;
+    for (uint32_t i = 0; i < count; i++) {
+        sim_world_submit(&rig->world, rig->now_us, rig->port, &frames[i]);
+    }
+    return (int)count;
 }
 
 static int port_receive(void *context, iw_can_frame_t *out_frame) {

@@ -85,6 +85,9 @@ void iw_register_write(iw_register_t *address, uint32_t value) {
     rig_device_t *const device = device_at(address, &offset);
     TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread, "the mask was not read back");
     device->mask_unread = !is_serving && offset == IER && (value & IW_IER_TMEIE) == 0U;
+    if (device->on_write != NULL && !is_serving) {
+        device->on_write(offset);
+    }
     bxcan_model_write(&device->model, offset, value);
     serve(device);
 }
@@ -94,6 +97,7 @@ void rig_reset(void) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         memset(&rig[i], 0xA5, sizeof rig[i]);
         rig[i].on_read = NULL;
+        rig[i].on_write = NULL;
         rig[i].reset = 0;
         rig[i].mask_unread = false;
         rig[i].interrupts = 0;

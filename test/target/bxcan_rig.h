@@ -18,7 +18,8 @@ typedef struct {
     iw_bxcan_t driver;
     bool mask_unread;    ///< Interrupts were masked, and IER was not read back yet: that write may still be under way.
     uint32_t interrupts; ///< Served so far.
-    bool (*on_read)(uint32_t offset); ///< Called after each read of this device; false: not again.
+    bool (*on_read)(uint32_t offset);  ///< Called after each read of this device; false: not again.
+    void (*on_write)(uint32_t offset); ///< Called before each write that the driver makes outside its interrupts.
 } rig_device_t;
 
 extern rig_device_t rig[RIG_DEVICES];

@@ -35,16 +35,16 @@ static void put(const iw_can_frame_t *frame) {
     }
 }
 
-int my_send(void *context, const iw_can_frame_t *frame) {
+int my_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     (void)context;
-    for (size_t i = 0; i < SLOTS; i++) {
+    uint32_t filled = 0;
+    for (size_t i = 0; i < SLOTS && filled < count; i++) {
         if (!my_can.is_full[i]) {
-            my_can.slot[i] = *frame;
+            my_can.slot[i] = frames[filled++];
             my_can.is_full[i] = true;
-            return 1;
         }
     }
-    return 0;
+    return (int)filled;
 }
 
 int my_receive(void *context, iw_can_frame_t *out_frame) {

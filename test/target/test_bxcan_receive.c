@@ -96,7 +96,7 @@ static void test_frames_come_in_the_order_of_the_bus_with_echoes_between(void) {
     const uint32_t expected[] = {256, 266, 512, 288};
     model_frame_t on_bus;
     iw_can_frame_t taken;
-    (void)iw_bxcan_send(driver, &left);
+    (void)iw_bxcan_send(driver, &left, 1);
     (void)rig_hear(0, 256, 4);
     (void)rig_send_next(0, &on_bus);
     (void)rig_hear(0, 512, 4);

@@ -20,7 +20,7 @@ void tearDown(void) {
 
 static int send(uint32_t id, uint8_t mark) {
     const iw_can_frame_t frame = rig_frame(id, mark);
-    return iw_bxcan_send(driver, &frame);
+    return iw_bxcan_send(driver, &frame, 1);
 }
 
 static void assert_on_bus(uint32_t id, uint8_t mark) {
@@ -55,7 +55,7 @@ static void test_frame_arrives_byte_for_byte(void) {
     for (size_t i = 0; i < 8; i++) {
         frame.data[i] = bytes[i];
     }
-    TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame, 1));
     TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
     TEST_ASSERT_EQUAL(0x7FF, on_bus.id);
     TEST_ASSERT_EQUAL(0, on_bus.extended);
@@ -68,7 +68,7 @@ static void test_every_dlc_is_sent(void) {
     for (uint8_t dlc = 0; dlc <= 8; dlc++) {
         const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
         model_frame_t on_bus;
-        TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame));
+        TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame, 1));
         TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
         TEST_ASSERT_EQUAL(dlc, on_bus.dlc);
     }
@@ -83,7 +83,7 @@ static void test_what_is_no_plain_data_frame_is_refused(void) {
         {.id = 266, .dlc = 9},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &wrong[i]));
+        TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &wrong[i], 1));
     }
     assert_nothing_waits();
 }
@@ -110,6 +110,107 @@ static void test_left_leaves_before_right_whatever_the_order(void) {
     assert_on_bus(298, 2);
     assert_echo(266, 1);
     assert_echo(298, 2);
+}
+
+/// Bytes and id of every mailbox are there before the first one is requested: of both frames, the left one's mailbox is still not
+/// pending when the right one's data is written.
+static uint32_t written[64];
+static uint32_t writes;
+
+static void note_write(uint32_t offset) {
+    written[writes++ % 64U] = offset;
+}
+
+static int send_pair(uint8_t left_mark, uint8_t right_mark) {
+    const iw_can_frame_t pair[] = {rig_frame(266, left_mark), rig_frame(298, right_mark)};
+    return iw_bxcan_send(driver, pair, 2);
+}
+
+static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
+    writes = 0;
+    rig[0].on_write = note_write;
+    TEST_ASSERT_EQUAL(2, send_pair(1, 2));
+    rig[0].on_write = NULL;
+    TEST_ASSERT_GREATER_THAN(2, writes);
+    for (uint32_t i = 0; i < writes; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(i >= writes - 2U, (written[i] & 0x18FU) == 0x180U,
+                                  "requests come last, both of them");
+    }
+    assert_on_bus(266, 1);
+    assert_on_bus(298, 2);
+    assert_nothing_waits();
+    assert_echo(266, 1);
+    assert_echo(298, 2);
+    assert_no_echo();
+}
+
+static void test_pair_takes_the_places_of_the_waiting_one(void) {
+    TEST_ASSERT_EQUAL(2, send_pair(1, 2));
+    TEST_ASSERT_EQUAL(2, send_pair(3, 4));
+    TEST_ASSERT_EQUAL(0, send_pair(5, 6));
+    assert_on_bus(266, 3);
+    assert_on_bus(298, 4);
+    assert_nothing_waits();
+    assert_echo(266, 1);
+    assert_echo(266, 3);
+    assert_echo(298, 2);
+    assert_echo(298, 4);
+    assert_no_echo();
+}
+
+static void test_pair_with_a_wrong_frame_is_refused_whole(void) {
+    const iw_can_frame_t left_wrong[] = {rig_frame(0x800, 1), rig_frame(298, 2)};
+    const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, left_wrong, 2));
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, right_wrong, 2));
+    assert_nothing_waits();
+    assert_no_echo();
+}
+
+static void test_pair_whose_right_frame_finds_no_place_leaves_the_left_one(void) {
+    const iw_can_frame_t right = rig_frame(298, 2);
+    (void)send(298, 1);
+    (void)iw_bxcan_send(driver, &right, 1);
+    TEST_ASSERT_EQUAL(1, send_pair(3, 4));
+    assert_on_bus(266, 3);
+    assert_on_bus(298, 2);
+    assert_nothing_waits();
+    assert_echo(266, 3);
+}
+
+/// Whatever waits gets through when the interrupt has just been masked: the abort comes too late.
+static bool send_all_at_masking(uint32_t offset) {
+    model_frame_t frame;
+    for (int i = bxcan_model_offer(model, &frame); offset == 0x14U && i >= 0; i = bxcan_model_offer(model, &frame)) {
+        bxcan_model_begin(model, i);
+        bxcan_model_end(model, i, MODEL_SENT);
+    }
+    return true;
+}
+
+/// Both old frames get through while the new ones take their places: the first one's mailbox is free again for the second one.
+static void test_pair_finds_places_though_both_old_frames_leave_meanwhile(void) {
+    TEST_ASSERT_EQUAL(2, send_pair(1, 2));
+    rig[0].on_read = send_all_at_masking;
+    TEST_ASSERT_EQUAL(2, send_pair(3, 4));
+    rig[0].on_read = NULL;
+    assert_echo(266, 1);
+    assert_echo(298, 2);
+    assert_no_echo();
+    assert_on_bus(266, 3);
+    assert_on_bus(298, 4);
+    assert_nothing_waits();
+    assert_echo(266, 3);
+    assert_echo(298, 4);
+    assert_no_echo();
+}
+
+static void test_call_places_no_more_frames_than_wheels(void) {
+    const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
+    TEST_ASSERT_EQUAL(2, iw_bxcan_send(driver, three, 3));
+    assert_on_bus(266, 1);
+    assert_on_bus(298, 2);
+    assert_nothing_waits();
 }
 
 static void test_newer_frame_takes_the_place_of_the_waiting_one(void) {
@@ -477,6 +578,12 @@ int main(void) {
     RUN_TEST(test_what_is_no_plain_data_frame_is_refused);
     RUN_TEST(test_echo_comes_only_with_the_acknowledgement);
     RUN_TEST(test_left_leaves_before_right_whatever_the_order);
+    RUN_TEST(test_pair_fills_both_mailboxes_before_it_requests_one);
+    RUN_TEST(test_pair_takes_the_places_of_the_waiting_one);
+    RUN_TEST(test_pair_with_a_wrong_frame_is_refused_whole);
+    RUN_TEST(test_pair_whose_right_frame_finds_no_place_leaves_the_left_one);
+    RUN_TEST(test_pair_finds_places_though_both_old_frames_leave_meanwhile);
+    RUN_TEST(test_call_places_no_more_frames_than_wheels);
     RUN_TEST(test_newer_frame_takes_the_place_of_the_waiting_one);
     RUN_TEST(test_third_frame_of_an_id_must_wait_and_changes_nothing);
     RUN_TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo);

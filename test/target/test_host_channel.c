@@ -45,7 +45,7 @@ static void start_with_lease(uint16_t lease_ms) {
     iw_config_t config = rig.config;
     iw_host_place_t place = host.place;
     config.lease_ms = lease_ms;
-    place.settings = iw_settings_from(&config, 540);
+    place.settings = iw_settings_from(&config);
     memset(&host, 0, sizeof host);
     iw_host_init(&host, &place, rig.now_us);
     say(0, "{\"cmd\":\"link\"}");

@@ -186,22 +186,22 @@ static void test_host_state_after_a_stall_comes_in_no_burst(void) {
 }
 
 static void test_host_setting_out_of_its_range_is_refused(void) {
-    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_settings_t settings = iw_settings_from(&rig.config);
     iw_config_t config = rig.config;
     char text[256];
     iwn_text_t why = iwn_text_begin(text, sizeof text);
     TEST_ASSERT_TRUE(iw_settings_check(&settings, &why));
     config.gear_turns = 1000;
     config.gear_per = 1;
-    settings = iw_settings_from(&config, 540);
+    settings = iw_settings_from(&config);
     TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
     config = rig.config;
     config.lease_ms = 900;
-    settings = iw_settings_from(&config, 540);
+    settings = iw_settings_from(&config);
     TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
     config = rig.config;
     config.radius_mm = 0;
-    settings = iw_settings_from(&config, 540);
+    settings = iw_settings_from(&config);
     TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
 }
 

@@ -46,7 +46,7 @@ void tearDown(void) {}
 static iw_settings_t settings_of(const char *key, const char *value) {
     char why[200];
     iwn_text_t text = iwn_text_begin(why, sizeof why);
-    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_settings_t settings = iw_settings_from(&rig.config);
     TEST_ASSERT_TRUE_MESSAGE(key == NULL || iw_settings_set(&settings, key, value, &text), why);
     return settings;
 }
@@ -209,18 +209,50 @@ static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
-/// As version 0.2 wrote it: 26 values, without the three of the pair behind the 14th; then whether something is learnt, and that.
+/// A record of version 0.2 has 26 values: its 18 numbers, type, role, five switches, track. The rest of its keys came later.
+static void put_as_before(uint8_t *place, const iw_settings_t *settings) {
+    iw_config_t config;
+    iw_config_default(&config);
+    iw_settings_to(settings, &config);
+    const uint16_t value[26] = {config.period_ms,
+                                config.lease_ms,
+                                config.accel_mm_s2,
+                                config.decel_mm_s2,
+                                config.max_speed_mm_s,
+                                config.max_current_mA,
+                                config.zero_hold_ms,
+                                config.wheel_silent_ms,
+                                config.echo_ms,
+                                config.rest_rpm,
+                                config.rest_ms,
+                                config.follow_mm_s,
+                                config.follow_ms,
+                                config.blocked_ms,
+                                config.radius_mm,
+                                config.gear_turns,
+                                config.gear_per,
+                                config.setpoint_dlc,
+                                config.setpoint_type_set ? config.setpoint_type : 0xFFFFU,
+                                (uint16_t)config.current_role,
+                                config.rpm_of_rotor,
+                                config.invert[IW_LEFT],
+                                config.invert[IW_RIGHT],
+                                (uint16_t)config.force_unit[IW_LEFT],
+                                (uint16_t)config.force_unit[IW_RIGHT],
+                                config.track_mm};
+    memcpy(place, value, sizeof value);
+}
+
+/// As version 0.2 wrote it: settings, whether something is learnt, and that.
 static void write_as_before(iw_kept_t *kept, const iw_settings_t *settings, const iw_learnt_t *learnt) {
     uint32_t words[IW_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
     uint8_t *const rest = (uint8_t *)&words[2];
     if (settings != NULL) {
-        memcpy(rest, settings->value, 14U * sizeof(uint16_t));
-        memcpy(rest + 28U, &settings->value[17], 12U * sizeof(uint16_t));
+        put_as_before(rest, settings);
     }
     if (learnt != NULL) {
         words[15] = 1U;
-        memcpy(rest + 56U, learnt->settings.value, 14U * sizeof(uint16_t));
-        memcpy(rest + 84U, &learnt->settings.value[17], 12U * sizeof(uint16_t));
+        put_as_before(rest + 56U, &learnt->settings);
         memcpy(rest + 108U, learnt->zero, sizeof *learnt - offsetof(iw_learnt_t, zero));
     }
     TEST_ASSERT_TRUE(iw_store_write(&kept->store, words, false));

@@ -118,9 +118,9 @@ static void test_assumption_a_track_within_two_percent_is_the_same(void) {
     assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "612");
     assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "587");
     assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "613");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "5000");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "5001");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "49");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "1500");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "1501");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "199");
 }
 
 static void test_assumption_gear_ratios_are_compared_as_ratios(void) {

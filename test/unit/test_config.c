@@ -22,6 +22,7 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, decel_mm_s2), 100, 20000, IW_CONFIG_DECEL},
     {offsetof(iw_config_t, max_speed_mm_s), 10, 5000, IW_CONFIG_MAX_SPEED},
     {offsetof(iw_config_t, max_current_mA), 300, 2000, IW_CONFIG_MAX_CURRENT},
+    {offsetof(iw_config_t, min_current_mA), 300, 2000, IW_CONFIG_MIN_CURRENT},
     {offsetof(iw_config_t, zero_hold_ms), 1100, 5000, IW_CONFIG_ZERO_HOLD},
     {offsetof(iw_config_t, wheel_silent_ms), 20, 200, IW_CONFIG_WHEEL_SILENT},
     {offsetof(iw_config_t, echo_ms), 20, 200, IW_CONFIG_ECHO},
@@ -33,6 +34,9 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, pair_mm), 20, 150, IW_CONFIG_PAIR},
     {offsetof(iw_config_t, pair_leak_ms), 500, 3000, IW_CONFIG_PAIR_LEAK},
     {offsetof(iw_config_t, wheel_lag_ms), 10, 300, IW_CONFIG_WHEEL_LAG},
+    {offsetof(iw_config_t, max_yaw_mrad_s), 50, 10000, IW_CONFIG_MAX_YAW},
+    {offsetof(iw_config_t, yaw_accel_mrad_s2), 100, 10000, IW_CONFIG_YAW_ACCEL},
+    {offsetof(iw_config_t, track_mm), 200, 1500, IW_CONFIG_TRACK},
     {offsetof(iw_config_t, radius_mm), 60, 400, IW_CONFIG_RADIUS},
     {offsetof(iw_config_t, gear_turns), 1, 1000, IW_CONFIG_GEAR_TURNS},
     {offsetof(iw_config_t, gear_per), 1, 1000, IW_CONFIG_GEAR_PER},
@@ -71,6 +75,8 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT16(1500, config.decel_mm_s2);
     TEST_ASSERT_EQUAL_UINT16(1000, config.max_speed_mm_s);
     TEST_ASSERT_EQUAL_UINT16(2000, config.max_current_mA);
+    TEST_ASSERT_EQUAL_UINT16(300, config.min_current_mA);
+    TEST_ASSERT_FALSE(config.asymmetric_current);
     TEST_ASSERT_EQUAL_UINT16(1500, config.zero_hold_ms);
     TEST_ASSERT_EQUAL_UINT16(50, config.wheel_silent_ms);
     TEST_ASSERT_EQUAL_UINT16(50, config.echo_ms);
@@ -82,6 +88,9 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT16(60, config.pair_mm);
     TEST_ASSERT_EQUAL_UINT16(1000, config.pair_leak_ms);
     TEST_ASSERT_EQUAL_UINT16(60, config.wheel_lag_ms);
+    TEST_ASSERT_EQUAL_UINT16(1000, config.max_yaw_mrad_s);
+    TEST_ASSERT_EQUAL_UINT16(2000, config.yaw_accel_mrad_s2);
+    TEST_ASSERT_EQUAL_UINT16(540, config.track_mm);
     TEST_ASSERT_EQUAL_UINT16(192, config.radius_mm);
     TEST_ASSERT_EQUAL_UINT16(config.gear_per, config.gear_turns);
     TEST_ASSERT_EQUAL_UINT16(5, config.setpoint_dlc);

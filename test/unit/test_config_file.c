@@ -77,7 +77,7 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL_UINT32(1000000, config.bus.bitrate);
     TEST_ASSERT_EQUAL_UINT16(625, config.bus.sample_point_permille);
     TEST_ASSERT_EQUAL(GATEWAY_MISMATCH_REFUSE, config.bus.on_mismatch);
-    TEST_ASSERT_EQUAL_UINT16(540, config.track_mm);
+    TEST_ASSERT_EQUAL_UINT16(540, config.core.track_mm);
     TEST_ASSERT_EQUAL_STRING("ESTOP", config.estop.line);
     TEST_ASSERT_TRUE(config.estop.active_high);
     TEST_ASSERT_EQUAL_UINT16(5, config.estop.debounce_ms);
@@ -104,7 +104,9 @@ static void test_parse_every_key_reaches_its_field(void) {
         "[wheels]\nsetpoint_type=0\ncurrent_role=setpoint\nrpm_of=rotor\nradius_mm=200\ngear_ratio=27/2\ntrack_mm=600\n"
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
-        "max_current_mA=1500\nzero_hold_ms=1200\n[limits]\nwheel_silent_ms=60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
+        "max_yaw_mrad_s=900\nyaw_accel_mrad_s2=1900\nmax_current_mA=1500\nmin_current_mA=400\nasymmetric_current=yes\n"
+        "zero_hold_ms=1200\n[limits]\nwheel_silent_ms="
+        "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\n"
         "[northbound]\nsocket=/tmp/s\nmode=0600\ngroup=dialout\nmax_clients=4\n[record]\nblackbox_s=0\ndirectory=/"
@@ -121,19 +123,21 @@ static void test_parse_every_key_reaches_its_field(void) {
     TEST_ASSERT_EQUAL_UINT16(200, core->radius_mm);
     TEST_ASSERT_EQUAL_UINT16(27, core->gear_turns);
     TEST_ASSERT_EQUAL_UINT16(2, core->gear_per);
-    TEST_ASSERT_EQUAL_UINT16(600, config.track_mm);
+    TEST_ASSERT_EQUAL_UINT16(600, config.core.track_mm);
     TEST_ASSERT_EQUAL_UINT16(8, core->setpoint_dlc);
     TEST_ASSERT_TRUE(core->invert[IW_LEFT]);
     TEST_ASSERT_FALSE(core->invert[IW_RIGHT]);
     TEST_ASSERT_EQUAL(IW_FORCE_DN, core->force_unit[IW_LEFT]);
     TEST_ASSERT_EQUAL(IW_FORCE_CN, core->force_unit[IW_RIGHT]);
-    const uint16_t numbers[] = {core->period_ms,      core->lease_ms,       core->accel_mm_s2,  core->decel_mm_s2,
-                                core->max_speed_mm_s, core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms,
-                                core->echo_ms,        core->rest_rpm,       core->rest_ms,      core->follow_mm_s,
-                                core->follow_ms,      core->blocked_ms,     core->pair_mm,      core->pair_leak_ms,
-                                core->wheel_lag_ms};
-    const uint16_t wanted[] = {10, 300, 500, 2000, 900, 1500, 1200, 60, 70, 3, 250, 310, 510, 1100, 61, 1001, 62};
+    const uint16_t numbers[] = {
+        core->period_ms,      core->lease_ms,     core->accel_mm_s2,     core->decel_mm_s2,       core->max_speed_mm_s,
+        core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms, core->echo_ms,           core->rest_rpm,
+        core->rest_ms,        core->follow_mm_s,  core->follow_ms,       core->blocked_ms,        core->pair_mm,
+        core->pair_leak_ms,   core->wheel_lag_ms, core->max_yaw_mrad_s,  core->yaw_accel_mrad_s2, core->min_current_mA};
+    const uint16_t wanted[] = {10,  300, 500, 2000, 900, 1500, 1200, 60,  70,   3,
+                               250, 310, 510, 1100, 61,  1001, 62,   900, 1900, 400};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
+    TEST_ASSERT_TRUE(core->asymmetric_current);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
     TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", config.estop.chip);
     TEST_ASSERT_EQUAL_STRING("GPIO4", config.estop.chip_line);
@@ -164,7 +168,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
     } rows[] = {
         {"bus", "bitrate", 10000, 1000000},     {"bus", "sample_point_permille", 500, 900},
         {"wheels", "setpoint_type", 0, 255},    {"wheels", "radius_mm", 60, 400},
-        {"wheels", "track_mm", 50, 5000},       {"wheels", "setpoint_dlc", 5, 8},
+        {"wheels", "track_mm", 200, 1500},      {"wheels", "setpoint_dlc", 5, 8},
         {"drive", "period_ms", 5, 50},          {"drive", "accel_mm_s2", 50, 20000},
         {"drive", "max_current_mA", 300, 2000}, {"drive", "zero_hold_ms", 1100, 5000},
         {"limits", "wheel_silent_ms", 20, 200}, {"limits", "echo_ms", 20, 200},
@@ -173,7 +177,8 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         {"limits", "pair_mm", 20, 150},         {"limits", "pair_leak_ms", 500, 3000},
         {"limits", "wheel_lag_ms", 10, 300},    {"estop", "debounce_ms", 0, 1000},
         {"northbound", "max_clients", 1, 64},   {"record", "blackbox_s", 0, 600},
-        {"record", "keep_stops", 8, 256},
+        {"record", "keep_stops", 8, 256},       {"drive", "min_current_mA", 300, 2000},
+        {"drive", "max_yaw_mrad_s", 50, 10000}, {"drive", "yaw_accel_mrad_s2", 100, 10000},
     };
     char text[128];
     char cure[64];

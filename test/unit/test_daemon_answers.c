@@ -149,6 +149,7 @@ static void test_reset_that_waited_through_a_stop_is_refused(void) {
 }
 
 static void test_change_of_state_is_noted_with_what_each_wheel_was_told(void) {
+    daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":100,\"left_mA\":500,\"right_mA\":900}",

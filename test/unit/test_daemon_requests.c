@@ -34,6 +34,7 @@ static void test_drive_reaches_the_wheel_it_is_for(void) {
 }
 
 static void test_current_reaches_the_wheel_it_is_for(void) {
+    daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100,\"left_mA\":500,\"right_mA\":900}",
@@ -50,8 +51,8 @@ static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
         assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":250,\"yaw_mrad_s\":200}", "\"ok\":true");
         daemon_rig_run(20);
     }
-    TEST_ASSERT_EQUAL_INT(250 - 200 * daemon_rig.daemon->config.track_mm / 2000, daemon_rig.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(250 + 200 * daemon_rig.daemon->config.track_mm / 2000, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(250 - 200 * daemon_rig.daemon->config.core.track_mm / 2000, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(250 + 200 * daemon_rig.daemon->config.core.track_mm / 2000, daemon_rig.told_mm_s[IW_RIGHT]);
 }
 
 static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(void) {

@@ -10,24 +10,28 @@
 
 static iw_config_t config;
 static iw_envelope_t envelope;
+/// Most of these tests judge speeds, with a current of 0.
+static bool no_floor;
+
+/// The configuration was changed: a new envelope for it.
+static void restart(void) {
+    config.min_current_mA = no_floor ? 300 : config.min_current_mA;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+    config.min_current_mA = no_floor ? 0 : config.min_current_mA;
+    memset(&envelope, 0, sizeof envelope);
+    envelope.config = &config;
+}
 
 void setUp(void) {
     iw_config_default(&config);
     config.setpoint_type = 1;
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
-    memset(&envelope, 0, sizeof envelope);
-    envelope.config = &config;
+    no_floor = true;
+    restart();
 }
 
 void tearDown(void) {}
-
-/// The configuration was changed: a new envelope for it.
-static void restart(void) {
-    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    memset(&envelope, 0, sizeof envelope);
-    envelope.config = &config;
-}
 
 /// Bytes written by hand, so that an error of the encoder does not hide one of the envelope.
 static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
@@ -52,8 +56,8 @@ static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t 
 
 /// Brings the wheel to a low speed: zero, and long after it the speed.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
-    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - AGES_US, side, 0, 0));
-    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - AGES_US, side, 0, config.max_current_mA));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, config.max_current_mA));
 }
 
 static void test_init_forgets_everything(void) {
@@ -149,10 +153,11 @@ static void test_check_role_not_configured_stops_everything(void) {
     TEST_ASSERT_EQUAL_UINT32(2, envelope.stopped);
 }
 
-/// A limit has no sign: a negative one is no current that may leave.
+/// A limit has no sign and a floor: a negative one is no current that may leave, nor one below the floor.
 static void sweep_currents(int32_t speed_mm_s) {
     const int32_t highest = config.max_current_mA;
-    const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? 0 : -highest;
+    const int32_t floor = (config.min_current_mA < highest) ? config.min_current_mA : highest;
+    const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? floor : -highest;
     for (int32_t current = -32768; current <= 32767; current++) {
         const bool within = current >= lowest && current <= highest;
         const iw_envelope_verdict_t verdict = check(START_US, IW_LEFT, speed_mm_s, current);
@@ -163,10 +168,13 @@ static void sweep_currents(int32_t speed_mm_s) {
 }
 
 static void test_check_every_current_passes_within_the_configured_maximum_only(void) {
-    static const uint16_t maxima[] = {300, 301, 1234, 1999, 2000};
+    static const uint16_t maxima[] = {300, 301, 700, 1234, 1999, 2000};
+    static const uint16_t minima[] = {300, 300, 500, 1233, 1999, 300};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
-    for (size_t i = 0; i < 10; i++) {
+    no_floor = false;
+    for (size_t i = 0; i < 12; i++) {
         config.max_current_mA = maxima[i / 2];
+        config.min_current_mA = minima[i / 2];
         config.current_role = roles[i % 2];
         restart();
         sweep_currents(0);

@@ -26,6 +26,10 @@ static iw_config_t any_config(void) {
     config.accel_mm_s2 = slopes[draw(7)];
     config.decel_mm_s2 = slopes[draw(7)];
     config.max_speed_mm_s = (uint16_t)(10U + draw(4991));
+    config.max_yaw_mrad_s = (uint16_t)(50U + draw(9951) / (1U + draw(9)));
+    config.yaw_accel_mrad_s2 = (uint16_t)(100U + draw(9901) / (1U + draw(9)));
+    config.track_mm = (uint16_t)(200U + draw(1301));
+    config.radius_mm = (uint16_t)(60U + draw(341));
     return config;
 }
 
@@ -35,15 +39,27 @@ static iw_command_t any_command(const iw_config_t *config) {
     return command;
 }
 
+/// As the gateway commands it: within the limit of yaw.
+static iw_pair_t any_pair(const iw_config_t *config, const iw_yaw_t *yaw) {
+    iw_pair_t pair = {{any_command(config), any_command(config)}};
+    int32_t speeds[IW_SIDES] = {pair.wheel[IW_LEFT].speed_mm_s, pair.wheel[IW_RIGHT].speed_mm_s};
+    (void)iw_yaw_limit(yaw, speeds);
+    pair.wheel[IW_LEFT].speed_mm_s = (int16_t)speeds[IW_LEFT];
+    pair.wheel[IW_RIGHT].speed_mm_s = (int16_t)speeds[IW_RIGHT];
+    return pair;
+}
+
 static void send_through_gate(iw_envelope_t *envelope, const iw_config_t *config, iw_time_us_t now_us,
                               const iw_pair_t *pair) {
+    iw_can_frame_t frames[IW_SIDES];
     for (int side = IW_LEFT; side <= IW_RIGHT; side++) {
         const iw_command_t *const command = &pair->wheel[side];
         const iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
-        iw_can_frame_t frame;
-        TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
-        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, &frame, now_us));
+        iw_can_frame_t *const frame = &frames[side];
+        TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, frame));
+        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, frame, now_us));
     }
+    TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check_pair(envelope, frames, now_us));
 }
 
 static void run_once(void) {
@@ -55,7 +71,7 @@ static void run_once(void) {
     iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_ZERO);
     for (uint32_t i = 0; i < 400U; i++) {
         if (draw(20) == 0U) {
-            const iw_pair_t command = {{any_command(&config), any_command(&config)}};
+            const iw_pair_t command = any_pair(&config, &setpoint.yaw);
             iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_FOLLOW);
             iw_setpoint_command(&setpoint, now_us, &command);
         }

@@ -107,10 +107,12 @@ static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_facto
         {{{1000, 500}, {1000, 900}, true}, {1000, 1000}, {500, 900}, false},
         {{{2000, 500}, {1000, 900}, true}, {1000, 1000}, {250, 900}, true},
         {{{-400, 4000}, {1000, 900}, true}, {-100, 1000}, {1000, 900}, true},
-        {{{32767, -32768}, {0, 0}, true}, {999, 0}, {-1000, 0}, true},
-        {{{100, 100}, {500, 2000}, true}, {100, 250}, {100, 1000}, true},
+        {{{32767, -32768}, {0, 0}, true}, {999, 300}, {-1000, 300}, true},
+        {{{100, 100}, {800, 2000}, true}, {100, 400}, {100, 1000}, true},
     };
     rig.config.max_current_mA = 1000;
+    rig.config.asymmetric_current = true;
+    rig.config.max_yaw_mrad_s = 10000; // Only the maximum speed is judged here.
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -122,6 +124,61 @@ static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_facto
         TEST_ASSERT_EQUAL_INT16(cases[i].right.current_mA, applied.pair.wheel[IW_RIGHT].current_mA);
         TEST_ASSERT_EQUAL_INT(cases[i].limited, applied.limited);
     }
+}
+
+/// 0 mA on the left and 2000 mA on the right were applied at speed: the right wheel turned the machine around the left one.
+static void test_gateway_unequal_limits_become_the_larger_one(void) {
+    const iw_drive_t request = {{600, 600}, {0, 2000}, true};
+    const iw_drive_t low = {{600, 600}, {0, 299}, true};
+    const iw_drive_t equal = {{600, 600}, {500, 500}, true};
+    const iw_drive_t stop = {{0, 0}, {500, 500}, true};
+    iw_applied_t applied;
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
+    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_TRUE(applied.limited);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&low, &applied));
+    TEST_ASSERT_EQUAL_INT(300, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(300, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_TRUE(applied.limited);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&equal, &applied));
+    TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_FALSE(applied.limited);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&stop, &applied));
+    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_TRUE(applied.limited);
+}
+
+/// A current that is a setpoint is the client's own: below any floor, unequal, of either sign.
+static void test_gateway_current_setpoints_have_no_floor(void) {
+    const iw_drive_t request = {{100, -100}, {5, -400}, true};
+    iw_applied_t applied;
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
+    TEST_ASSERT_EQUAL_INT(5, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(-400, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_FALSE(applied.limited);
+}
+
+/// On the bus: never unequal, never below the floor, and the ramp to zero has the maximum.
+static void test_gateway_limit_of_the_client_ends_with_the_stop(void) {
+    const iw_drive_t request = {{600, 600}, {500, 500}, true};
+    iw_applied_t applied;
+    gateway_rig_arm(&rig);
+    for (unsigned i = 0; i < 50U; i++) {
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
+        gateway_rig_run(&rig, MS(20));
+    }
+    TEST_ASSERT_EQUAL_INT(500, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(6));
+    TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
+    TEST_ASSERT_TRUE(fake_bus_command(&rig.bus.last[IW_RIGHT]).speed_mm_s > 0);
 }
 
 static void test_gateway_current_alone_is_a_command_with_the_role_setpoint_only(void) {
@@ -281,6 +338,9 @@ int main(void) {
     RUN_TEST(test_gateway_drive_without_current_needs_the_role_limit);
     RUN_TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint);
     RUN_TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor);
+    RUN_TEST(test_gateway_unequal_limits_become_the_larger_one);
+    RUN_TEST(test_gateway_current_setpoints_have_no_floor);
+    RUN_TEST(test_gateway_limit_of_the_client_ends_with_the_stop);
     RUN_TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only);
     RUN_TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once);
     RUN_TEST(test_gateway_takeover_happens_at_rest_only);

@@ -68,10 +68,10 @@ static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
 
 /// A narrower track turns further; a slow machine does not brake but settles, and its quarter may not even be noticed.
 static void test_log_at_start_reckons_angles_with_track_and_speed(void) {
-    config.track_mm = 270;
+    config.core.track_mm = 270;
     gw_report_start(&config, false, false, &people);
     assert_line("running on 212.2 degrees a second;");
-    config.track_mm = 540;
+    config.core.track_mm = 540;
     config.core.max_speed_mm_s = 90;
     gw_report_start(&config, false, false, &people);
     assert_line("a wheel blocked 3.7 degrees, slow 7.2,");

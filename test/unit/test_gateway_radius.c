@@ -19,6 +19,7 @@ static void begin(uint16_t radius_mm) {
     fixture_config(&rig.config);
     rig.config.radius_mm = radius_mm;
     rig.config.rest_rpm = iw_config_rest(&rig.config).standard;
+    rig.config.max_yaw_mrad_s = 10000; // These wheels are compared with what they were told, in a turn too.
     world_rig_begin(&rig, 0);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         rig.world.pair.wheel[side].motion.config.radius_mm = radius_mm;

@@ -16,9 +16,10 @@ static size_t count;
 static int send_answer, estop_answer, waiting;
 static iw_bus_state_t bus_answer;
 
-int iw_bus_send(iw_backend_store_t *context, const iw_can_frame_t *frame) {
+int iw_bus_send(iw_backend_store_t *context, const iw_can_frame_t *frames, uint32_t frame_count) {
     (void)context;
-    (void)frame;
+    (void)frames;
+    (void)frame_count;
     return send_answer;
 }
 
@@ -100,11 +101,11 @@ static void test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     const uint8_t kinds[] = {BLACKBOX_NOT_SENT, BLACKBOX_NOT_SENT};
     gw_tape_step_begin(&tape, 5);
-    (void)hal.send(hal.context, &frame);
+    (void)hal.send(hal.context, &frame, 1);
     send_answer = 0;
-    (void)hal.send(hal.context, &frame);
+    (void)hal.send(hal.context, &frame, 1);
     send_answer = -1;
-    (void)hal.send(hal.context, &frame);
+    (void)hal.send(hal.context, &frame, 1);
     expect_kinds(kinds, sizeof kinds);
     TEST_ASSERT_EQUAL_INT64(0, entries[0].as.value);
     TEST_ASSERT_EQUAL_INT64(-1, entries[1].as.value);
@@ -126,9 +127,9 @@ static void test_frames_have_the_time_of_their_step_and_stand_for_it(void) {
 static void test_only_a_send_that_failed_is_noted(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     gw_tape_step_begin(&tape, 5);
-    TEST_ASSERT_EQUAL(1, hal.send(hal.context, &frame));
+    TEST_ASSERT_EQUAL(1, hal.send(hal.context, &frame, 1));
     send_answer = -1;
-    TEST_ASSERT_EQUAL(-1, hal.send(hal.context, &frame));
+    TEST_ASSERT_EQUAL(-1, hal.send(hal.context, &frame, 1));
     TEST_ASSERT_EQUAL(1, hal.purge(hal.context));
     look();
     TEST_ASSERT_EQUAL_size_t(2, count);
@@ -136,6 +137,24 @@ static void test_only_a_send_that_failed_is_noted(void) {
     TEST_ASSERT_EQUAL(266, entries[0].number);
     TEST_ASSERT_EQUAL_INT64(-1, entries[0].as.value);
     TEST_ASSERT_EQUAL(BLACKBOX_PURGE, entries[1].kind);
+}
+
+static void test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted(void) {
+    static const int answers[] = {2, 1, 0, -1};
+    const iw_can_frame_t pair[] = {{.id = 266, .dlc = 5}, {.id = 298, .dlc = 5}};
+    gw_tape_step_begin(&tape, 5);
+    for (size_t i = 0; i < sizeof answers / sizeof answers[0]; i++) {
+        send_answer = answers[i];
+        TEST_ASSERT_EQUAL(answers[i], hal.send(hal.context, pair, 2));
+    }
+    look();
+    TEST_ASSERT_EQUAL_size_t(3, count);
+    TEST_ASSERT_EQUAL_UINT32(298, entries[0].number);
+    TEST_ASSERT_EQUAL_INT64(0, entries[0].as.value);
+    TEST_ASSERT_EQUAL_UINT32(266, entries[1].number);
+    TEST_ASSERT_EQUAL_INT64(0, entries[1].as.value);
+    TEST_ASSERT_EQUAL_UINT32(266, entries[2].number);
+    TEST_ASSERT_EQUAL_INT64(-1, entries[2].as.value);
 }
 
 static void test_answers_are_noted_again_each_second(void) {
@@ -215,6 +234,7 @@ int main(void) {
     RUN_TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus);
     RUN_TEST(test_frames_have_the_time_of_their_step_and_stand_for_it);
     RUN_TEST(test_only_a_send_that_failed_is_noted);
+    RUN_TEST(test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted);
     RUN_TEST(test_answers_are_noted_again_each_second);
     RUN_TEST(test_drive_keeps_what_was_asked_and_when_it_was_sent);
     RUN_TEST(test_frames_around_a_stop_are_kept_apart);

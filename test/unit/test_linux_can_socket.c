@@ -20,9 +20,12 @@ static struct {
 static unsigned count;
 static int refused;   // The option that the kernel does not take; 0: it takes all.
 static int come;      // What recvmmsg says: frames, or minus an errno.
-static ssize_t taken; // What send says; negative: minus an errno.
-static bool unknown;  // CAN, to this kernel.
-static int before;    // The errno that a call of before has left.
+static int taken;     // Frames that sendmmsg takes at most; negative: minus an errno.
+static size_t length; // Of each of them, it says.
+static struct can_frame on_bus[IW_SIDES];
+static int calls;    // Of sendmmsg.
+static bool unknown; // CAN, to this kernel.
+static int before;   // The errno that a call of before has left.
 static iw_socketcan_socket_t bus;
 
 int socket(int domain, int type, int protocol) {
@@ -70,26 +73,42 @@ int recvmmsg(int fd, struct mmsghdr *messages, unsigned room, int flags, struct 
     return (come < 0) ? -1 : come;
 }
 
-ssize_t send(int fd, const void *bytes, size_t size, int flags) {
-    (void)fd;
-    (void)bytes;
-    TEST_ASSERT_EQUAL_UINT(sizeof(struct can_frame), size);
+int sendmmsg(int fd, struct mmsghdr *messages, unsigned asked_frames, int flags) {
+    TEST_ASSERT_EQUAL_INT(bus.fd, fd);
     TEST_ASSERT_EQUAL_INT(MSG_DONTWAIT | MSG_NOSIGNAL, flags);
-    errno = (taken < 0) ? (int)-taken : before;
-    return (taken < 0) ? -1 : taken;
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(IW_SIDES, asked_frames);
+    calls++;
+    const int sent = (taken < (int)asked_frames) ? taken : (int)asked_frames;
+    for (int i = 0; i < sent; i++) {
+        TEST_ASSERT_EQUAL_UINT(1, messages[i].msg_hdr.msg_iovlen);
+        TEST_ASSERT_EQUAL_UINT(sizeof on_bus[i], messages[i].msg_hdr.msg_iov->iov_len);
+        TEST_ASSERT_NULL(messages[i].msg_hdr.msg_name);
+        TEST_ASSERT_NULL(messages[i].msg_hdr.msg_control);
+        memcpy(&on_bus[i], messages[i].msg_hdr.msg_iov->iov_base, sizeof on_bus[i]);
+        messages[i].msg_len = (unsigned)length;
+    }
+    errno = (taken < 0) ? -taken : before;
+    return (taken < 0) ? -1 : sent;
 }
 
 void setUp(void) {
     memset(asked, 0, sizeof asked);
     count = 0;
-    refused = come = before = 0;
-    taken = (ssize_t)sizeof(struct can_frame);
+    refused = come = before = calls = 0;
+    memset(on_bus, 0xA5, sizeof on_bus);
+    taken = IW_SIDES;
+    length = sizeof(struct can_frame);
     iw_socketcan_socket_init(&bus);
 }
 
 void tearDown(void) {
     iw_socketcan_socket_close(&bus);
 }
+
+static const iw_can_frame_t pair[IW_SIDES] = {
+    {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .data = {1, 0, 100, 7, 208}},
+    {.id = IW_ID_RIGHT_SETPOINT, .dlc = 5, .data = {1, 255, 156, 7, 208}},
+};
 
 static bool was_asked(int level, int name, int value) {
     for (unsigned i = 0; i < count; i++) {
@@ -160,19 +179,47 @@ static void test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be
 }
 
 static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(void) {
-    const iw_can_frame_t frame = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5};
     TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
-    TEST_ASSERT_EQUAL_INT(1, iw_socketcan_socket_send(&bus, &frame));
+    TEST_ASSERT_EQUAL_INT(1, iw_socketcan_socket_send(&bus, pair, 1));
     static const int for_now[] = {EAGAIN, ENOBUFS, EINTR};
     for (size_t i = 0; i < sizeof for_now / sizeof for_now[0]; i++) {
         taken = -for_now[i];
-        TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_send(&bus, &frame));
+        TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_send(&bus, pair, 1));
+        TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
     }
     taken = -ENETDOWN;
-    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, &frame));
-    taken = 0; // Less than a frame: no frame. What a call of before left says nothing.
+    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    taken = 0; // No frame. What a call of before left says nothing.
     before = EAGAIN;
-    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, &frame));
+    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    taken = 1; // Less than a frame: no frame.
+    length = sizeof(struct can_frame) - 1U;
+    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+}
+
+static void test_can_socket_pair_leaves_in_one_call_left_first(void) {
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(2, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(1, calls);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_HEX32(pair[side].id, on_bus[side].can_id);
+        TEST_ASSERT_EQUAL_UINT8(pair[side].dlc, on_bus[side].len);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(pair[side].data, on_bus[side].data, sizeof on_bus[side].data);
+    }
+}
+
+static void test_can_socket_of_a_pair_that_leaves_in_half_reports_one(void) {
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    taken = 1;
+    before = ENOBUFS;
+    TEST_ASSERT_EQUAL_INT(1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(1, calls); // The second frame is not tried again.
+}
+
+static void test_can_socket_call_never_brings_more_frames_than_wheels(void) {
+    iw_can_frame_t many[IW_SIDES + 1U] = {{.id = 1}, {.id = 2}, {.id = 3}};
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(2, iw_socketcan_socket_send(&bus, many, IW_SIDES + 1U));
 }
 
 static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) {
@@ -201,6 +248,9 @@ int main(void) {
     RUN_TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went);
     RUN_TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained);
     RUN_TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone);
+    RUN_TEST(test_can_socket_pair_leaves_in_one_call_left_first);
+    RUN_TEST(test_can_socket_of_a_pair_that_leaves_in_half_reports_one);
+    RUN_TEST(test_can_socket_call_never_brings_more_frames_than_wheels);
     RUN_TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such);
     RUN_TEST(test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one);
     return UNITY_END();

@@ -91,7 +91,7 @@ static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
     TEST_ASSERT_EQUAL_UINT8(5, raw.len);
@@ -171,7 +171,7 @@ static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
     }
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     (void)close(hub);
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) < 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) < 0);
     iw_linux_hal_tend(&hal, now_us); // Back at once.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
@@ -193,7 +193,7 @@ static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) > now_us);
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
-        TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) < 0);
+        TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) < 0);
         TEST_ASSERT_TRUE(receive(&heard) < 0);
         now_us += 1000;
     }
@@ -260,7 +260,7 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     unsigned sent = 0;
     int result = 1;
     while (result > 0) {
-        result = iw_bus_send(&hal.bus, &frame);
+        result = iw_bus_send(&hal.bus, &frame, 1);
         sent += (result > 0) ? 1U : 0U;
         TEST_ASSERT_LESS_THAN_UINT(100000, sent);
     }
@@ -272,7 +272,7 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, iw_linux_hal_link(&hal)->purge);
     TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&hal.bus));
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, iw_linux_hal_link(&hal)->purge);
@@ -288,7 +288,7 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of before.
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
 static void test_estop_is_unreadable_until_the_button_has_spoken(void) {

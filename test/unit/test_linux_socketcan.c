@@ -58,7 +58,7 @@ static unsigned drain(void) {
 }
 
 static int send_setpoint(void) {
-    return iw_bus_send(&store, &setpoint);
+    return iw_bus_send(&store, &setpoint, 1);
 }
 
 static const iw_bus_link_t *link_now(void) {

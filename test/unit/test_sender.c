@@ -106,6 +106,60 @@ static void test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused
     TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
 }
 
+static void test_sender_pair_leaves_in_one_call(void) {
+    send_whole(0);
+    TEST_ASSERT_EQUAL_UINT32(1, bus.calls);
+    TEST_ASSERT_EQUAL_UINT32(2, bus.call_frames);
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(1, 1));
+    TEST_ASSERT_EQUAL_UINT32(2, bus.calls);
+    TEST_ASSERT_EQUAL_UINT32(2, bus.call_frames);
+}
+
+/// The port accepts the left frame and refuses the right one: the left one is in the account, and nothing is tried again.
+static void test_sender_one_accepted_of_two_is_a_refused_pair(void) {
+    static const int16_t speeds_mm_s[] = {0, 1};
+    for (size_t i = 0; i < 2; i++) {
+        setUp();
+        bus.send_result[IW_RIGHT] = (i == 0U) ? 0 : -1;
+        TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(speeds_mm_s[i], speeds_mm_s[i]));
+        TEST_ASSERT_EQUAL_UINT32(1, bus.calls);
+        TEST_ASSERT_EQUAL_UINT32(1, bus.sent);
+        TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
+        TEST_ASSERT_EQUAL_UINT32(0, sender.sent.pairs);
+        TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_LEFT]);
+        TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_RIGHT]);
+        TEST_ASSERT_TRUE(sender.confirmation.waiting_us[IW_RIGHT] == now_us);
+        TEST_ASSERT_FALSE(iw_sender_ready(&sender, false));
+        TEST_ASSERT_TRUE(iw_sender_ready(&sender, true));
+    }
+}
+
+static void test_sender_pair_that_the_port_refuses_whole_is_in_no_account(void) {
+    bus.send_result[IW_LEFT] = -1;
+    bus.send_result[IW_RIGHT] = -1;
+    TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
+    TEST_ASSERT_EQUAL_UINT32(2, bus.calls); // The right zero alone, too.
+    TEST_ASSERT_EQUAL_UINT32(2, sender.sent.later);
+    TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_RIGHT]);
+}
+
+static void test_sender_port_that_claims_more_than_two_frames_has_accepted_two(void) {
+    bus.boast = 7;
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(1, 1));
+    TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_RIGHT]);
+}
+
+/// Not ready, and asked all the same: behind two frames that wait for their echo no third one leaves.
+static void test_sender_pair_that_neither_wheel_may_have_reaches_no_port(void) {
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_FALSE(iw_sender_ready(&sender, true));
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    TEST_ASSERT_EQUAL_UINT32(2, bus.calls);
+}
+
 static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, (int16_t)(config.max_speed_mm_s + 1)));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
@@ -134,6 +188,11 @@ int main(void) {
     RUN_TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair);
     RUN_TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left);
     RUN_TEST(test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one);
+    RUN_TEST(test_sender_pair_leaves_in_one_call);
+    RUN_TEST(test_sender_one_accepted_of_two_is_a_refused_pair);
+    RUN_TEST(test_sender_pair_that_the_port_refuses_whole_is_in_no_account);
+    RUN_TEST(test_sender_port_that_claims_more_than_two_frames_has_accepted_two);
+    RUN_TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port);
     RUN_TEST(test_sender_remembers_why_the_gate_stopped_a_pair);
     RUN_TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did);
     return UNITY_END();

@@ -55,6 +55,7 @@ static void test_setpoint_collapse_while_braking_leaves_no_tail(void) {
 
 static void test_setpoint_zero_with_a_limit_carries_the_maximum_current(void) {
     rig.config.max_current_mA = 1500;
+    setpoint_rig_begin(&rig);
     setpoint_rig_follow(&rig);
     iw_pair_t pair = iw_setpoint_applied(&rig.setpoint);
     for (int side = 0; side < IW_SIDES; side++) {
@@ -69,13 +70,48 @@ static void test_setpoint_zero_with_a_limit_carries_the_maximum_current(void) {
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-static void test_setpoint_limit_current_is_not_ramped(void) {
+/// A wheel that loses its torque at once is a wheel that lets go.
+static void test_setpoint_limit_falls_by_80_mA_in_20_ms(void) {
     setpoint_rig_follow(&rig);
     const iw_pair_t target = {{{1000, 700}, {1000, 300}}};
     iw_setpoint_command(&rig.setpoint, rig.now_us, &target);
-    const iw_pair_t pair = setpoint_rig_take_next(&rig);
-    TEST_ASSERT_EQUAL_INT(700, pair.wheel[IW_LEFT].current_mA);
-    TEST_ASSERT_EQUAL_INT(300, pair.wheel[IW_RIGHT].current_mA);
+    iw_pair_t pair = setpoint_rig_take_after(&rig, MS(5));
+    int32_t expected = 2000 - 20;
+    for (uint32_t i = 0; i < 30U; i++) {
+        TEST_ASSERT_EQUAL_INT((expected > 700) ? expected : 700, pair.wheel[IW_LEFT].current_mA);
+        TEST_ASSERT_EQUAL_INT((expected > 300) ? expected : 300, pair.wheel[IW_RIGHT].current_mA);
+        pair = setpoint_rig_take_next(&rig);
+        expected -= 80;
+    }
+}
+
+static void test_setpoint_limit_rises_with_the_next_pair(void) {
+    setpoint_rig_cruise(&rig, 1000, 1000, 300);
+    TEST_ASSERT_EQUAL_INT(300, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
+    setpoint_rig_command(&rig, 1000, 1000, 900);
+    TEST_ASSERT_EQUAL_INT(900, setpoint_rig_take_after(&rig, MS(5)).wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_EQUAL_INT(1000, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].speed_mm_s);
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(5));
+    TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_RIGHT].current_mA);
+}
+
+static void test_setpoint_limit_of_a_long_gap_falls_to_its_target(void) {
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 1000, 1000, 300);
+    TEST_ASSERT_EQUAL_INT(300, setpoint_rig_take_after(&rig, MS(1000000)).wheel[IW_LEFT].current_mA);
+}
+
+/// A command that comes before the zero of a collapse does not take its torque.
+static void test_setpoint_zero_of_a_collapse_carries_the_maximum_current(void) {
+    setpoint_rig_cruise(&rig, 1000, 1000, 300);
+    iw_setpoint_collapse(&rig.setpoint, rig.now_us);
+    setpoint_rig_command(&rig, 500, 500, 300);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(5));
+    TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_RIGHT].current_mA);
 }
 
 static void test_setpoint_zero_with_a_current_setpoint_carries_no_current(void) {
@@ -183,7 +219,10 @@ int main(void) {
     RUN_TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero);
     RUN_TEST(test_setpoint_collapse_while_braking_leaves_no_tail);
     RUN_TEST(test_setpoint_zero_with_a_limit_carries_the_maximum_current);
-    RUN_TEST(test_setpoint_limit_current_is_not_ramped);
+    RUN_TEST(test_setpoint_limit_falls_by_80_mA_in_20_ms);
+    RUN_TEST(test_setpoint_limit_rises_with_the_next_pair);
+    RUN_TEST(test_setpoint_limit_of_a_long_gap_falls_to_its_target);
+    RUN_TEST(test_setpoint_zero_of_a_collapse_carries_the_maximum_current);
     RUN_TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current);
     RUN_TEST(test_setpoint_current_setpoint_scales_with_the_speed);
     RUN_TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current);

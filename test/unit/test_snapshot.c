@@ -249,10 +249,10 @@ static void test_snapshot_armed_shows_command_ramp_and_lease(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, armed.state);
     TEST_ASSERT_FALSE(armed.arming);
     TEST_ASSERT_EQUAL_UINT64(armed.armed_us + MS(1000), armed.lease_until_us);
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 400, -200, MS(200)));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 300, -150, MS(200)));
     const iw_snapshot_t seen = look();
-    TEST_ASSERT_EQUAL_INT16(400, seen.target.wheel[IW_LEFT].speed_mm_s);
-    TEST_ASSERT_EQUAL_INT16(-200, seen.target.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT16(300, seen.target.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT16(-150, seen.target.wheel[IW_RIGHT].speed_mm_s);
     TEST_ASSERT_INT16_WITHIN(50, 140, seen.applied.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_INT16_WITHIN(25, -70, seen.applied.wheel[IW_RIGHT].speed_mm_s);
     TEST_ASSERT_FALSE(seen.output_zero);

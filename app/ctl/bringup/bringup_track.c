@@ -11,8 +11,8 @@
 #define TURNS_MAX 20
 #define TICKS_MIN 60
 /// The bounds of the configuration's key.
-#define TRACK_MIN 50
-#define TRACK_MAX 5000
+#define TRACK_MIN 200
+#define TRACK_MAX 1500
 /// The machine's middle may have wandered so far, as a share of what the wheels rolled.
 #define WANDER_PERCENT 20.0
 /// Further off what was configured, somebody may have counted wrongly.
@@ -53,7 +53,7 @@ static bool is_turn(const bringup_t *self, const hand_t *hand) {
 
 static void keep_track(bringup_t *self, const hand_t *hand, int turns, double track_mm) {
     const bool rolled_distance = self->mm_per_tick > 0.0;
-    self->config.track_mm = (uint16_t)lround(track_mm);
+    self->config.core.track_mm = (uint16_t)lround(track_mm);
     bringup_note(self, "wheels", "track_mm", rolled_distance ? "track" : NULL,
                  "%d full turns by hand: left %lld, right %lld ticks%s", turns, hand->ticks[IW_LEFT],
                  hand->ticks[IW_RIGHT], rolled_distance ? "" : "; the radius is assumed");
@@ -64,7 +64,7 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     const double left = rolled(self, hand, IW_LEFT);
     const double right = rolled(self, hand, IW_RIGHT);
     const double track_mm = fabs(right - left) / (2.0 * M_PI * turns);
-    const double before_mm = self->config.track_mm;
+    const double before_mm = self->config.core.track_mm;
     const bool near = fabs(track_mm - before_mm) <= before_mm * OFF_PERCENT / 100.0;
     if (!is_turn(self, hand)) {
         return false;

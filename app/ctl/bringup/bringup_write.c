@@ -137,7 +137,7 @@ static const char *value_of(const bringup_t *self, const bringup_note_t *note, c
     } else if (strcmp(note->key, "radius_mm") == 0) {
         (void)snprintf(out_value, 32, "%u", core->radius_mm);
     } else if (strcmp(note->key, "track_mm") == 0) {
-        (void)snprintf(out_value, 32, "%u", self->config.track_mm);
+        (void)snprintf(out_value, 32, "%u", self->config.core.track_mm);
     } else {
         out_value[0] = '\0';
     }

@@ -28,8 +28,7 @@ static int take_answer(replay_t *self, blackbox_kind_t kind, uint32_t number, in
     return otherwise;
 }
 
-static int port_send(void *context, const iw_can_frame_t *frame) {
-    replay_t *self = (replay_t *)context;
+static int send_one(replay_t *self, const iw_can_frame_t *frame) {
     const int answer = take_answer(self, BLACKBOX_NOT_SENT, frame->id, 1);
     const int side = side_of(frame);
     if (answer <= 0 || side < 0) {
@@ -42,6 +41,18 @@ static int port_send(void *context, const iw_can_frame_t *frame) {
     }
     self->sent[side][self->sent_count[side]++] = *frame;
     return answer;
+}
+
+/// As the port that was recorded: from the first frame on, up to the one that it refused.
+static int port_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    replay_t *self = (replay_t *)context;
+    for (uint32_t i = 0; i < count; i++) {
+        const int answer = send_one(self, &frames[i]);
+        if (answer <= 0) {
+            return (i > 0U) ? (int)i : answer;
+        }
+    }
+    return (int)count;
 }
 
 /// An echo as it was recorded, against the setpoint that we sent.

@@ -92,7 +92,9 @@ static const settings_key_t keys[] = {
      CORE(radius_mm, IW_CONFIG_RADIUS), RULE("rule R15, a wrong radius makes every speed and distance wrong")},
     {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
      .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
-    {"wheels", "track_mm", " mm", "Distance between the wheels; only for twist commands.", NUMBER(track_mm, 50, 5000)},
+    {"wheels", "track_mm", " mm",
+     "Distance between the wheels: turns a twist into speeds, and yaw into their difference.",
+     CORE(track_mm, IW_CONFIG_TRACK)},
     {"wheels", "setpoint_dlc", "", "Length of a setpoint frame, zero padded; the document's table has 5 bytes.",
      CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
 
@@ -118,8 +120,19 @@ static const settings_key_t keys[] = {
      CORE(decel_mm_s2, IW_CONFIG_DECEL)},
     {"drive", "max_speed_mm_s", " mm/s", "Faster commands are scaled down, both wheels by one factor.",
      CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
+    {"drive", "max_yaw_mrad_s", " mrad/s", "A command that turns faster is scaled down, both wheels by one factor.",
+     CORE(max_yaw_mrad_s, IW_CONFIG_MAX_YAW)},
+    {"drive", "yaw_accel_mrad_s2", " mrad/s2", "So fast may turning grow under a command; no stop is slowed by it.",
+     CORE(yaw_accel_mrad_s2, IW_CONFIG_YAW_ACCEL)},
     {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT),
      RULE("rule R15, with less a loaded wheel may have no torque to brake with")},
+    {"drive", "min_current_mA", " mA",
+     "With current_role limit no limit of a client is lower: it is raised to this, as a wheel without torque cannot "
+     "brake.",
+     CORE(min_current_mA, IW_CONFIG_MIN_CURRENT)},
+    {"drive", "asymmetric_current", "",
+     "no: both wheels get the larger limit of a client, since unequal torque turns the machine.",
+     WORD(core.asymmetric_current, no_yes)},
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
 
     {"limits", "wheel_silent_ms", " ms",
@@ -293,7 +306,6 @@ IW_STATIC_ASSERT(sizeof keys / sizeof keys[0] <= SETTINGS_KEYS_MAX, keys_fit);
 void gateway_config_default(gateway_config_t *out_config) {
     static const gateway_config_t standard = {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
-        .track_mm = 540U,
         .estop = {"ESTOP", true, 5U, "any", "any"},
         .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U, 1000U},
         .record = {30U, "/var/lib/iwheel", 200U},

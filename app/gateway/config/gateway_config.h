@@ -36,7 +36,6 @@ typedef struct gateway_config {
         uint16_t sample_point_permille;       ///< Expected, 500..900.
         gateway_mismatch_t on_mismatch;       ///< Whether a contradicted timing refuses arm or only warns.
     } bus;
-    uint16_t track_mm; ///< Distance between the wheels, 50..5000. Only for twist commands.
     struct {
         char line[GATEWAY_ADDRESS_SIZE]; ///< gpiod line name, `gpiochipN:OFFSET`, `unix:PATH` (SIMULATED) or `none`.
         bool active_high;                ///< Pressed, or a cut wire, reads high.

@@ -17,7 +17,7 @@ static uint64_t real(const gateway_config_t *config, uint64_t by_setpoints) {
 
 /// One wheel goes so much further than the other: really, not by its setpoints.
 static unsigned tenths(const gateway_config_t *config, uint64_t apart_mm) {
-    return (unsigned)(apart_mm * MILLI_TENTHS_PER_RADIAN / 1000U / config->track_mm);
+    return (unsigned)(apart_mm * MILLI_TENTHS_PER_RADIAN / 1000U / config->core.track_mm);
 }
 
 /// The way of a wheel that is sent zero: at the assumed deceleration while it is far from zero, then by its lag.

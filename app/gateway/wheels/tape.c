@@ -43,11 +43,13 @@ static void put_value(gw_tape_t *self, blackbox_kind_t kind, uint32_t number, in
     gw_tape_put(self, &entry);
 }
 
-static int tape_send(void *context, const iw_can_frame_t *frame) {
+/// Of the frames that the port refused the first is noted: the core passes one behind it in a call of its own, or not.
+static int tape_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = iw_bus_send(&self->port->bus, frame);
-    if (answer <= 0) {
-        put_value(self, BLACKBOX_NOT_SENT, frame->id, answer);
+    const int answer = iw_bus_send(&self->port->bus, frames, count);
+    const uint32_t accepted = (answer > 0) ? (uint32_t)answer : 0U;
+    if (accepted < count) {
+        put_value(self, BLACKBOX_NOT_SENT, frames[accepted].id, (answer < 0) ? answer : 0);
     }
     return answer;
 }

@@ -146,7 +146,7 @@ gw_found_t gw_assumption_compare(const gw_configured_t *configured, iw_ledger_it
     case IW_LEDGER_WHEEL_RADIUS:
         return compare_number(found, config->radius_mm, 20U, 500U, GW_RADIUS_PERCENT);
     case IW_LEDGER_TRACK:
-        return compare_number(found, configured->track_mm, 50U, 5000U, GW_TRACK_PERCENT);
+        return compare_number(found, configured->track_mm, 200U, 1500U, GW_TRACK_PERCENT);
     case IW_LEDGER_GEAR_RATIO:
         return compare_gear(found, config);
     case IW_LEDGER_CURRENT_ROLE:

@@ -20,6 +20,7 @@ typedef struct {
     bool setpoint_type_set;         ///< The wheels do not move until this is true.
     bool rpm_of_rotor;              ///< The rpm in telemetry are the rotor's, not the wheel's.
     bool listen_only;               ///< Nothing is ever sent; arm is refused.
+    bool asymmetric_current;        ///< IW_ROLE_LIMIT: a client may limit one wheel lower than the other.
     iw_current_role_t current_role; ///< The wheels do not move while it is IW_ROLE_UNSET.
     bool invert[IW_SIDES];          ///< This wheel is mounted mirrored: negate its speed, both ways.
     iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
@@ -29,6 +30,7 @@ typedef struct {
     uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
     uint16_t max_speed_mm_s;  ///< 10..5000. Faster commands are scaled, both wheels by one factor.
     uint16_t max_current_mA;  ///< 300..2000: with less a loaded wheel may have no torque to brake with.
+    uint16_t min_current_mA;  ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..2000. Ours, no physics.
     uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
     uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
     uint16_t echo_ms;         ///< A setpoint not echoed for this long is stalled, 20..200.
@@ -40,10 +42,13 @@ typedef struct {
     uint16_t pair_mm;         ///< So far may the pair leave its path, right minus left, 20..150 ...
     uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000. Then it stops.
     uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
-    uint16_t radius_mm;       ///< Of the wheel, 60..400; the document says "approximately 192".
-    uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
-    uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
-    uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
+    uint16_t max_yaw_mrad_s;  ///< So fast may a machine turn, 50..10000. Faster commands are scaled down by one factor.
+    uint16_t yaw_accel_mrad_s2; ///< So fast may its turning grow under a drive command, 100..10000. No stop is slowed.
+    uint16_t track_mm;     ///< Distance of the wheels, 200..1500. It turns yaw into speeds and back, as the radius.
+    uint16_t radius_mm;    ///< Of the wheel, 60..400; the document says "approximately 192".
+    uint16_t gear_turns;   ///< Rotor turns in `gear_per` wheel turns, 1..1000.
+    uint16_t gear_per;     ///< 1..1000. Together the ratio must lie within 1..100.
+    uint16_t setpoint_dlc; ///< 5..8, zero padded. The document's table has 5 bytes.
 } iw_config_t;
 
 // Fixed by the safety rules.
@@ -65,6 +70,7 @@ typedef enum {
     IW_CONFIG_DECEL,
     IW_CONFIG_MAX_SPEED,
     IW_CONFIG_MAX_CURRENT,
+    IW_CONFIG_MIN_CURRENT,
     IW_CONFIG_ZERO_HOLD,
     IW_CONFIG_WHEEL_SILENT,
     IW_CONFIG_ECHO,
@@ -76,6 +82,9 @@ typedef enum {
     IW_CONFIG_PAIR,
     IW_CONFIG_PAIR_LEAK,
     IW_CONFIG_WHEEL_LAG,
+    IW_CONFIG_MAX_YAW,
+    IW_CONFIG_YAW_ACCEL,
+    IW_CONFIG_TRACK,
     IW_CONFIG_RADIUS,
     IW_CONFIG_GEAR_TURNS,
     IW_CONFIG_GEAR_PER,

@@ -11,7 +11,7 @@
 ///
 /// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
 ///
-/// R1 to R14 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R17 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
@@ -56,7 +56,7 @@ typedef struct {
 /// What a drive request came to.
 typedef struct {
     iw_pair_t pair; ///< The target after limits; ramps come on top.
-    bool limited;   ///< It differs from the request: both wheels scaled by one factor.
+    bool limited;   ///< It differs from the request: both wheels scaled by one factor, or a current limit raised.
 } iw_applied_t;
 
 /// The whole of it. Members are the core's own: what may be known of them, snapshot.h tells. What is short stands

@@ -21,8 +21,20 @@ typedef enum {
 
 /// Where the core gets frames from and gives them to.
 typedef struct {
-    /// Hands one frame to the controller or its queue. A success proves nothing: only the echo does.
-    int (*send)(void *context, const iw_can_frame_t *frame);
+    /// Accepts `count` frames (1..IW_SIDES) of different ids, as a whole: the setpoints of both wheels arrive in one
+    /// call, the left one first, and one must not leave long before the other. A port with one call of its system for
+    /// several frames uses it; a driver fills every mailbox before it requests the first.
+    ///
+    ///     > 0  So many frames were accepted, from the first on; the rest was refused. That proves nothing: only the
+    ///          echo does.
+    ///     0    None was accepted; there is no room for the first one now.
+    ///     < 0  None was accepted; the bus is lost.
+    ///
+    /// The port never retries what it refused, and stores none of it. One of two counts as a refused pair: the core
+    /// collapses the ramp, so that the next pair is zero, and the echo that is missing ends in IW_CAUSE_SEND_STALLED.
+    /// Of a zero pair the core passes what stands behind a refused frame again, alone: a zero never waits for the other
+    /// wheel.
+    int (*send)(void *context, const iw_can_frame_t *frames, uint32_t count);
 
     /// Takes the oldest frame received, or the echo of one of ours with its bytes, in the order of the bus. Frames that
     /// are not for us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are

@@ -164,9 +164,9 @@ typedef enum {
     IW_LEDGER_FEEDBACK_SIGN_RIGHT,
     IW_LEDGER_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
     IW_LEDGER_MOUNT_SIGN_RIGHT,
-    IW_LEDGER_WHEEL_RADIUS, ///< "Approximately 192 mm".
-    IW_LEDGER_TRACK,        ///< Distance between the wheels. Not used in the core: it turns a twist into wheel speeds.
-    IW_LEDGER_GEAR_RATIO,   ///< Rotor turns per wheel turn, and which of them the rpm count.
+    IW_LEDGER_WHEEL_RADIUS,    ///< "Approximately 192 mm".
+    IW_LEDGER_TRACK,           ///< Distance between the wheels. It turns a twist into wheel speeds, and bounds yaw.
+    IW_LEDGER_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of them the rpm count.
     IW_LEDGER_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
     IW_LEDGER_DLC,             ///< Frames are as long as the table: the document does not state it.
     IW_LEDGER_ITEMS,

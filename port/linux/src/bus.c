@@ -145,12 +145,12 @@ void iw_bus_fill(iw_bus_t *bus) {
 
 /// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h). Between a bus-off and the
 /// call that tells of it nothing is sent: the core takes what was sent before that call for gone.
-int iw_bus_send(iw_backend_store_t *store, const iw_can_frame_t *frame) {
+int iw_bus_send(iw_backend_store_t *store, const iw_can_frame_t *frames, uint32_t count) {
     iw_bus_t *bus = bus_of(store);
     if (bus->up && bus->unheeded < IW_BUS_PASSIVE) {
         return 0;
     }
-    const int result = bus->up ? iw_socketcan_socket_send(&bus->ours, frame) : -1;
+    const int result = bus->up ? iw_socketcan_socket_send(&bus->ours, frames, count) : -1;
     if (result < 0 && bus->up) {
         iw_bus_lose(bus, ENETDOWN);
     }

@@ -153,12 +153,24 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
 }
 
 /// ENOBUFS: the interface's queue is full. Nothing is retried here: a newer setpoint replaces this one (R6).
-int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
-    struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
-    memcpy(raw.data, frame->data, sizeof raw.data);
-    const ssize_t sent = send(self->fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (sent == (ssize_t)sizeof raw) {
-        return 1;
+int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count) {
+    struct can_frame raw[IW_SIDES];
+    struct iovec part[IW_SIDES];
+    struct mmsghdr message[IW_SIDES];
+    const uint32_t asked = (count < IW_SIDES) ? count : IW_SIDES;
+    for (uint32_t i = 0; i < asked; i++) {
+        raw[i] = (struct can_frame){.can_id = frames[i].id & ~IW_CAN_FD, .len = frames[i].dlc};
+        memcpy(raw[i].data, frames[i].data, sizeof raw[i].data);
+        part[i] = (struct iovec){.iov_base = &raw[i], .iov_len = sizeof raw[i]};
+        message[i] = (struct mmsghdr){.msg_hdr = {.msg_iov = &part[i], .msg_iovlen = 1}};
     }
-    return (sent < 0 && (errno == EAGAIN || errno == ENOBUFS || errno == EINTR)) ? 0 : -1;
+    const int sent = sendmmsg(self->fd, message, asked, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent < 0) {
+        return (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) ? 0 : -1;
+    }
+    int whole = 0;
+    while (whole < sent && message[whole].msg_len == sizeof raw[0]) {
+        whole++;
+    }
+    return (whole > 0) ? whole : -1; // Less than a frame is no frame.
 }

@@ -95,7 +95,9 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self);
 /// Takes the next batch; only when empty. 0 (there may be none), or the errno that tells why the bus is lost.
 int iw_socketcan_socket_fill(iw_socketcan_socket_t *self);
 
-/// > 0: handed over. 0: no room now. < 0: the bus is lost.
-int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame);
+/// As `send` of iw_hal_t: all frames in one call of the kernel. That call does not end between two frames for a signal,
+/// not even SIGKILL; but the kernel may let another process run there, its queue may have room for one frame only, and
+/// it drops the error of the second frame: the next call reports it.
+int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count);
 
 #endif

@@ -16,13 +16,15 @@ static iw_gateway_t gateway;
 static iw_time_us_t now_us = 1000000;
 static int16_t rpm;
 
-static int bus_send(void *context, const iw_can_frame_t *frame) {
+static int bus_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     (void)context;
-    bus.frame[(bus.first + bus.count) % QUEUE] = *frame;
-    bus.frame[(bus.first + bus.count) % QUEUE].kind = IW_CAN_ECHO;
-    bus.count++;
-    bus.sent++;
-    return 1;
+    for (uint32_t i = 0; i < count; i++) {
+        bus.frame[(bus.first + bus.count) % QUEUE] = frames[i];
+        bus.frame[(bus.first + bus.count) % QUEUE].kind = IW_CAN_ECHO;
+        bus.count++;
+        bus.sent++;
+    }
+    return (int)count;
 }
 
 static int bus_receive(void *context, iw_can_frame_t *out_frame) {

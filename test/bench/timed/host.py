@@ -205,6 +205,20 @@ def rows(taken):
     return [*call_rows(taken), *period_rows(taken), *flood_rows(taken), *loaded_flood_rows(taken), *latency_rows(taken)]
 
 
+def pair_table(build, before, rounds, pair_s):
+    """Lines about the gap between both setpoints of a pair, of the program `before` and of this build in turns."""
+    wish = {"rounds": rounds, "pair_s": pair_s, "before": str(Path(before).resolve()), "stall_us": 1_000_000}
+    taken, failures = measure(build, wish, ("pair",), ("before", "gateway"), show=lambda result: print(".", end="", flush=True))
+    lines = ["", *failures, "| | pairs | p50 | p99 | p99.9 | largest | later than 1 ms | left alone |", "|---|---:|---:|---:|---:|---:|---:|---:|"]
+    for name, turns in taken.get("pair", {}).items():
+        gaps = [gap for turn in turns for gap in turn["gaps_ns"]]
+        whole_us = sorted(gap / 1000 for gap in gaps if gap >= 0)
+        at = [us(whole_us[min(len(whole_us) - 1, int(len(whole_us) * part))]) for part in (0.5, 0.99, 0.999, 1.0)]
+        late = sum(gap > 1000 for gap in whole_us)
+        lines.append(f"| {name} | {len(gaps)} | {' | '.join(at)} | {late} | {len(gaps) - len(whole_us)} |")
+    return lines
+
+
 def smoke(build):
     """What is wrong with the short turns of floor and gateway; empty: nothing."""
     wanted = [name for name in ALL if name != "calls" or have("strace")]

@@ -105,11 +105,10 @@ class Surroundings:
             self.wheels.end()
             self.wheels = None
 
-    def start_gateway(self):
-        self.gateway = self.built(
-            "gateway", "iwheel-gateway", "-c", f"{self.folder}/gateway.conf", "--can", self.interface, "--socket", self.socket,
-            "--log-level", "error", served=True
-        )
+    def start_gateway(self, program=None, served=True):
+        program = program or os.path.join(self.plan["build"], "app", "gateway", "iwheel-gateway")
+        self.gateway = Started([program, "-c", f"{self.folder}/gateway.conf", "--can", self.interface, "--socket", self.socket,
+                                "--log-level", "error"], self.folder, served=served)
         client = self.client()
         client.request("hello")
         client.close()

@@ -119,7 +119,7 @@ int timed_receive(int can, canid_t id, struct can_frame *out_frame, int64_t *out
         if (!receive_one(can, out_frame, out_at_ns, left_ms)) {
             return 0;
         }
-        if (out_frame->can_id == id) {
+        if (id == 0U || out_frame->can_id == id) {
             return 1;
         }
         left_ms = (int)((end_ns - timed_now_ns(CLOCK_MONOTONIC)) / (TIMED_NS_PER_S / 1000));

@@ -26,7 +26,7 @@ int timed_can(const char *interface, canid_t id);
 /// Both wheels' setpoints, one after the other, as a gateway sends them.
 void timed_send_pair(int can, int16_t left_mm_s, int16_t right_mm_s);
 
-/// The next frame of that id and the kernel's stamp of it, CLOCK_REALTIME. False: none came within that time.
+/// The next frame of that id (0: of any) and the kernel's stamp of it, CLOCK_REALTIME. False: none came within that time.
 int timed_receive(int can, canid_t id, struct can_frame *out_frame, int64_t *out_at_ns, int within_ms);
 
 /// Asks for stamps.

@@ -14,12 +14,15 @@
 /// change passes through zero. Away from zero a late call is granted two periods at the most (no burst); towards zero
 /// the whole time.
 ///
+/// Under a command other than 0/0 the difference of both wheels grows no faster, and no further, than yaw.h allows.
+///
 /// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least
 /// IW_SETPOINT_SPACING_US after the last one; ZERO is due at once.
 #ifndef IW_SETPOINT_H
 #define IW_SETPOINT_H
 
 #include "iwheel/config.h"
+#include "iwheel/private/yaw.h"
 
 /// A changed command leaves at once, but not sooner than this after the last pair.
 #define IW_SETPOINT_SPACING_US 5000U
@@ -34,6 +37,8 @@ typedef struct {
     iw_pair_t target;     ///< The client's command, cleared whenever the demand is not FOLLOW.
     int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
     int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
+    int16_t limit_mA[IW_SIDES];   ///< IW_ROLE_LIMIT: as last taken. See current.h.
+    iw_yaw_t yaw;                 ///< How fast the pair may turn the machine.
 } iw_setpoint_t;
 
 /// `config` must be checked and outlive it. Begins in silence.

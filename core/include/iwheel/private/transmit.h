@@ -2,9 +2,9 @@
 /// @file
 /// Hands a pair to the bus: whole, within the envelope, each frame tracked until its TX confirmation.
 ///
-///     pair -> invert -> encode -> envelope (both frames) -> port (left, then right) -> TX confirmation
+///     pair -> invert -> encode -> envelope (both frames) -> port (both in one call) -> TX confirmation
 ///
-/// Both frames are judged before one of them leaves. If the port takes the left and not the right, the caller is told
+/// Both frames are judged before one of them leaves. If the port accepts the left and not the right, the caller is told
 /// and the next pair must be zero.
 #ifndef IW_TRANSMIT_H
 #define IW_TRANSMIT_H
@@ -22,8 +22,9 @@
 // setpoint of one of the two ids, with the configured type and length, current and speed within the configured
 // maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
 // between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
-// whatever its slew. A negative current is refused where the current is a limit; while setpoint type or current role
-// are unset nothing passes.
+// whatever its slew. Both frames of a pair are then judged together: they turn the machine no faster than configured, and
+// its turning grows no faster; a pair that turns it no more than the last one passes, so no stop is held up. A current
+// limit below `min_current_mA` is refused; while setpoint type or current role are unset nothing passes.
 //
 // Written independently of the scheduler, so that an error in one is caught by the other.
 
@@ -38,6 +39,7 @@ typedef enum {
     IW_ENVELOPE_CURRENT,
     IW_ENVELOPE_SPEED,
     IW_ENVELOPE_SLEW,
+    IW_ENVELOPE_YAW, ///< Of the pair: it would turn the machine too fast, or faster too soon.
 } iw_envelope_verdict_t;
 
 /// What passed last, against which the next one is judged. It begins all zero but for `config`.
@@ -45,11 +47,18 @@ typedef struct {
     const iw_config_t *config;      ///< The owner's: checked.
     iw_time_us_t last_us[IW_SIDES]; ///< When the last frame passed.
     int32_t last_mm_s[IW_SIDES];    ///< Its speed, as on the bus; 0 at first.
+    iw_time_us_t turn_us;           ///< When the last pair passed.
+    uint32_t turn_mm_s;             ///< The difference of its speeds in the machine's frame, without sign.
     uint32_t stopped;               ///< Frames that did not pass.
 } iw_envelope_t;
 
 /// Judges one frame; what does not pass is counted and must not be sent.
 iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_t *frame, iw_time_us_t now_us);
+
+/// Judges a pair of frames that have passed one by one: left, then right. What does not pass is counted and must not be
+/// sent.
+iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
+                                             iw_time_us_t now_us);
 
 // ---- TX confirmation ----
 //

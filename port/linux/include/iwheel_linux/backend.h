@@ -35,7 +35,7 @@ void iw_bus_waited(iw_backend_store_t *bus, bool told);
 /// When `tend` has something to do; IW_NEVER if it has not.
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *bus);
 /// As `send` of iw_hal_t.
-int iw_bus_send(iw_backend_store_t *bus, const iw_can_frame_t *frame);
+int iw_bus_send(iw_backend_store_t *bus, const iw_can_frame_t *frames, uint32_t count);
 /// As `receive` of iw_hal_t.
 int iw_bus_receive(iw_backend_store_t *bus, iw_can_frame_t *out_frame);
 /// As `bus_state` of iw_hal_t.

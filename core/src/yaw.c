@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/private/yaw.h"
+
+#include "iwheel/private/diverge.h"
+#include "magnitude.h"
+
+/// Each wheel's part is cut off to whole um/s, so both together may be beyond by less than this.
+#define ROUNDING_UM_S 2
+
+/// A yaw in mrad as the difference of setpoints in mm; the same for their rates.
+static IW_APART uint32_t difference_of(uint32_t mrad, const iw_yaw_machine_t *machine) {
+    return mrad * machine->track_mm * IW_SETPOINT_RADIUS_MM / (machine->radius_mm * 1000U);
+}
+
+void iw_yaw_init(iw_yaw_t *self, const iw_yaw_machine_t *machine) {
+    self->most_mm_s = (int32_t)difference_of(machine->max_yaw_mrad_s, machine);
+    self->growth_mm_s2 = difference_of(machine->yaw_accel_mrad_s2, machine);
+}
+
+bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {
+    const int32_t turn_mm_s = iw_magnitude(speed_mm_s[IW_RIGHT] - speed_mm_s[IW_LEFT]);
+    if (turn_mm_s <= self->most_mm_s) {
+        return false;
+    }
+    speed_mm_s[IW_LEFT] = speed_mm_s[IW_LEFT] * self->most_mm_s / turn_mm_s;
+    speed_mm_s[IW_RIGHT] = speed_mm_s[IW_RIGHT] * self->most_mm_s / turn_mm_s;
+    return true;
+}
+
+/// How large the difference may be after the step. It never has to fall.
+static int32_t bound_um_s(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um_s) {
+    const int32_t most_um_s = self->most_mm_s * 1000;
+    const int32_t grown_um_s = from_um_s + (int32_t)growth_um_s;
+    const int32_t bound = (grown_um_s < most_um_s) ? grown_um_s : most_um_s;
+    return (bound > from_um_s) ? bound : from_um_s;
+}
+
+static uint32_t room_um_s(int32_t bound, int32_t before) {
+    const int32_t room = bound - before - ROUNDING_UM_S;
+    return (room > 0) ? (uint32_t)room : 0U;
+}
+
+iw_yaw_cut_t iw_yaw_cut(const iw_yaw_t *self, const iw_yaw_step_t *step, uint32_t growth_um_s) {
+    const int32_t bound = bound_um_s(self, iw_magnitude(step->from_um_s), growth_um_s);
+    int32_t from = step->from_um_s;
+    int32_t braked = from + step->braking_um_s;
+    int32_t to = braked + step->faster_um_s;
+    iw_yaw_cut_t cut = {IW_YAW_CUT_NONE, 0, 0};
+    if (iw_magnitude(to) <= bound) {
+        return cut;
+    }
+    if (to < 0) { // As if it turned to the left.
+        from = -from;
+        braked = -braked;
+        to = -to;
+    }
+    // Wheels that become faster wait first: one that brakes is on its way to what was commanded, and its end is within
+    // the limit, so it always gets there.
+    if (braked <= bound) {
+        cut.kind = IW_YAW_CUT_FASTER;
+        cut.part_um_s = room_um_s(bound, braked);
+        cut.whole_um_s = (uint32_t)(to - braked);
+    } else {
+        cut.kind = IW_YAW_CUT_BRAKING;
+        cut.part_um_s = room_um_s(bound, from);
+        cut.whole_um_s = (uint32_t)(braked - from);
+    }
+    return cut;
+}

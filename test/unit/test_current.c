@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// Current limits of a client: what becomes of each pair of them, and how fast they fall.
+#include "iwheel/private/current.h"
+#include "unity.h"
+
+static iw_config_t config;
+
+void setUp(void) {
+    iw_config_default(&config);
+    config.current_role = IW_ROLE_LIMIT;
+}
+
+void tearDown(void) {}
+
+static int32_t larger(int32_t a, int32_t b) {
+    return (a > b) ? a : b;
+}
+
+/// Each pair of limits in steps of 50 mA against the words of the rule.
+static void sweep(int32_t lowest, bool zero) {
+    for (int32_t left = 0; left <= config.max_current_mA; left += 50) {
+        for (int32_t right = 0; right <= config.max_current_mA; right += 50) {
+            int32_t limit[IW_SIDES] = {left, right};
+            const bool apart = config.asymmetric_current;
+            const int32_t wanted[IW_SIDES] = {larger(apart ? left : larger(left, right), lowest),
+                                              larger(apart ? right : larger(left, right), lowest)};
+            const bool limited = iw_current_limit(&config, limit, zero);
+            TEST_ASSERT_EQUAL_INT32_ARRAY(wanted, limit, IW_SIDES);
+            TEST_ASSERT_EQUAL_INT(wanted[IW_LEFT] != left || wanted[IW_RIGHT] != right, limited);
+        }
+    }
+}
+
+static void test_current_sides_get_the_larger_limit_and_the_floor(void) {
+    sweep(300, false);
+    config.min_current_mA = 1234;
+    sweep(1234, false);
+}
+
+static void test_current_sides_may_differ_only_if_configured(void) {
+    config.asymmetric_current = true;
+    sweep(300, false);
+}
+
+static void test_current_of_two_zero_speeds_is_the_maximum(void) {
+    config.max_current_mA = 1500;
+    sweep(1500, true);
+    config.asymmetric_current = true;
+    sweep(1500, true);
+}
+
+static void test_current_floor_is_never_above_the_maximum(void) {
+    config.max_current_mA = 200;
+    TEST_ASSERT_EQUAL_INT32(200, iw_current_floor(&config));
+    sweep(200, false);
+    config.max_current_mA = 300;
+    TEST_ASSERT_EQUAL_INT32(300, iw_current_floor(&config));
+    config.max_current_mA = 301;
+    TEST_ASSERT_EQUAL_INT32(300, iw_current_floor(&config));
+}
+
+static void test_current_limit_falls_with_time_and_rises_without(void) {
+    static const struct {
+        int16_t from, target;
+        uint32_t elapsed_us;
+        int16_t expected;
+    } cases[] = {
+        {2000, 300, 0, 2000},      {2000, 300, 249, 2000},    {2000, 300, 250, 1999}, {2000, 300, 20000, 1920},
+        {2000, 1950, 20000, 1950}, {2000, 1920, 20000, 1920}, {2000, 0, 1000000, 0},  {2000, 0, UINT32_MAX, 0},
+        {300, 2000, 0, 2000},      {300, 301, 20000, 301},    {500, 500, 20000, 500}, {2000, 300, 424999, 301},
+        {2000, 300, 425000, 300},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const iw_pair_t left = {{{0, cases[i].target}, {0, 700}}};
+        const iw_pair_t right = {{{0, 700}, {0, cases[i].target}}};
+        int16_t limit[IW_SIDES] = {cases[i].from, 700};
+        iw_current_follow(limit, &left, cases[i].elapsed_us);
+        TEST_ASSERT_EQUAL_INT16(cases[i].expected, limit[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT16(700, limit[IW_RIGHT]);
+        limit[IW_LEFT] = 700;
+        limit[IW_RIGHT] = cases[i].from;
+        iw_current_follow(limit, &right, cases[i].elapsed_us);
+        TEST_ASSERT_EQUAL_INT16(700, limit[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT16(cases[i].expected, limit[IW_RIGHT]);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_current_sides_get_the_larger_limit_and_the_floor);
+    RUN_TEST(test_current_sides_may_differ_only_if_configured);
+    RUN_TEST(test_current_of_two_zero_speeds_is_the_maximum);
+    RUN_TEST(test_current_floor_is_never_above_the_maximum);
+    RUN_TEST(test_current_limit_falls_with_time_and_rises_without);
+    return UNITY_END();
+}

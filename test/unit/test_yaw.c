@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+// How fast the pair may turn the machine: what is commanded, how it grows in a ramp, and that it slows no stop.
+#include "setpoint_rig.h"
+#include "unity.h"
+
+#include <stdlib.h>
+
+static setpoint_rig_t rig;
+
+void setUp(void) {
+    setpoint_rig_init(&rig);
+    fixture_config(&rig.config);
+    setpoint_rig_begin(&rig);
+}
+
+void tearDown(void) {}
+
+static int32_t turn_of(const iw_pair_t *pair) {
+    return pair->wheel[IW_RIGHT].speed_mm_s - pair->wheel[IW_LEFT].speed_mm_s;
+}
+
+static void test_yaw_bounds_are_those_of_the_real_machine(void) {
+    static const struct {
+        uint16_t max_mrad_s, accel_mrad_s2, track_mm, radius_mm;
+        int32_t most_mm_s;
+        uint32_t growth_mm_s2;
+    } cases[] = {
+        {1000, 2000, 540, 192, 540, 1080},      {1000, 2000, 540, 60, 1728, 3456},
+        {1000, 2000, 540, 400, 259, 518},       {50, 100, 200, 500, 3, 7},
+        {10000, 10000, 1500, 60, 48000, 48000}, {10000, 10000, 1500, 20, 144000, 144000},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        rig.config.max_yaw_mrad_s = cases[i].max_mrad_s;
+        rig.config.yaw_accel_mrad_s2 = cases[i].accel_mrad_s2;
+        rig.config.track_mm = cases[i].track_mm;
+        rig.config.radius_mm = cases[i].radius_mm;
+        setpoint_rig_begin(&rig);
+        TEST_ASSERT_EQUAL_INT32(cases[i].most_mm_s, rig.setpoint.yaw.most_mm_s);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].growth_mm_s2, rig.setpoint.yaw.growth_mm_s2);
+    }
+}
+
+static void test_yaw_limit_scales_both_wheels_by_one_factor(void) {
+    static const struct {
+        int32_t asked[IW_SIDES];
+        int32_t applied[IW_SIDES];
+        bool limited;
+    } cases[] = {
+        {{-270, 270}, {-270, 270}, false},
+        {{-271, 270}, {-270, 269}, true},
+        {{270, -270}, {270, -270}, false},
+        {{270, -271}, {269, -270}, true},
+        {{1000, 1000}, {1000, 1000}, false},
+        {{0, 540}, {0, 540}, false},
+        {{0, 541}, {0, 540}, true},
+        {{541, 0}, {540, 0}, true},
+        {{0, -541}, {0, -540}, true},
+        {{1000, 100}, {600, 60}, true},
+        {{-100, -1000}, {-60, -600}, true},
+        {{32767, -32768}, {269, -270}, true},
+        {{-32768, 32767}, {-270, 269}, true},
+        {{-32768, -32768}, {-32768, -32768}, false},
+        {{0, 0}, {0, 0}, false},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        int32_t speeds[IW_SIDES] = {cases[i].asked[IW_LEFT], cases[i].asked[IW_RIGHT]};
+        TEST_ASSERT_EQUAL_INT(cases[i].limited, iw_yaw_limit(&rig.setpoint.yaw, speeds));
+        TEST_ASSERT_EQUAL_INT32_ARRAY(cases[i].applied, speeds, IW_SIDES);
+    }
+}
+
+static void test_yaw_limit_never_is_faster_or_moves_another_way(void) {
+    fixture_random_t random;
+    fixture_random_init(&random, 21);
+    for (uint32_t n = 0; n < 200000; n++) {
+        const iw_yaw_t yaw = {fixture_random_in(&random, 1, 3000), 1};
+        const int32_t asked[IW_SIDES] = {fixture_random_in(&random, -32768, 32767),
+                                         (n % 7U == 0U) ? 0 : fixture_random_in(&random, -32768, 32767)};
+        int32_t speeds[IW_SIDES] = {asked[IW_LEFT], asked[IW_RIGHT]};
+        (void)iw_yaw_limit(&yaw, speeds);
+        TEST_ASSERT_TRUE(abs(speeds[IW_RIGHT] - speeds[IW_LEFT]) <= yaw.most_mm_s);
+        for (int side = 0; side < IW_SIDES; side++) {
+            TEST_ASSERT_TRUE(abs(speeds[side]) <= abs(asked[side]));
+            TEST_ASSERT_TRUE(speeds[side] == 0 || (speeds[side] < 0) == (asked[side] < 0));
+        }
+        const int64_t skew = (int64_t)speeds[0] * asked[1] - (int64_t)speeds[1] * asked[0];
+        TEST_ASSERT_TRUE(llabs(skew) <= 2 * 32768);
+    }
+}
+
+static iw_yaw_cut_t cut_of(int32_t from, int32_t braking, int32_t faster, uint32_t growth) {
+    const iw_yaw_t yaw = {540, 1080};
+    const iw_yaw_step_t step = {from, braking, faster};
+    return iw_yaw_cut(&yaw, &step, growth);
+}
+
+static void assert_cut(iw_yaw_cut_kind_t kind, uint32_t part, uint32_t whole, const iw_yaw_cut_t *cut) {
+    TEST_ASSERT_EQUAL_INT(kind, cut->kind);
+    TEST_ASSERT_EQUAL_UINT32(part, cut->part_um_s);
+    TEST_ASSERT_EQUAL_UINT32(whole, cut->whole_um_s);
+}
+
+/// The same to both sides.
+static void both_ways(iw_yaw_cut_kind_t kind, uint32_t part, uint32_t whole, const iw_yaw_step_t *step,
+                      uint32_t growth) {
+    const iw_yaw_cut_t one = cut_of(step->from_um_s, step->braking_um_s, step->faster_um_s, growth);
+    const iw_yaw_cut_t other = cut_of(-step->from_um_s, -step->braking_um_s, -step->faster_um_s, growth);
+    assert_cut(kind, part, whole, &one);
+    assert_cut(kind, part, whole, &other);
+}
+
+static void test_yaw_cut_takes_what_is_beyond_the_growth(void) {
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){0, 0, 21600}, 21600);
+    both_ways(IW_YAW_CUT_FASTER, 21598, 21601, &(iw_yaw_step_t){0, 0, 21601}, 21600);
+    both_ways(IW_YAW_CUT_FASTER, 998, 3000, &(iw_yaw_step_t){5000, 0, 3000}, 1000);
+    both_ways(IW_YAW_CUT_FASTER, 1498, 3000, &(iw_yaw_step_t){5000, -500, 3000}, 1000);
+    both_ways(IW_YAW_CUT_FASTER, 498, 3000, &(iw_yaw_step_t){5000, 500, 3000}, 1000);
+    both_ways(IW_YAW_CUT_FASTER, 0, 3000, &(iw_yaw_step_t){5000, 1000, 3000}, 1000);
+    both_ways(IW_YAW_CUT_FASTER, 0, 3000, &(iw_yaw_step_t){5000, 997, 3000}, 999);
+    both_ways(IW_YAW_CUT_FASTER, 1, 3000, &(iw_yaw_step_t){5000, 997, 3000}, 1000);
+    both_ways(IW_YAW_CUT_BRAKING, 998, 1001, &(iw_yaw_step_t){5000, 1001, 3000}, 1000);
+    both_ways(IW_YAW_CUT_BRAKING, 998, 2000, &(iw_yaw_step_t){5000, 2000, 0}, 1000);
+    both_ways(IW_YAW_CUT_BRAKING, 3098, 4100, &(iw_yaw_step_t){-1000, 4100, 0}, 1100);
+}
+
+static void test_yaw_cut_ends_at_the_limit(void) {
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){530000, 0, 10000}, 21600);
+    both_ways(IW_YAW_CUT_FASTER, 9998, 10001, &(iw_yaw_step_t){530000, 0, 10001}, 21600);
+    both_ways(IW_YAW_CUT_FASTER, 0, 10, &(iw_yaw_step_t){540000, 0, 10}, 21600);
+    // Beyond it, which never happens: it does not have to fall, and does not grow.
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){550000, 0, 0}, 21600);
+    both_ways(IW_YAW_CUT_FASTER, 0, 1, &(iw_yaw_step_t){550000, 0, 1}, 21600);
+}
+
+static void test_yaw_cut_leaves_what_falls_alone(void) {
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){540000, -540000, 0}, 0);
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){540000, -300000, -240000}, 0);
+    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){5000, -10000, 0}, 0); // As much to the other side.
+    both_ways(IW_YAW_CUT_BRAKING, 9998, 10001, &(iw_yaw_step_t){5000, -10001, 0}, 0);
+}
+
+static void test_yaw_grows_by_its_acceleration_and_to_its_end(void) {
+    setpoint_rig_follow(&rig);
+    const iw_time_us_t start_us = rig.now_us;
+    setpoint_rig_command(&rig, -270, 270, 2000);
+    for (uint32_t n = 0; n < 40; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        const int64_t ideal = (int64_t)(rig.now_us - start_us) * 1080 / 1000000;
+        TEST_ASSERT_INT_WITHIN(2, (ideal > 540) ? 540 : ideal, turn_of(&pair));
+        TEST_ASSERT_EQUAL_INT(pair.wheel[IW_RIGHT].speed_mm_s, -pair.wheel[IW_LEFT].speed_mm_s);
+    }
+    TEST_ASSERT_EQUAL_INT(-270, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
+}
+
+static void test_yaw_late_call_is_granted_two_periods_of_growth(void) {
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, -270, 270, 2000);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, 500000);
+    TEST_ASSERT_INT_WITHIN(1, 42, turn_of(&pair));
+}
+
+static void test_yaw_of_a_faster_curve_keeps_the_curve(void) {
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 300, 840, 2000);
+    for (uint32_t n = 0; n < 100; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        TEST_ASSERT_INT_WITHIN(1, pair.wheel[IW_RIGHT].speed_mm_s * 300 / 840, pair.wheel[IW_LEFT].speed_mm_s);
+    }
+    TEST_ASSERT_EQUAL_INT(840, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].speed_mm_s);
+}
+
+/// One wheel that alone slows down turns the machine: that is growth of yaw too.
+static void test_yaw_growth_by_one_braking_wheel_is_bounded(void) {
+    setpoint_rig_cruise(&rig, 900, 900, 2000);
+    const iw_time_us_t start_us = rig.setpoint.last_us;
+    setpoint_rig_command(&rig, 400, 900, 2000);
+    for (uint32_t n = 0; n < 40; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        const int64_t ideal = (int64_t)(rig.now_us - start_us) * 1080 / 1000000;
+        TEST_ASSERT_INT_WITHIN(2, (ideal > 500) ? 500 : ideal, turn_of(&pair));
+        TEST_ASSERT_EQUAL_INT(900, pair.wheel[IW_RIGHT].speed_mm_s);
+    }
+    TEST_ASSERT_EQUAL_INT(400, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
+}
+
+/// Nothing but the slope towards zero: in a stop, at a command of 0/0, and where yaw falls.
+static void test_yaw_slows_no_stop_and_no_fall(void) {
+    static const struct {
+        bool command;
+        int16_t left_mm_s, right_mm_s;
+    } ends[] = {{false, 0, 0}, {true, 0, 0}, {true, -20, 20}, {true, 20, -20}};
+    rig.config.yaw_accel_mrad_s2 = 200;
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        setpoint_rig_begin(&rig);
+        setpoint_rig_cruise(&rig, -270, 270, 2000);
+        const iw_time_us_t start_us = rig.setpoint.last_us;
+        if (ends[i].command) {
+            setpoint_rig_command(&rig, ends[i].left_mm_s, ends[i].right_mm_s, 2000);
+        } else {
+            setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+        }
+        const int32_t least = (ends[i].right_mm_s > 0) ? ends[i].right_mm_s : 0;
+        for (uint32_t n = 0; n < 10; n++) {
+            const iw_pair_t pair = setpoint_rig_take_next(&rig);
+            const int64_t ideal = 270 - (int64_t)(rig.now_us - start_us) * 1500 / 1000000;
+            if (ideal > 0) {
+                TEST_ASSERT_INT_WITHIN(1, (ideal < least) ? least : ideal, pair.wheel[IW_RIGHT].speed_mm_s);
+            }
+        }
+    }
+}
+
+/// One wheel has a long way to brake through zero, the other would become faster at once: it waits, and both get there.
+static void test_yaw_at_its_limit_waits_and_gets_there(void) {
+    rig.config.max_yaw_mrad_s = 278; // 150 mm/s.
+    rig.config.accel_mm_s2 = 20000;
+    rig.config.decel_mm_s2 = 100;
+    rig.config.max_speed_mm_s = 60;
+    setpoint_rig_begin(&rig);
+    setpoint_rig_cruise(&rig, 50, -100, 2000);
+    setpoint_rig_command(&rig, -1000, -1000, 2000);
+    for (uint32_t n = 0; n < 400; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        TEST_ASSERT_TRUE(abs(turn_of(&pair)) <= 150);
+    }
+    TEST_ASSERT_EQUAL_INT(-1000, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(-1000, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].speed_mm_s);
+}
+
+static void draw_config(fixture_random_t *random) {
+    rig.config.max_yaw_mrad_s = (uint16_t)fixture_random_in(random, 50, 3000);
+    rig.config.yaw_accel_mrad_s2 = (uint16_t)fixture_random_in(random, 100, 10000);
+    rig.config.track_mm = (uint16_t)fixture_random_in(random, 200, 1500);
+    rig.config.radius_mm = (uint16_t)fixture_random_in(random, 60, 400);
+    rig.config.accel_mm_s2 = (uint16_t)fixture_random_in(random, 400, 20000);
+    rig.config.decel_mm_s2 = (uint16_t)fixture_random_in(random, 400, 20000);
+    rig.config.current_role = (fixture_random_in(random, 0, 1) == 0) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
+    setpoint_rig_begin(&rig);
+}
+
+static void command_anything(fixture_random_t *random, iw_pair_t *target) {
+    int32_t speeds[IW_SIDES] = {fixture_random_in(random, -1000, 1000), fixture_random_in(random, -1000, 1000)};
+    (void)iw_yaw_limit(&rig.setpoint.yaw, speeds);
+    for (int side = 0; side < IW_SIDES; side++) {
+        target->wheel[side].speed_mm_s = (int16_t)speeds[side];
+        target->wheel[side].current_mA = (int16_t)fixture_random_in(random, 0, 2000);
+    }
+    iw_setpoint_command(&rig.setpoint, rig.now_us, target);
+}
+
+static void test_yaw_stays_bounded_and_every_target_is_reached(void) {
+    fixture_random_t random;
+    fixture_random_init(&random, 22);
+    for (uint32_t run = 0; run < 300; run++) {
+        iw_pair_t target = {{{0, 0}, {0, 0}}};
+        draw_config(&random);
+        setpoint_rig_follow(&rig);
+        const iw_yaw_t *const yaw = &rig.setpoint.yaw;
+        iw_pair_t before = iw_setpoint_applied(&rig.setpoint);
+        iw_time_us_t before_us = rig.now_us;
+        for (uint32_t n = 0; n < 3000; n++) {
+            if (n < 300U && n % 20U == 0U) {
+                command_anything(&random, &target);
+            }
+            const iw_pair_t pair = setpoint_rig_take_next(&rig);
+            const int32_t growth = (int32_t)((rig.now_us - before_us) * yaw->growth_mm_s2 / 1000000U);
+            TEST_ASSERT_TRUE(abs(turn_of(&pair)) <= yaw->most_mm_s);
+            TEST_ASSERT_TRUE(abs(turn_of(&pair)) - abs(turn_of(&before)) <= growth + 2);
+            before = pair;
+            before_us = rig.now_us;
+            if (n >= 300U && pair.wheel[0].speed_mm_s == target.wheel[0].speed_mm_s &&
+                pair.wheel[1].speed_mm_s == target.wheel[1].speed_mm_s) {
+                break;
+            }
+        }
+        TEST_ASSERT_EQUAL_INT16(target.wheel[IW_LEFT].speed_mm_s, before.wheel[IW_LEFT].speed_mm_s);
+        TEST_ASSERT_EQUAL_INT16(target.wheel[IW_RIGHT].speed_mm_s, before.wheel[IW_RIGHT].speed_mm_s);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_yaw_bounds_are_those_of_the_real_machine);
+    RUN_TEST(test_yaw_limit_scales_both_wheels_by_one_factor);
+    RUN_TEST(test_yaw_limit_never_is_faster_or_moves_another_way);
+    RUN_TEST(test_yaw_cut_takes_what_is_beyond_the_growth);
+    RUN_TEST(test_yaw_cut_ends_at_the_limit);
+    RUN_TEST(test_yaw_cut_leaves_what_falls_alone);
+    RUN_TEST(test_yaw_grows_by_its_acceleration_and_to_its_end);
+    RUN_TEST(test_yaw_late_call_is_granted_two_periods_of_growth);
+    RUN_TEST(test_yaw_of_a_faster_curve_keeps_the_curve);
+    RUN_TEST(test_yaw_growth_by_one_braking_wheel_is_bounded);
+    RUN_TEST(test_yaw_slows_no_stop_and_no_fall);
+    RUN_TEST(test_yaw_at_its_limit_waits_and_gets_there);
+    RUN_TEST(test_yaw_stays_bounded_and_every_target_is_reached);
+    return UNITY_END();
+}
