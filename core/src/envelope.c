@@ -95,18 +95,20 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_
     return verdict;
 }
 
-/// In the machine's frame.
-static int32_t speed_ahead(const iw_config_t *config, iw_side_t side, const uint8_t *data) {
-    const int32_t speed_mm_s = as_the_wheel_reads(data).speed_mm_s;
-    return config->invert[side] ? -speed_mm_s : speed_mm_s;
+/// Right minus left in the machine's frame, without sign.
+static uint32_t turn_of(const iw_config_t *config, int32_t left_mm_s, int32_t right_mm_s) {
+    const int32_t left = config->invert[IW_LEFT] ? -left_mm_s : left_mm_s;
+    const int32_t right = config->invert[IW_RIGHT] ? -right_mm_s : right_mm_s;
+    return (uint32_t)iw_magnitude(right - left);
 }
 
-/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track).
+/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A pair
+/// that turns no more than the last one passes, as every stop does.
 static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t turn_mm_s) {
     const iw_config_t *const config = self->config;
     const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
     const uint32_t span_mm2 = config->track_mm * SETPOINT_RADIUS_MM;
-    const uint32_t most = self->turn_mm_s + TURN_ROUNDING_MM_S;
+    const uint32_t most = turn_of(config, self->last_mm_s[IW_LEFT], self->last_mm_s[IW_RIGHT]) + TURN_ROUNDING_MM_S;
     if ((uint64_t)turn_mm_s * (config->radius_mm * 1000U) > (uint64_t)span_mm2 * config->max_yaw_mrad_s) {
         return false;
     }
@@ -116,15 +118,11 @@ static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t tur
 
 iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
                                              iw_time_us_t now_us) {
-    const int32_t turn = speed_ahead(self->config, IW_RIGHT, frame[IW_RIGHT].data) -
-                         speed_ahead(self->config, IW_LEFT, frame[IW_LEFT].data);
-    const uint32_t turn_mm_s = (uint32_t)iw_magnitude(turn);
-    // A pair without yaw passes, as a stop does: this rule holds up no zero.
-    if (!turn_ok(self, iw_age_us(self->turn_us, now_us), turn_mm_s)) {
+    const uint32_t turn_mm_s = turn_of(self->config, as_the_wheel_reads(frame[IW_LEFT].data).speed_mm_s,
+                                       as_the_wheel_reads(frame[IW_RIGHT].data).speed_mm_s);
+    if (!turn_ok(self, iw_age_us(self->last_us[IW_RIGHT], now_us), turn_mm_s)) {
         self->stopped++;
         return IW_ENVELOPE_YAW;
     }
-    self->turn_us = now_us;
-    self->turn_mm_s = turn_mm_s;
     return IW_ENVELOPE_PASS;
 }

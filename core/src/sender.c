@@ -21,9 +21,8 @@ bool iw_sender_ready(const iw_sender_t *self, bool zero) {
     return zero ? left || right : left && right;
 }
 
-/// The frame for one wheel, in the wheel's own direction. False, with the reason in `verdict`, if the envelope stops
-/// it.
-static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command) {
+/// The frame for one wheel, in the wheel's own direction.
+static void prepare(iw_sender_t *self, iw_side_t side, const iw_command_t *command) {
     iw_can_frame_t *const frame = &self->frame[side];
     const iw_config_t *const config = self->config;
     const bool invert = config->invert[side];
@@ -36,7 +35,14 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
     self->sent.clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
-    const iw_envelope_verdict_t verdict = iw_envelope_check(&self->envelope, frame, now_us);
+}
+
+/// The pair together, then each frame. False, with the reason in `verdict`, if the envelope stops one of them.
+static bool is_within(iw_sender_t *self, iw_time_us_t now_us) {
+    iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
+    for (size_t side = 0; side < IW_SIDES && verdict == IW_ENVELOPE_PASS; side++) {
+        verdict = iw_envelope_check(&self->envelope, &self->frame[side], now_us);
+    }
     self->verdict = (verdict == IW_ENVELOPE_PASS) ? self->verdict : verdict;
     return verdict == IW_ENVELOPE_PASS;
 }
@@ -96,13 +102,9 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
 /// Both frames are judged before the first one leaves, else a stopped right frame would leave the left one alone.
 iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_time_us_t now_us, bool zero) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side])) {
-            return IW_SEND_STOPPED;
-        }
+        prepare(self, (iw_side_t)side, &pair->wheel[side]);
     }
-    const iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
-    if (verdict != IW_ENVELOPE_PASS) {
-        self->verdict = verdict;
+    if (!is_within(self, now_us)) {
         return IW_SEND_STOPPED;
     }
     return hand_over_both(self, now_us, zero) ? IW_SEND_DONE : IW_SEND_LATER;

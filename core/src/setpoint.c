@@ -11,19 +11,12 @@
 #define FRACTION_BITS 24U
 #define FRACTION_ONE  (1U << FRACTION_BITS)
 
-/// One of the quantities that ramp: where it is going in this step, and which share of the way it may go.
+/// One of the quantities that ramp: its way in this step, and which share of that it may go.
 typedef struct {
-    int32_t *value;
-    int32_t aim;
+    int32_t way;
     bool braking; ///< Towards zero.
     uint32_t fraction;
 } axis_t;
-
-/// Which share of their ways the quantities go in this step.
-typedef struct {
-    uint32_t all; ///< Those that do not brake.
-    uint32_t braking;
-} shares_t;
 
 /// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
@@ -127,14 +120,13 @@ static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
 
 /// Where a quantity may go now: not past zero in one step. Writes in place, since a copy would add to the deepest stack
 /// of the core.
-static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) {
-    const int32_t *const value = axis->value;
+static void plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
     const bool through_zero = *value != 0 && (target < 0) != (*value < 0);
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
     const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value);
     const uint32_t allowed = braking ? towards : away;
-    axis->aim = aim;
+    axis->way = aim - *value;
     axis->braking = braking;
     axis->fraction = (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
 }
@@ -147,55 +139,61 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// One common share of all ways; braking quantities do not wait for accelerating ones.
-static shares_t common_shares(const axis_t *axes, size_t count) {
-    shares_t shares = {FRACTION_ONE, FRACTION_ONE};
+static IW_APART void level(axis_t *axes, size_t count) {
+    uint32_t braking = FRACTION_ONE;
+    uint32_t all = FRACTION_ONE;
     for (size_t i = 0; i < count; i++) {
-        shares.all = (axes[i].fraction < shares.all) ? axes[i].fraction : shares.all;
-        shares.braking = (axes[i].braking && axes[i].fraction < shares.braking) ? axes[i].fraction : shares.braking;
+        all = (axes[i].fraction < all) ? axes[i].fraction : all;
+        braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    return shares;
+    for (axis_t *axis = axes; axis < axes + count; axis++) {
+        axis->fraction = axis->braking ? braking : all;
+    }
 }
 
-static int32_t part_of_way(const axis_t *axis, const shares_t *shares) {
-    const int64_t share = axis->braking ? shares->braking : shares->all;
-    return (int32_t)(share * (axis->aim - *axis->value) / (int64_t)FRACTION_ONE);
+static int32_t part_of_way(const axis_t *axis) {
+    return (int32_t)((int64_t)axis->fraction * axis->way / (int64_t)FRACTION_ONE);
 }
 
-/// What the shares would do to the difference of both wheels, right minus left.
-static iw_yaw_step_t yaw_step(const iw_setpoint_t *self, const axis_t *axes, const shares_t *shares) {
-    iw_yaw_step_t step = {self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT], 0, 0};
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        const int32_t part = part_of_way(&axes[side], shares);
-        const int32_t change = (side == IW_LEFT) ? -part : part;
-        if (axes[side].braking) {
-            step.braking_um_s += change;
-        } else {
-            step.faster_um_s += change;
+/// What wheels that brake, or those that do not, would do to the difference of both: right minus left.
+static IW_APART int32_t turn_by(const axis_t *axes, bool braking) {
+    const int32_t left = (axes[IW_LEFT].braking == braking) ? part_of_way(&axes[IW_LEFT]) : 0;
+    const int32_t right = (axes[IW_RIGHT].braking == braking) ? part_of_way(&axes[IW_RIGHT]) : 0;
+    return right - left;
+}
+
+/// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
+static IW_APART void cut_step(axis_t *axes, size_t count, bool braking, uint32_t fraction) {
+    for (axis_t *axis = axes; axis < axes + count; axis++) {
+        if (axis->braking == braking) {
+            axis->fraction = (uint32_t)((uint64_t)axis->fraction * fraction / FRACTION_ONE);
         }
     }
-    return step;
 }
 
-static IW_APART uint32_t cut_share(uint32_t share, const iw_yaw_cut_t *cut) {
-    return (uint32_t)((uint64_t)share * fraction_of(cut->part_um_s, cut->whole_um_s) / FRACTION_ONE);
-}
-
-/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts.
-static void limit_yaw(const iw_setpoint_t *self, const axis_t *axes, uint32_t us, shares_t *shares) {
-    const iw_yaw_step_t step = yaw_step(self, axes, shares);
-    const iw_yaw_cut_t cut = iw_yaw_cut(&self->yaw, &step, ramp_step(self->yaw.growth_mm_s2, us));
-    if (cut.kind == IW_YAW_CUT_FASTER) {
-        shares->all = cut_share(shares->all, &cut);
-    } else if (cut.kind == IW_YAW_CUT_BRAKING) {
-        shares->braking = cut_share(shares->braking, &cut);
-        shares->all = 0;
+/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that become
+/// faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so it gets
+/// there.
+static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uint32_t us) {
+    const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
+    const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
+    const int32_t braking = turn_by(axes, true);
+    const int32_t faster = turn_by(axes, false);
+    const int32_t braked = from + braking;
+    if (iw_magnitude(braked + faster) <= bound) {
+        return;
+    }
+    if (iw_magnitude(braked) <= bound) {
+        cut_step(axes, count, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+    } else {
+        cut_step(axes, count, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        cut_step(axes, count, false, 0);
     }
 }
 
-static void move(const axis_t *axes, size_t count, const shares_t *shares) {
-    for (const axis_t *axis = axes; axis < axes + count; axis++) {
-        *axis->value += part_of_way(axis, shares);
-    }
+static IW_APART void move(int32_t *values, const axis_t *axes) {
+    values[IW_LEFT] += part_of_way(&axes[IW_LEFT]);
+    values[IW_RIGHT] += part_of_way(&axes[IW_RIGHT]);
 }
 
 /// True if this wheel's speed and current are where they should be.
@@ -218,23 +216,25 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     axis_t axes[AXES];
     for (size_t side = 0; side < IW_SIDES; side++) {
-        axes[side].value = &self->speed_um_s[side];
-        plan(&axes[side], target[side].speed_mm_s * 1000, away, towards);
+        plan(&axes[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
     }
     if (ramps_current) {
         const uint32_t current_away = current_step(config, away);
         const uint32_t current_towards = current_step(config, towards);
         for (size_t side = 0; side < IW_SIDES; side++) {
-            axes[IW_SIDES + side].value = &self->current_uA[side];
-            plan(&axes[IW_SIDES + side], target[side].current_mA * 1000, current_away, current_towards);
+            plan(&axes[IW_SIDES + side], &self->current_uA[side], target[side].current_mA * 1000, current_away,
+                 current_towards);
         }
     }
     const size_t count = ramps_current ? AXES : IW_SIDES;
-    shares_t shares = common_shares(axes, count);
+    level(axes, count);
     if (target[IW_LEFT].speed_mm_s != 0 || target[IW_RIGHT].speed_mm_s != 0) { // A stop is not for it to slow.
-        limit_yaw(self, axes, away_us, &shares);
+        limit_yaw(self, axes, count, away_us);
     }
-    move(axes, count, &shares);
+    move(self->speed_um_s, axes);
+    if (ramps_current) {
+        move(self->current_uA, &axes[IW_SIDES]);
+    }
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {

@@ -27,43 +27,16 @@ bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {
     return true;
 }
 
-/// How large the difference may be after the step. It never has to fall.
-static int32_t bound_um_s(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um_s) {
+int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um_s) {
+    const int32_t now_um_s = iw_magnitude(from_um_s);
     const int32_t most_um_s = self->most_mm_s * 1000;
-    const int32_t grown_um_s = from_um_s + (int32_t)growth_um_s;
-    const int32_t bound = (grown_um_s < most_um_s) ? grown_um_s : most_um_s;
-    return (bound > from_um_s) ? bound : from_um_s;
+    const int32_t grown_um_s = now_um_s + (int32_t)growth_um_s;
+    const int32_t bound_um_s = (grown_um_s < most_um_s) ? grown_um_s : most_um_s;
+    return (bound_um_s > now_um_s) ? bound_um_s : now_um_s;
 }
 
-static uint32_t room_um_s(int32_t bound, int32_t before) {
-    const int32_t room = bound - before - ROUNDING_UM_S;
+uint32_t iw_yaw_room(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s) {
+    const int32_t from = (change_um_s < 0) ? -from_um_s : from_um_s;
+    const int32_t room = bound_um_s - from - ROUNDING_UM_S;
     return (room > 0) ? (uint32_t)room : 0U;
-}
-
-iw_yaw_cut_t iw_yaw_cut(const iw_yaw_t *self, const iw_yaw_step_t *step, uint32_t growth_um_s) {
-    const int32_t bound = bound_um_s(self, iw_magnitude(step->from_um_s), growth_um_s);
-    int32_t from = step->from_um_s;
-    int32_t braked = from + step->braking_um_s;
-    int32_t to = braked + step->faster_um_s;
-    iw_yaw_cut_t cut = {IW_YAW_CUT_NONE, 0, 0};
-    if (iw_magnitude(to) <= bound) {
-        return cut;
-    }
-    if (to < 0) { // As if it turned to the left.
-        from = -from;
-        braked = -braked;
-        to = -to;
-    }
-    // Wheels that become faster wait first: one that brakes is on its way to what was commanded, and its end is within
-    // the limit, so it always gets there.
-    if (braked <= bound) {
-        cut.kind = IW_YAW_CUT_FASTER;
-        cut.part_um_s = room_um_s(bound, braked);
-        cut.whole_um_s = (uint32_t)(to - braked);
-    } else {
-        cut.kind = IW_YAW_CUT_BRAKING;
-        cut.part_um_s = room_um_s(bound, from);
-        cut.whole_um_s = (uint32_t)(braked - from);
-    }
-    return cut;
 }

@@ -104,18 +104,20 @@ typedef struct {
     iwn_receiver_t receiver;
     char in[IWN_LINE_BOARD_MAX];
     iw_time_us_t now_us;
-    iw_time_us_t heard_us;    ///< When the last good line came.
-    iw_time_us_t linked_us;   ///< When the last `link` was written.
-    iw_time_us_t stamped_us;  ///< When any line was.
-    iw_time_us_t error_us;    ///< When the last line_error was written.
-    uint32_t errors;          ///< Bad lines since the start.
-    uint32_t errors_told;     ///< Of them, those that a line_error has counted.
-    iwn_line_verdict_t fault; ///< Of the last of them.
+    iw_time_us_t heard_us;   ///< When the last good line came.
+    iw_time_us_t linked_us;  ///< When the last `link` was written.
+    iw_time_us_t stamped_us; ///< When any line was.
+    iw_time_us_t error_us;   ///< When the last line_error was written.
+    uint32_t errors;         ///< Bad lines since the start.
+    uint32_t errors_told;    ///< Of them, those that a line_error has counted.
     iw_client_t last_id;
-    uint8_t next_owed; ///< Whose turn it is to have the long line, so that nobody keeps it.
-    bool estop_high;   ///< The level of the e-stop's pin.
-    iw_host_told_t told;
     uint32_t lease_us;
+    iwn_line_verdict_t fault; ///< Of the last bad line.
+    uint8_t next_owed;        ///< Whose turn it is to have the long line, so that nobody keeps it.
+    bool estop_high;          ///< The level of the e-stop's pin.
+    bool has_staged;          ///< `staged` is something.
+    iw_memory_t memory;
+    iw_host_told_t told;
     iw_snapshot_t seen; ///< Of iw_host_look: too large for the stack.
     iwn_request_t request;
     iwn_refusal_t refusal;
@@ -123,11 +125,9 @@ typedef struct {
     iw_time_us_t stopped_us, estopped_us; ///< When a client last asked; 0: never.
     iw_client_t stopped_by, estopped_by;
     char estop_reason[IWN_REASON_MAX + 1U];
-    iw_settings_t staged; ///< By `config`; in force after a commit and the start that follows it.
-    bool has_staged;
+    iw_settings_t staged;            ///< By `config`; in force after a commit and the start that follows it.
     iw_learnt_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
     iw_time_us_t learn_us;           ///< Nothing that was learnt is written before.
-    iw_memory_t memory;
     iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
     union {
         iwn_work_t work;                   ///< While a request is read, ...

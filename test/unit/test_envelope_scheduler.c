@@ -57,9 +57,11 @@ static void send_through_gate(iw_envelope_t *envelope, const iw_config_t *config
         const iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
         iw_can_frame_t *const frame = &frames[side];
         TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, frame));
-        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, frame, now_us));
     }
     TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check_pair(envelope, frames, now_us));
+    for (int side = IW_LEFT; side <= IW_RIGHT; side++) {
+        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, &frames[side], now_us));
+    }
 }
 
 static void run_once(void) {

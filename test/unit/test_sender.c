@@ -161,11 +161,14 @@ static void test_sender_pair_that_neither_wheel_may_have_reaches_no_port(void) {
 }
 
 static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
-    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, (int16_t)(config.max_speed_mm_s + 1)));
+    const int16_t fast_mm_s = (int16_t)(config.max_speed_mm_s + 1);
+    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, fast_mm_s)); // The pair is judged first.
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, sender.verdict);
+    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(fast_mm_s, fast_mm_s));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
     send_whole(0);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SPEED, sender.verdict);
-    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, 100));
+    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(100, 100));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, sender.verdict);
 }
 

@@ -88,55 +88,33 @@ static void test_yaw_limit_never_is_faster_or_moves_another_way(void) {
     }
 }
 
-static iw_yaw_cut_t cut_of(int32_t from, int32_t braking, int32_t faster, uint32_t growth) {
+static void test_yaw_bound_is_the_growth_up_to_the_limit(void) {
+    static const struct {
+        int32_t from;
+        uint32_t growth;
+        int32_t bound;
+    } cases[] = {{0, 21600, 21600},       {5000, 1000, 6000},      {0, 0, 0},
+                 {530000, 9999, 539999},  {530000, 10000, 540000}, {530000, 10001, 540000},
+                 {540000, 21600, 540000}, {550000, 21600, 550000}, {550000, 0, 550000}};
     const iw_yaw_t yaw = {540, 1080};
-    const iw_yaw_step_t step = {from, braking, faster};
-    return iw_yaw_cut(&yaw, &step, growth);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        TEST_ASSERT_EQUAL_INT32(cases[i].bound, iw_yaw_bound(&yaw, cases[i].from, cases[i].growth));
+        TEST_ASSERT_EQUAL_INT32(cases[i].bound, iw_yaw_bound(&yaw, -cases[i].from, cases[i].growth));
+    }
 }
 
-static void assert_cut(iw_yaw_cut_kind_t kind, uint32_t part, uint32_t whole, const iw_yaw_cut_t *cut) {
-    TEST_ASSERT_EQUAL_INT(kind, cut->kind);
-    TEST_ASSERT_EQUAL_UINT32(part, cut->part_um_s);
-    TEST_ASSERT_EQUAL_UINT32(whole, cut->whole_um_s);
-}
-
-/// The same to both sides.
-static void both_ways(iw_yaw_cut_kind_t kind, uint32_t part, uint32_t whole, const iw_yaw_step_t *step,
-                      uint32_t growth) {
-    const iw_yaw_cut_t one = cut_of(step->from_um_s, step->braking_um_s, step->faster_um_s, growth);
-    const iw_yaw_cut_t other = cut_of(-step->from_um_s, -step->braking_um_s, -step->faster_um_s, growth);
-    assert_cut(kind, part, whole, &one);
-    assert_cut(kind, part, whole, &other);
-}
-
-static void test_yaw_cut_takes_what_is_beyond_the_growth(void) {
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){0, 0, 21600}, 21600);
-    both_ways(IW_YAW_CUT_FASTER, 21598, 21601, &(iw_yaw_step_t){0, 0, 21601}, 21600);
-    both_ways(IW_YAW_CUT_FASTER, 998, 3000, &(iw_yaw_step_t){5000, 0, 3000}, 1000);
-    both_ways(IW_YAW_CUT_FASTER, 1498, 3000, &(iw_yaw_step_t){5000, -500, 3000}, 1000);
-    both_ways(IW_YAW_CUT_FASTER, 498, 3000, &(iw_yaw_step_t){5000, 500, 3000}, 1000);
-    both_ways(IW_YAW_CUT_FASTER, 0, 3000, &(iw_yaw_step_t){5000, 1000, 3000}, 1000);
-    both_ways(IW_YAW_CUT_FASTER, 0, 3000, &(iw_yaw_step_t){5000, 997, 3000}, 999);
-    both_ways(IW_YAW_CUT_FASTER, 1, 3000, &(iw_yaw_step_t){5000, 997, 3000}, 1000);
-    both_ways(IW_YAW_CUT_BRAKING, 998, 1001, &(iw_yaw_step_t){5000, 1001, 3000}, 1000);
-    both_ways(IW_YAW_CUT_BRAKING, 998, 2000, &(iw_yaw_step_t){5000, 2000, 0}, 1000);
-    both_ways(IW_YAW_CUT_BRAKING, 3098, 4100, &(iw_yaw_step_t){-1000, 4100, 0}, 1100);
-}
-
-static void test_yaw_cut_ends_at_the_limit(void) {
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){530000, 0, 10000}, 21600);
-    both_ways(IW_YAW_CUT_FASTER, 9998, 10001, &(iw_yaw_step_t){530000, 0, 10001}, 21600);
-    both_ways(IW_YAW_CUT_FASTER, 0, 10, &(iw_yaw_step_t){540000, 0, 10}, 21600);
-    // Beyond it, which never happens: it does not have to fall, and does not grow.
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){550000, 0, 0}, 21600);
-    both_ways(IW_YAW_CUT_FASTER, 0, 1, &(iw_yaw_step_t){550000, 0, 1}, 21600);
-}
-
-static void test_yaw_cut_leaves_what_falls_alone(void) {
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){540000, -540000, 0}, 0);
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){540000, -300000, -240000}, 0);
-    both_ways(IW_YAW_CUT_NONE, 0, 0, &(iw_yaw_step_t){5000, -10000, 0}, 0); // As much to the other side.
-    both_ways(IW_YAW_CUT_BRAKING, 9998, 10001, &(iw_yaw_step_t){5000, -10001, 0}, 0);
+/// 2 um/s are left for the rounding of both wheels.
+static void test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change(void) {
+    static const struct {
+        int32_t bound, from, change;
+        uint32_t room;
+    } cases[] = {{21600, 0, 21601, 21598}, {6000, 5000, 3000, 998},    {6000, -5000, 12000, 10998},
+                 {6000, 6000, 1, 0},       {6000, 5998, 100, 0},       {6000, 5997, 100, 1},
+                 {6000, 5999, 100, 0},     {540000, 0, 600000, 539998}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        TEST_ASSERT_EQUAL_UINT32(cases[i].room, iw_yaw_room(cases[i].bound, cases[i].from, cases[i].change));
+        TEST_ASSERT_EQUAL_UINT32(cases[i].room, iw_yaw_room(cases[i].bound, -cases[i].from, -cases[i].change));
+    }
 }
 
 static void test_yaw_grows_by_its_acceleration_and_to_its_end(void) {
@@ -283,9 +261,8 @@ int main(void) {
     RUN_TEST(test_yaw_bounds_are_those_of_the_real_machine);
     RUN_TEST(test_yaw_limit_scales_both_wheels_by_one_factor);
     RUN_TEST(test_yaw_limit_never_is_faster_or_moves_another_way);
-    RUN_TEST(test_yaw_cut_takes_what_is_beyond_the_growth);
-    RUN_TEST(test_yaw_cut_ends_at_the_limit);
-    RUN_TEST(test_yaw_cut_leaves_what_falls_alone);
+    RUN_TEST(test_yaw_bound_is_the_growth_up_to_the_limit);
+    RUN_TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change);
     RUN_TEST(test_yaw_grows_by_its_acceleration_and_to_its_end);
     RUN_TEST(test_yaw_late_call_is_granted_two_periods_of_growth);
     RUN_TEST(test_yaw_of_a_faster_curve_keeps_the_curve);

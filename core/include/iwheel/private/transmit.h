@@ -47,16 +47,14 @@ typedef struct {
     const iw_config_t *config;      ///< The owner's: checked.
     iw_time_us_t last_us[IW_SIDES]; ///< When the last frame passed.
     int32_t last_mm_s[IW_SIDES];    ///< Its speed, as on the bus; 0 at first.
-    iw_time_us_t turn_us;           ///< When the last pair passed.
-    uint32_t turn_mm_s;             ///< The difference of its speeds in the machine's frame, without sign.
     uint32_t stopped;               ///< Frames that did not pass.
 } iw_envelope_t;
 
 /// Judges one frame; what does not pass is counted and must not be sent.
 iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_t *frame, iw_time_us_t now_us);
 
-/// Judges a pair of frames that have passed one by one: left, then right. What does not pass is counted and must not be
-/// sent.
+/// Judges both frames of a pair together, left and right, before each of them is judged alone: against what passed last.
+/// A pair that does not pass is counted and must not be sent.
 iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
                                              iw_time_us_t now_us);
 

@@ -29,34 +29,18 @@ typedef struct {
     uint32_t growth_mm_s2; ///< Of how fast its magnitude may grow.
 } iw_yaw_t;
 
-/// What a step of the ramp would do to the difference.
-typedef struct {
-    int32_t from_um_s;    ///< The difference before it.
-    int32_t braking_um_s; ///< Its change by wheels that brake.
-    int32_t faster_um_s;  ///< Its change by wheels that become faster.
-} iw_yaw_step_t;
-
-/// Which wheels go only a part of their step.
-typedef enum {
-    IW_YAW_CUT_NONE = 0, ///< None.
-    IW_YAW_CUT_FASTER,   ///< Those that become faster.
-    IW_YAW_CUT_BRAKING,  ///< Those that brake; those that would become faster wait.
-} iw_yaw_cut_kind_t;
-
-/// They go `part_um_s` of `whole_um_s`, which is larger and not 0, unless it is IW_YAW_CUT_NONE.
-typedef struct {
-    iw_yaw_cut_kind_t kind; ///< Which.
-    uint32_t part_um_s;     ///< What is left,
-    uint32_t whole_um_s;    ///< of this.
-} iw_yaw_cut_t;
-
 /// Once, so that no step divides.
 void iw_yaw_init(iw_yaw_t *self, const iw_yaw_machine_t *machine);
 
 /// Scales both speeds (each within int16) by one factor, so that the curve stays. True if they had to be.
 bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]);
 
-/// What of a step under a drive command may be gone. `growth_um_s`: what `growth_mm_s2` allows in its time.
-iw_yaw_cut_t iw_yaw_cut(const iw_yaw_t *self, const iw_yaw_step_t *step, uint32_t growth_um_s);
+/// How large the difference may be after a step under a drive command, without sign. `growth_um_s`: what `growth_mm_s2`
+/// allows in its time. It never has to fall.
+int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um_s);
+
+/// How much of a change, without sign, may be gone where all of it would lead from within that bound to beyond it. Less
+/// than the change.
+uint32_t iw_yaw_room(int32_t bound_um_s, int32_t from_um_s, int32_t change_um_s);
 
 #endif
