@@ -16,6 +16,7 @@ void gw_daemon_compose(gw_daemon_t *self) {
     self->knowledge.log = &self->log;
     self->knowledge.clients = clients;
     self->knowledge.configured = (gw_configured_t){&config->core, config->core.track_mm};
+    self->knowledge.button = (gw_button_t){.line = config->estop.line, .active_high = config->estop.active_high};
     self->knowledge.bus = config->bus.interface;
     self->status = (gw_status_t){
         .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};

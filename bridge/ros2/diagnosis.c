@@ -56,7 +56,10 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
 
 static void tell_estop(const ros_facts_t *facts, ros_status_t *status) {
     const char *state = facts->machine.estop;
-    if (strcmp(state, "released") == 0) {
+    if (strcmp(state, "released") == 0 && !facts->machine.estop_tried && !facts->machine.estop_simulated) {
+        say(status, ROS_WARN,
+            "released, but its button was never seen to work on this wiring: press it, then release it");
+    } else if (strcmp(state, "released") == 0) {
         say(status, ROS_OK, "released");
     } else if (strcmp(state, "none") == 0) {
         say(status, ROS_WARN,

@@ -36,6 +36,8 @@ typedef struct {
     iwc_state_t now;
     int64_t wall_us;
     char estop[16];
+    bool estop_tried;     ///< Its button was seen to work on this wiring.
+    bool estop_simulated; ///< It is the button of a simulator.
     char bus[16];
     char timing[16];
     char holder[65]; ///< Name of who has the lease.

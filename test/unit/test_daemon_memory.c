@@ -135,6 +135,31 @@ static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry(IW_LEDGER_GEAR_RATIO)->state);
 }
 
+static bool is_warned_of_the_button(void) {
+    const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    for (uint32_t i = 0; i < wheels->warnings; i++) {
+        if (strstr(wheels->warning[i], "was never seen to work on this wiring") != NULL) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
+    const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(wheels->estop_untried);
+    TEST_ASSERT_EQUAL_INT64(0, wheels->estop_tried_us);
+    TEST_ASSERT_TRUE(is_warned_of_the_button());
+    stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .line = "ESTOP", .active_high = true};
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_FALSE(wheels->estop_untried);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
+    TEST_ASSERT_FALSE(is_warned_of_the_button());
+}
+
 static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
@@ -378,6 +403,7 @@ int main(void) {
     RUN_TEST(test_memory_finding_for_another_value_is_forgotten);
     RUN_TEST(test_memory_contradiction_stays_one);
     RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
+    RUN_TEST(test_memory_button_that_was_tried_before_is_not_warned_of);
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
     RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);

@@ -41,6 +41,7 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
         return wire.open_error;
     }
     wire.fd = self->fd = eventfd(0, EFD_NONBLOCK);
+    self->seen = (iw_estop_seen_t){"label", "name"};
     return 0;
 }
 
@@ -196,6 +197,16 @@ static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
+static void test_estop_line_has_names_as_long_as_it_can_be_read(void) {
+    const iw_estop_seen_t *seen = iw_gpio_estop_ops->seen(&store);
+    TEST_ASSERT_NOT_NULL(seen);
+    TEST_ASSERT_EQUAL_STRING("label", seen->chip);
+    TEST_ASSERT_EQUAL_STRING("name", seen->line);
+    wire.level = -1;
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    TEST_ASSERT_NULL(iw_gpio_estop_ops->seen(&store));
+}
+
 static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
     static const char *const longest = "0123456789012345678901234567890";
     static const struct {
@@ -268,6 +279,7 @@ int main(void) {
     RUN_TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while);
     RUN_TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can);
     RUN_TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed);
+    RUN_TEST(test_estop_line_has_names_as_long_as_it_can_be_read);
     RUN_TEST(test_estop_expects_what_is_configured_and_nothing_for_any);
     RUN_TEST(test_estop_that_is_no_line_is_called_nothing);
     RUN_TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now);

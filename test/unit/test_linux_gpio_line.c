@@ -160,6 +160,8 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
         address.expected = cases[i / 2U].expected;
         iw_gpio_line_close(&line);
         TEST_ASSERT_EQUAL_INT(cases[i / 2U].error, iw_gpio_line_open(&line, &address));
+        TEST_ASSERT_EQUAL_STRING((cases[i / 2U].error == 0) ? FAKE_GPIO_LABEL : "", line.seen.chip);
+        TEST_ASSERT_EQUAL_STRING((cases[i / 2U].error == 0) ? FAKE_GPIO_NAME : "", line.seen.line);
         TEST_ASSERT_EQUAL_INT((cases[i / 2U].error == 0) ? 1 : 0, fake_gpio.open);
         TEST_ASSERT_EQUAL_INT((cases[i / 2U].error == 0) ? 1 : 0, fake_gpio.requested);
     }

@@ -25,6 +25,7 @@ void setUp(void) {
     facts.machine.lease_ms = 200;
     facts.machine.now.left.heard = true;
     facts.machine.now.right.heard = true;
+    facts.machine.estop_tried = true;
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "released");
     (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "active");
     (void)snprintf(facts.machine.timing, sizeof facts.machine.timing, "confirmed");
@@ -208,6 +209,13 @@ static void expect(ros_tells_t which, ros_level_t level, const char *part) {
     }
 }
 
+static void test_diagnosis_button_never_seen_to_work_is_a_warning(void) {
+    facts.machine.estop_tried = false;
+    expect(ROS_TELLS_ESTOP, ROS_WARN, "never seen to work");
+    facts.machine.estop_simulated = true;
+    expect(ROS_TELLS_ESTOP, ROS_OK, "released");
+}
+
 static void test_diagnosis_all_in_order_is_ok(void) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&facts, (ros_tells_t)i, &status);
@@ -303,6 +311,7 @@ int main(void) {
     RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
     RUN_TEST(test_configuration_stands_for_the_values_that_a_board_has_not);
     RUN_TEST(test_diagnosis_all_in_order_is_ok);
+    RUN_TEST(test_diagnosis_button_never_seen_to_work_is_a_warning);
     RUN_TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale);
     RUN_TEST(test_diagnosis_each_stop_has_its_sentence_and_cure);
     RUN_TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving);

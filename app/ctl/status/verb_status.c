@@ -72,8 +72,13 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     (void)snprintf(text, sizeof text, "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
                    text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
     paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
-    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s", is(button, "none") ? "NONE" : button,
-                   json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"));
+    char when[TEXT_CELL] = "never";
+    const json_t *tried = get(estop, "tried_wall_us");
+    if (json_is_integer(tried)) {
+        text_when(json_integer_value(tried), when);
+    }
+    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s; button tried: %s", is(button, "none") ? "NONE" : button,
+                   json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"), when);
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 

@@ -47,6 +47,9 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
     } else if (hal->estop_ops->simulated) {
         warn(wheels, "the e-stop %s is SIMULATED: no button of this machine stops the wheels", wheels->estop);
     }
+    if (wheels->estop_untried) {
+        warn(wheels, GW_ESTOP_UNTRIED, wheels->estop);
+    }
     if (left_behind) {
         gw_bus_left_sentence(iw_linux_hal_link(hal), wheels->bus.name, sentence, sizeof sentence);
         warn(wheels, "%s", sentence);
@@ -65,7 +68,7 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
 void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_behind) {
     const iw_bus_link_t *link = iw_linux_hal_link(&wheels->hal);
     const bool news = !self->known || link->changes != self->changes;
-    if (!news && left_behind == self->left_behind) {
+    if (!news && left_behind == self->left_behind && wheels->estop_untried == self->untried) {
         return;
     }
     if (news) {
@@ -78,6 +81,7 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
         gw_tape_facts(&wheels->tape, wheels->now_us, &facts);
     }
     self->left_behind = left_behind;
+    self->untried = wheels->estop_untried;
     note_warnings(wheels, left_behind);
 }
 

@@ -11,6 +11,7 @@ typedef struct gw_bus_facts {
     uint32_t changes; ///< Of the link, when last passed on.
     bool known;       ///< It has been passed on once.
     bool left_behind; ///< What was warned of.
+    bool untried;     ///< The same: nobody has seen the button of the e-stop work.
 } gw_bus_facts_t;
 
 /// Passes on what has changed since the last call: to the core and to the warnings. Call it before a step. `left_behind` as last

@@ -80,6 +80,23 @@ static void observe_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_
     *told = now;
 }
 
+/// Logged each time that the button becomes one that nobody has seen to work, as at the start.
+static void observe_button(gw_knowledge_t *self) {
+    gw_wheels_t *wheels = self->wheels;
+    const iw_estop_ops_t *kind = wheels->hal.estop_ops;
+    const gw_button_news_t news = gw_button_look(&self->button, &wheels->hal, wheels->now_us, &self->known.tried);
+    if (news != GW_BUTTON_NO_NEWS) {
+        self->changed = true;
+        gw_knowledge_tell_button(self, news);
+    }
+    wheels->estop_tried_us = self->known.tried.wall_us;
+    const bool untried = kind->present && !kind->simulated && self->known.tried.wall_us == 0;
+    if (untried && !wheels->estop_untried) {
+        gw_log(self->log, GW_LOG_WARNING, GW_ESTOP_UNTRIED, wheels->estop);
+    }
+    wheels->estop_untried = untried;
+}
+
 void gw_knowledge_observe(gw_knowledge_t *self, const iw_snapshot_t *seen) {
     if (!self->answered) {
         return;
@@ -92,6 +109,7 @@ void gw_knowledge_observe(gw_knowledge_t *self, const iw_snapshot_t *seen) {
     }
     observe_offset(self, IW_LEFT, seen->wheel[IW_LEFT].force);
     observe_offset(self, IW_RIGHT, seen->wheel[IW_RIGHT].force);
+    observe_button(self);
 }
 
 /// What an earlier run found is put beside what this one has found already, which is fresher.
@@ -140,6 +158,7 @@ static void merge(gw_knowledge_t *self, const gw_known_t *stored) {
     }
     merge_offset(self, IW_LEFT, &stored->offset[IW_LEFT]);
     merge_offset(self, IW_RIGHT, &stored->offset[IW_RIGHT]);
+    self->known.tried = stored->tried;
 }
 
 /// The first news: the file, or why there is none.

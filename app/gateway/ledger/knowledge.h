@@ -64,6 +64,7 @@ typedef struct gw_knowledge {
     const char *bus;
     gw_known_t known;
     gw_ledger_written_t written;
+    gw_button_t button; ///< Its first two members are set already.
     gw_told_offset_t told[IW_SIDES];
     iw_force_quality_t tare[IW_SIDES]; ///< Of the window of the last tare.
     gw_keeper_t keeper;
@@ -120,6 +121,9 @@ void gw_knowledge_tell_item(gw_knowledge_t *self, iw_ledger_item_t item);
 /// The offset in force has changed.
 void gw_knowledge_tell_offset(gw_knowledge_t *self, iw_side_t side, const gw_told_offset_t *now,
                               const gw_told_offset_t *before);
+
+/// The button was tried, or what was tried is another wiring.
+void gw_knowledge_tell_button(gw_knowledge_t *self, gw_button_news_t news);
 
 /// Where it is kept, or why not.
 void gw_knowledge_tell_memory(gw_knowledge_t *self);

@@ -122,3 +122,12 @@ void gw_knowledge_tell_ledger(gw_knowledge_t *self) {
         }
     }
 }
+
+void gw_knowledge_tell_button(gw_knowledge_t *self, gw_button_news_t news) {
+    const char *line = self->wheels->estop;
+    if (news == GW_BUTTON_TRIED) {
+        gw_log(self->log, GW_LOG_INFO, "e-stop %s: its button was pressed and released, it works", line);
+    } else {
+        gw_log(self->log, GW_LOG_WARNING, "e-stop %s: its wiring is not the one on which its button was tried", line);
+    }
+}

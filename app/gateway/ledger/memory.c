@@ -74,6 +74,11 @@ size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text,
         }
     }
     iwn_out_close(&json, '}');
+    if (known->tried.wall_us != 0) {
+        iwn_out_open(&json, "button", '{');
+        gw_tried_write(&known->tried, &json);
+        iwn_out_close(&json, '}');
+    }
     iwn_out_close(&json, '}');
     const size_t length = iwn_out_finish(&json);
     if (length == 0U) {
@@ -199,6 +204,12 @@ static bool read_all(iwn_json_t root, const char *field, gw_known_t *known,
     return true;
 }
 
+/// The button, if the line speaks of it.
+static bool read_button(iwn_json_t root, gw_tried_t *out_tried) {
+    iwn_json_t object;
+    return !iwn_json_find(root, "button", &object) || gw_tried_read(object, out_tried);
+}
+
 /// NULL, or what is wrong with the line.
 static const char *read_line(const char *text, size_t length, const char *bus, gw_known_t *known) {
     iwn_work_t work;
@@ -215,7 +226,8 @@ static const char *read_line(const char *text, size_t length, const char *bus, g
     if (!is_text(root, "bus", bus)) {
         return "it speaks of another bus";
     }
-    if (!read_all(root, "items", known, read_item) || !read_all(root, "offsets", known, read_offset)) {
+    if (!read_all(root, "items", known, read_item) || !read_all(root, "offsets", known, read_offset) ||
+        !read_button(root, &known->tried)) {
         return "it holds what no gateway has measured";
     }
     return NULL;

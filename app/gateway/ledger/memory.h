@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What is known of the wheels, as it is kept from one run of the gateway to the next: evidence of the ledger and force
-/// offsets, as text.
+/// What is known of the wheels, as it is kept from one run of the gateway to the next: evidence of the ledger, force
+/// offsets, and the e-stop's button, as text.
 ///
 /// The text is one line of JSON and one with its checksum. It names the bus it speaks of, and beside each piece of
 /// evidence the configured value for which it was found: evidence for another value is worth nothing. Whatever no run of
@@ -9,6 +9,7 @@
 #ifndef GATEWAY_MEMORY_H
 #define GATEWAY_MEMORY_H
 
+#include "button.h"
 #include "words/assumption.h"
 
 #include "iwheel/force_offset.h"
@@ -40,6 +41,7 @@ typedef struct {
 typedef struct {
     gw_known_item_t item[IW_LEDGER_ITEMS];
     gw_known_offset_t offset[IW_SIDES];
+    gw_tried_t tried; ///< The e-stop's button. Versions before 0.3 pass it over.
 } gw_known_t;
 
 /// Writes the text. Its length; 0 if it does not fit.

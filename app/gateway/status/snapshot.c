@@ -30,7 +30,8 @@ static iwn_estop_t estop_of(const gw_wheels_t *wheels) {
     return (iwn_estop_t){.line = wheels->estop,
                          .answer = wheels->hal.estop_last,
                          .present = kind->present,
-                         .simulated = kind->simulated};
+                         .simulated = kind->simulated,
+                         .tried_us = wheels->estop_tried_us};
 }
 
 static iwn_zero_note_t zero_of(const gw_known_offset_t *known) {

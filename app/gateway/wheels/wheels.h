@@ -17,6 +17,10 @@
 
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
+/// The warning about an e-stop line, by its name, whose button nobody has seen to work.
+#define GW_ESTOP_UNTRIED                                                                                               \
+    "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would go unseen; press " \
+    "it for a second, then release it"
 
 /// How regularly setpoint pairs leave: a histogram of the gaps between them, and the worst, since the gateway's start.
 ///
@@ -52,7 +56,9 @@ typedef struct gw_wheels {
     bool requested;       ///< A request has changed something since the last step.
     bool time_used;       ///< A request was carried out at `now_us` already.
     bool shutting_down;
-    uint32_t warnings; ///< What is wrong enough to be said at start, in `status` and with every arm.
+    bool estop_untried;     ///< Its button was never seen to work on this wiring; not before what was kept is read.
+    int64_t estop_tried_us; ///< When it was last, by the wall clock; 0: never.
+    uint32_t warnings;      ///< What is wrong enough to be said at start, in `status` and with every arm.
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
 } gw_wheels_t;
 

@@ -55,6 +55,7 @@ typedef struct {
     int answer;       ///< 0: released, 1: pressed, negative: unreadable.
     bool present;     ///< False: there is none.
     bool simulated;   ///< A simulator's button.
+    int64_t tried_us; ///< When its button was last seen pressed and released, by the wall clock; 0: never.
 } iwn_estop_t;
 
 /// Everything that a snapshot of the core does not have.

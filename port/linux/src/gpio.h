@@ -25,9 +25,10 @@ int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address);
 /// and gpio_v2.c; CMake takes the one that is installed.
 typedef struct {
     void *chip;
-    void *line;   ///< v1: the line; v2: the request.
-    void *events; ///< v2: where edges are read to.
-    int fd;       ///< Readable when there is an edge; -1: closed.
+    void *line;           ///< v1: the line; v2: the request.
+    void *events;         ///< v2: where edges are read to.
+    int fd;               ///< Readable when there is an edge; -1: closed.
+    iw_estop_seen_t seen; ///< What the line is called.
 } iw_gpio_line_t;
 
 /// Takes the line as input with pull-up and both edges. 0, or an errno, `*self` then closed: ENOENT no such line or

@@ -133,6 +133,11 @@ static int gpio_trouble(const void *self) {
     return ((const gpio_estop_t *)self)->trouble;
 }
 
+static const iw_estop_seen_t *gpio_seen(const void *self) {
+    const gpio_estop_t *estop = (const gpio_estop_t *)self;
+    return is_open(estop) ? &estop->line.seen : NULL;
+}
+
 int iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
     iw_gpio_address_t address;
     if (strncmp(name, "unix:", 5U) == 0) {
@@ -150,6 +155,7 @@ static const iw_estop_ops_t ops = {
     .next_us = gpio_next_us,
     .pressed = gpio_pressed,
     .trouble = gpio_trouble,
+    .seen = gpio_seen,
     .simulated = false,
     .present = true,
 };

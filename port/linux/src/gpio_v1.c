@@ -85,14 +85,13 @@ int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen
 }
 
 int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
-    iw_estop_seen_t seen;
     *self = (iw_gpio_line_t){.fd = -1};
-    struct gpiod_line *line = find_and_see(address, &seen);
+    struct gpiod_line *line = find_and_see(address, &self->seen);
     if (line == NULL) {
         return errno;
     }
     self->line = line;
-    if (!iw_gpio_is_expected(address, &seen)) {
+    if (!iw_gpio_is_expected(address, &self->seen)) {
         iw_gpio_line_close(self);
         return EREMCHG;
     }

@@ -144,13 +144,12 @@ int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen
 
 int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     unsigned offset = 0;
-    iw_estop_seen_t seen;
     *self = (iw_gpio_line_t){.fd = -1};
-    self->chip = find_and_see(address, &offset, &seen);
+    self->chip = find_and_see(address, &offset, &self->seen);
     if (self->chip == NULL) {
         return errno;
     }
-    if (!iw_gpio_is_expected(address, &seen)) {
+    if (!iw_gpio_is_expected(address, &self->seen)) {
         iw_gpio_line_close(self);
         return EREMCHG;
     }

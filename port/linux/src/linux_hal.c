@@ -86,3 +86,12 @@ const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self) {
 int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self) {
     return self->estop_ops->present ? self->estop_ops->trouble(&self->estop) : 0;
 }
+
+bool iw_linux_hal_estop_seen(const iw_linux_hal_t *self, iw_estop_seen_t *out_seen) {
+    const iw_estop_ops_t *kind = self->estop_ops;
+    const iw_estop_seen_t *seen = (kind->seen == NULL) ? NULL : kind->seen(&self->estop);
+    if (seen != NULL) {
+        *out_seen = *seen;
+    }
+    return seen != NULL;
+}

@@ -96,6 +96,8 @@ class EstopStatus(TypedDict):
     line: str
     state: EstopState
     simulated: bool
+    tried_wall_us: Optional[int]
+    """when its button was last seen pressed and released on this wiring; None: never"""
 
 
 class WheelValid(TypedDict):

@@ -301,6 +301,53 @@ def row14_line_names(t):
     t.judge(rig)
 
 
+@kernel_test("the button is untried until it was pressed and released; another name of its line makes it untried again", "estop", 13)
+def row13_button_tried(t):
+    rig = t.rig()
+
+    def untried(client):
+        status = client.request("status")
+        warned = any("never seen to work" in warning for warning in status["warnings"])
+        t.check(warned == (status["estop"]["tried_wall_us"] is None), f"warned of exactly while it is untried: {status['estop']}, {status['warnings']}")
+        return warned
+
+    def started():
+        rig.start_gateway()
+        client = rig.client()
+        rig.wait_status(client, lambda s: s["memory"]["state"] in ("new", "kept"), 3)
+        time.sleep(0.2)
+        return client
+
+    def ended(client):
+        client.close()
+        rig.gateway.end()
+
+    client = started()
+    t.check(untried(client), "nobody has pressed it yet")
+    reply = client.request("arm", name="tester")
+    t.check(reply["ok"] and any("never seen to work" in warning for warning in reply["warnings"]), f"arm warns: {reply}")
+    client.request("stop")
+    time.sleep(3)
+    rig.press()
+    time.sleep(0.3)
+    t.check(untried(client), "pressed is not yet tried")
+    rig.release()
+    time.sleep(1.5)
+    t.check(not untried(client), "pressed and released")
+    reset(t, client, 6.0)
+    time.sleep(1.5)
+    ended(client)
+    client = started()
+    t.check(not untried(client), "known after a restart")
+    ended(client)
+    rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
+    client = started()
+    t.check(untried(client), "its line is configured otherwise")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
 @kernel_test("an adapter without rights over the interface drives and stops as well", "estop", 11, SlcanRig)
 def row11_without_rights(t):
     rig = t.rig()

@@ -82,8 +82,10 @@ typedef struct {
     /// there are no edges to be read; the level always is.
     int (*pressed)(void *self, bool quiet);
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
-    bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
-    bool present;                     ///< False: there is no e-stop at all, always released.
+    /// What the kernel calls the line while it can be read, else NULL. The function is NULL if there is no such name.
+    const iw_estop_seen_t *(*seen)(const void *self);
+    bool simulated; ///< Not a real button: announced wherever the e-stop is shown.
+    bool present;   ///< False: there is no e-stop at all, always released.
 } iw_estop_ops_t;
 
 /// `unix:PATH`: the simulator's button.

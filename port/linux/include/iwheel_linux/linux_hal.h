@@ -52,6 +52,9 @@ iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self);
 /// What is known of the link to the bus; valid until the HAL is closed.
 const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self);
 
+/// What the kernel calls the e-stop's line. False if it cannot be read now, or has no such name.
+bool iw_linux_hal_estop_seen(const iw_linux_hal_t *self, iw_estop_seen_t *out_seen);
+
 /// Why the e-stop cannot be read, as an errno; 0 while it can.
 int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self);
 

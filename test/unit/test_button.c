@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+// Was the button of the e-stop ever seen to work? What counts as tried, what voids it, what is stored.
+#include "ledger/button.h"
+#include "ledger/memory.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+#define MS(value) ((iw_time_us_t)(value)*1000U)
+
+static iw_estop_seen_t seen;
+static bool readable;
+
+static const iw_estop_seen_t *fake_seen(const void *self) {
+    (void)self;
+    return readable ? &seen : NULL;
+}
+
+static iw_estop_ops_t ops;
+static iw_linux_hal_t hal;
+static gw_button_t button;
+static gw_tried_t tried;
+static iw_time_us_t now_us;
+
+void setUp(void) {
+    seen = (iw_estop_seen_t){"pinctrl-bcm2711", "GPIO4"};
+    readable = true;
+    ops = (iw_estop_ops_t){.seen = fake_seen, .present = true};
+    hal = (iw_linux_hal_t){.estop_ops = &ops};
+    button = (gw_button_t){.line = "ESTOP", .active_high = true};
+    memset(&tried, 0, sizeof tried);
+    now_us = MS(5000);
+}
+
+void tearDown(void) {}
+
+/// That answer for so long, looked at every 10 ms.
+static gw_button_news_t hold(int answer, unsigned for_ms) {
+    gw_button_news_t news = GW_BUTTON_NO_NEWS;
+    for (unsigned ms = 0; ms < for_ms; ms += 10U) {
+        hal.estop_last = answer;
+        const gw_button_news_t one = gw_button_look(&button, &hal, now_us, &tried);
+        news = (one != GW_BUTTON_NO_NEWS) ? one : news;
+        now_us += MS(10);
+    }
+    return news;
+}
+
+static void test_button_pressed_and_released_is_tried_on_this_wiring(void) {
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
+    TEST_ASSERT_TRUE(tried.wall_us > 0);
+    TEST_ASSERT_TRUE(tried.active_high);
+    TEST_ASSERT_EQUAL_STRING("ESTOP", tried.line);
+    TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", tried.seen.chip);
+    TEST_ASSERT_EQUAL_STRING("GPIO4", tried.seen.line);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
+}
+
+static void test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise(void) {
+    (void)hold(0, 10);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 40));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 50));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
+}
+
+static void test_button_pressed_at_the_start_shows_nothing(void) {
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+}
+
+static void test_button_unreadable_or_gone_breaks_the_press(void) {
+    (void)hold(0, 10);
+    (void)hold(1, 1000);
+    (void)hold(-1, 10);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    (void)hold(1, 1000);
+    readable = false;
+    (void)hold(1, 10);
+    readable = true;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+}
+
+static void press(void) {
+    (void)hold(0, 10);
+    (void)hold(1, 1000);
+    (void)hold(0, 10);
+}
+
+static void test_button_that_is_simulated_or_absent_is_never_tried(void) {
+    ops.simulated = true;
+    press();
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    ops.simulated = false;
+    ops.present = false;
+    press();
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    ops.present = true;
+    ops.seen = NULL;
+    press();
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+}
+
+static void test_button_of_any_other_wiring_is_void(void) {
+    for (unsigned change = 0; change < 4U; change++) {
+        setUp();
+        press();
+        TEST_ASSERT_TRUE(tried.wall_us > 0);
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+        button.line = (change == 0U) ? "gpiochip0:4" : button.line;
+        button.active_high = (change == 1U) ? false : button.active_high;
+        (void)snprintf(seen.chip, sizeof seen.chip, "%s", (change == 2U) ? "gpio-sim" : "pinctrl-bcm2711");
+        (void)snprintf(seen.line, sizeof seen.line, "%s", (change == 3U) ? "GPIO5" : "GPIO4");
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold(0, 10));
+        TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    }
+}
+
+static void test_button_whose_line_cannot_be_read_is_not_void(void) {
+    press();
+    const int64_t before = tried.wall_us;
+    readable = false;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(-1, 100));
+    TEST_ASSERT_EQUAL_INT64(before, tried.wall_us);
+}
+
+static bool stored_is_read(const gw_known_t *known, gw_known_t *out_known) {
+    static char text[GW_MEMORY_SIZE];
+    char reason[GW_MEMORY_REASON_SIZE];
+    const size_t length = gw_memory_write(known, "can0", text, sizeof text);
+    return length > 0U && gw_memory_read(text, length, "can0", out_known, reason);
+}
+
+static void test_button_is_stored_and_read_back(void) {
+    static gw_known_t known;
+    static gw_known_t got;
+    memset(&known, 0, sizeof known);
+    known.tried = (gw_tried_t){.wall_us = 1, .active_high = true};
+    memset(known.tried.line, 'l', sizeof known.tried.line - 1U);
+    memset(known.tried.seen.chip, 'c', sizeof known.tried.seen.chip - 1U);
+    memset(known.tried.seen.line, 'n', sizeof known.tried.seen.line - 1U);
+    TEST_ASSERT_TRUE(stored_is_read(&known, &got));
+    TEST_ASSERT_EQUAL_MEMORY(&known.tried, &got.tried, sizeof got.tried);
+    known.tried.active_high = false;
+    TEST_ASSERT_TRUE(stored_is_read(&known, &got));
+    TEST_ASSERT_FALSE(got.tried.active_high);
+    memset(&known, 0, sizeof known);
+    TEST_ASSERT_TRUE(stored_is_read(&known, &got));
+    TEST_ASSERT_EQUAL_INT64(0, got.tried.wall_us);
+    known.tried.wall_us = -1;
+    TEST_ASSERT_FALSE(stored_is_read(&known, &got));
+}
+
+/// Each member is needed, of its own kind.
+static void test_button_stored_wrongly_is_refused(void) {
+    static const char *const members[] = {
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
+        "{\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
+        "{\"line\":\"a\",\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
+        "{\"line\":\"a\",\"active_high\":1,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip_line\":\"c\",\"wall_us\":7}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"wall_us\":7}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\"}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":0}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7.5}",
+    };
+    for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
+        iwn_work_t work;
+        char why[128];
+        iwn_text_t reason = iwn_text_begin(why, sizeof why);
+        iwn_json_t root;
+        gw_tried_t got;
+        TEST_ASSERT_TRUE(iwn_json_check(members[i], strlen(members[i]), &work, &root, &reason));
+        TEST_ASSERT_EQUAL_MESSAGE(i == 0U, gw_tried_read(root, &got), members[i]);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_button_pressed_and_released_is_tried_on_this_wiring);
+    RUN_TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise);
+    RUN_TEST(test_button_pressed_at_the_start_shows_nothing);
+    RUN_TEST(test_button_unreadable_or_gone_breaks_the_press);
+    RUN_TEST(test_button_that_is_simulated_or_absent_is_never_tried);
+    RUN_TEST(test_button_of_any_other_wiring_is_void);
+    RUN_TEST(test_button_whose_line_cannot_be_read_is_not_void);
+    RUN_TEST(test_button_is_stored_and_read_back);
+    RUN_TEST(test_button_stored_wrongly_is_refused);
+    return UNITY_END();
+}
