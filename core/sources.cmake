@@ -17,6 +17,7 @@ set(IWHEEL_CORE_SOURCES
     src/ledger.c
     src/permit.c
     src/permit_refuse.c
+    src/rolling.c
     src/sender.c
     src/setpoint.c
     src/snapshot.c

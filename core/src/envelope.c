@@ -102,8 +102,8 @@ static uint32_t turn_of(const iw_config_t *config, int32_t left_mm_s, int32_t ri
     return (uint32_t)iw_magnitude(right - left);
 }
 
-/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A pair
-/// that turns no more than the last one passes, as every stop does.
+/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A
+/// pair that turns no more than the last one passes, as every stop does.
 static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t turn_mm_s) {
     const iw_config_t *const config = self->config;
     const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;

@@ -40,10 +40,15 @@ static void prepare(iw_sender_t *self, iw_side_t side, const iw_command_t *comma
 /// The pair together, then each frame. False, with the reason in `verdict`, if the envelope stops one of them.
 static bool is_within(iw_sender_t *self, iw_time_us_t now_us) {
     iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
-    for (size_t side = 0; side < IW_SIDES && verdict == IW_ENVELOPE_PASS; side++) {
-        verdict = iw_envelope_check(&self->envelope, &self->frame[side], now_us);
+    if (verdict == IW_ENVELOPE_PASS) {
+        verdict = iw_envelope_check(&self->envelope, &self->frame[IW_LEFT], now_us);
     }
-    self->verdict = (verdict == IW_ENVELOPE_PASS) ? self->verdict : verdict;
+    if (verdict == IW_ENVELOPE_PASS) {
+        verdict = iw_envelope_check(&self->envelope, &self->frame[IW_RIGHT], now_us);
+    }
+    if (verdict != IW_ENVELOPE_PASS) {
+        self->verdict = verdict;
+    }
     return verdict == IW_ENVELOPE_PASS;
 }
 

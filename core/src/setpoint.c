@@ -171,9 +171,9 @@ static IW_APART void cut_step(axis_t *axes, size_t count, bool braking, uint32_t
     }
 }
 
-/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that become
-/// faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so it gets
-/// there.
+/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
+/// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
+/// it gets there.
 static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));

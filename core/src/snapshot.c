@@ -107,5 +107,7 @@ void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snaps
     out_snapshot->pair_largest_mm = self->diverge.largest_um / 1000;
     out_snapshot->bus = self->bus;
     out_snapshot->echo_proven = self->facts.echo_proven;
+    out_snapshot->rolling = self->rolling.rolling;
+    out_snapshot->rolling_fault = self->rolling.is_fault;
     out_snapshot->left_behind = self->left_behind;
 }

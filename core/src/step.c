@@ -306,6 +306,18 @@ static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     }
 }
 
+static bool turns(const iw_gateway_t *self, iw_side_t side) {
+    const iw_wheel_t *const wheel = &self->wheel[side];
+    return iw_magnitude(wheel->speed_mm_s) > IW_ROLLING_MM_S && iw_wheel_heard(wheel, self->now_us);
+}
+
+/// A machine that rolls away, or is pushed by hand. Not while setpoints are sent: a zero is a command too, and wheels
+/// that brake still turn.
+static IW_APART void watch_rolling(iw_gateway_t *self) {
+    const bool alone = self->setpoint.demand == IW_DEMAND_SILENCE;
+    iw_rolling_step(&self->rolling, self->now_us, alone && (turns(self, IW_LEFT) || turns(self, IW_RIGHT)));
+}
+
 /// How long both wheels have been at rest; 0: one turns, or is not heard.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
     const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], self->now_us);
@@ -333,6 +345,7 @@ static void judge_wheels(iw_gateway_t *self) {
         watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
         watch_wheel(self, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
         iw_watch_pair(self, heard);
+        watch_rolling(self);
     }
     view->heard = heard;
     view->applied = applied;
@@ -395,6 +408,7 @@ static void send_due(iw_gateway_t *self) {
         keep_silent(self);
         return;
     }
+    self->rolling.setpoint_us = self->now_us;
     // Nothing is left behind either: arm was refused until it was gone.
     self->purged_us = IW_NEVER;
     if (self->bus >= IW_BUS_PASSIVE && send_pair(self) == IW_SEND_STOPPED) {

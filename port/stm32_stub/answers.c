@@ -7,6 +7,9 @@
 /// A software e-stop that is in force is not put in force again within this time: a flood of it costs no step.
 #define ESTOP_AGAIN_US 200000U
 
+static const char ALL_WAIT[] =
+    "the answers to other requests still wait, and there is no place for this one; try again";
+
 static void send_refusal(iw_host_t *self, iw_host_client_t *client) {
     iw_host_send_refusal(self, client, &self->request.id);
 }
@@ -66,8 +69,12 @@ static void do_status(iw_host_t *self, iw_host_client_t *client) {
         REFUSE(self, client, IWN_BUSY, "the answer to an earlier status still waits for the serial line; wait for it");
         return;
     }
+    if (!iw_pending_has_room(&self->pending, client->id, IWN_CMD_STATUS)) {
+        REFUSE(self, client, IWN_BUSY, ALL_WAIT);
+        return;
+    }
     client->owed_status = true;
-    client->status_id = self->request.id;
+    iw_pending_put(&self->pending, client->id, IWN_CMD_STATUS, &self->request.id);
 }
 
 static void do_watch(iw_host_t *self, iw_host_client_t *client) {
@@ -86,6 +93,10 @@ static void do_arm(iw_host_t *self, iw_host_client_t *client) {
         REFUSE(self, client, IWN_DENIED, "a configuration was committed: the gateway starts anew with it, then arm");
         return;
     }
+    if (!iw_pending_has_room(&self->pending, client->id, IWN_CMD_ARM)) {
+        REFUSE(self, client, IWN_BUSY, ALL_WAIT);
+        return;
+    }
     const iw_refusal_t refusal = iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
@@ -95,18 +106,19 @@ static void do_arm(iw_host_t *self, iw_host_client_t *client) {
         memcpy(client->name, self->request.name, sizeof client->name);
     }
     client->arming = true;
-    client->arm_id = self->request.id;
+    iw_pending_put(&self->pending, client->id, IWN_CMD_ARM, &self->request.id);
 }
 
 void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen) {
+    const iwn_id_t *const id = iw_pending_take(&self->pending, client->id, IWN_CMD_ARM);
     if (seen->holder == client->id && seen->state == IW_STATE_ARMED) {
         const iwn_surroundings_t around = iw_host_around(self, seen);
-        iwn_out_t json = iw_host_begin_reply(self, &client->arm_id);
+        iwn_out_t json = iw_host_begin_reply(self, id);
         iwn_tell_terms(seen, &around, &json);
         iw_host_send_reply(self, client, &json);
         return;
     }
-    self->request = (iwn_request_t){.cmd = IWN_CMD_ARM, .id = client->arm_id};
+    self->request = (iwn_request_t){.cmd = IWN_CMD_ARM, .id = *id};
     iw_answer_refuse(self, client, (seen->arm_refusal == IW_REFUSE_NONE) ? IW_REFUSE_NOT_ARMED : seen->arm_refusal);
 }
 

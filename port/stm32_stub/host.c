@@ -70,6 +70,7 @@ static void end_client(iw_host_t *self, iw_host_client_t *client) {
     if (client->id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->place.gateway, self->now_us, client->id);
         iw_observe(self, iw_host_look(self));
+        iw_pending_forget(&self->pending, client->id);
         memset(client, 0, sizeof *client);
     }
 }
@@ -305,7 +306,8 @@ static void pay(iw_host_t *self, const iw_snapshot_t *seen) {
         bool *const owed = reply ? &client->owed_status : &client->owed_state;
         if (client->id != IW_CLIENT_NONE && *owed) {
             *owed = false;
-            iw_host_send_status(self, client, seen, reply ? &client->status_id : NULL);
+            const iwn_id_t *const id = reply ? iw_pending_take(&self->pending, client->id, IWN_CMD_STATUS) : NULL;
+            iw_host_send_status(self, client, seen, id);
             self->next_owed = (uint8_t)(client - self->client + 1);
             return;
         }

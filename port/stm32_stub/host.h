@@ -17,6 +17,7 @@
 #define IW_STM32_HOST_H
 
 #include "learnt.h"
+#include "pending.h"
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
@@ -24,7 +25,7 @@
 #include "iwheel_northbound/tell.h"
 
 /// The longest line to the host, with its newline: told by the event link.
-#define IW_HOST_LINE_BYTES 4608U
+#define IW_HOST_LINE_BYTES 4480U
 /// The longest line but a snapshot's.
 #define IW_HOST_SMALL_BYTES 1664U
 /// What events leave free of the line, for replies.
@@ -54,8 +55,6 @@ typedef struct {
     uint64_t seq;     ///< Of its newest command.
     iw_time_us_t opened_us;
     iw_time_us_t next_us; ///< When state and force are due.
-    iwn_id_t arm_id;
-    iwn_id_t status_id;
     char name[IWN_NAME_MAX + 1U];
 } iw_host_client_t;
 
@@ -80,6 +79,8 @@ typedef struct {
     uint32_t assumed_changes;
     uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
     bool left_behind;
+    bool rolling;
+    bool rolling_fault;
     bool estop_high;
     bool started;
     char holder_name[IWN_NAME_MAX + 1U];
@@ -101,6 +102,7 @@ typedef struct {
 typedef struct {
     iw_host_place_t place;
     iw_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
+    iw_pending_t pending;                       ///< Answers of theirs that wait.
     iwn_receiver_t receiver;
     char in[IWN_LINE_BOARD_MAX];
     iw_time_us_t now_us;

@@ -54,6 +54,19 @@ static void observe_faults(iw_host_t *self, const iw_snapshot_t *seen) {
     }
 }
 
+static void observe_rolling(iw_host_t *self, const iw_snapshot_t *seen) {
+    if (seen->rolling != self->told.rolling) {
+        self->told.rolling = seen->rolling;
+        iwn_out_t json = begin(self, "rolling");
+        iwn_out_bool(&json, "present", seen->rolling);
+        iw_host_send_event(self, IWN_TOPIC_STOP, &json);
+    }
+    if (seen->rolling_fault != self->told.rolling_fault) {
+        self->told.rolling_fault = seen->rolling_fault;
+        tell_fault(self, "rolling", seen->rolling_fault);
+    }
+}
+
 /// Who asked for it or held the lease, while that is still known.
 static const char *note_client(iw_host_t *self) {
     iwn_stop_note_t *const note = &self->stop;
@@ -155,6 +168,7 @@ void iw_observe(iw_host_t *self, const iw_snapshot_t *seen) {
     observe_bus(self, seen, first);
     observe_estop(self, first);
     observe_faults(self, seen);
+    observe_rolling(self, seen);
     observe_stop(self, seen);
     observe_lease(self, seen);
     observe_state(self, seen, first);

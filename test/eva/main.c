@@ -127,6 +127,9 @@ static void any_config(iw_config_t *out_config) {
     out_config->pair_mm = any_within(IW_CONFIG_PAIR);
     out_config->pair_leak_ms = any_within(IW_CONFIG_PAIR_LEAK);
     out_config->wheel_lag_ms = any_within(IW_CONFIG_WHEEL_LAG);
+    out_config->max_yaw_mrad_s = any_within(IW_CONFIG_MAX_YAW);
+    out_config->yaw_accel_mrad_s2 = any_within(IW_CONFIG_YAW_ACCEL);
+    out_config->track_mm = any_within(IW_CONFIG_TRACK);
     out_config->radius_mm = any_within(IW_CONFIG_RADIUS);
     any_gear(out_config);
     out_config->setpoint_dlc = any_within(IW_CONFIG_SETPOINT_DLC);

@@ -12,7 +12,7 @@ TARGET, PORT = ROOT / "test/target", ROOT / "port/stm32_stub"
 DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
 IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "startup.c", "watchdog.c")
 ALONE_FILES = ("commander.c", "console.c", "report.c")
-GATEWAY_FILES = ("answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c", "kept.c", "learnt.c", "observe.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c")
+GATEWAY_FILES = ("answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c", "kept.c", "learnt.c", "observe.c", "pending.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c")
 
 
 def run(command):

@@ -53,6 +53,7 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     }
     self->late_us = now_us;
     self->ramp_us = self->foreign_us = self->nonzero_drive_us = self->refused_us = self->silent_us = IW_NEVER;
+    self->turning_us = self->turned_us = self->setpoint_us = IW_NEVER;
     self->stops = gateway->permit.stop.number;
     self->bus_bad_us = now_us;
     for (size_t side = 0; side < IW_SIDES; side++) {

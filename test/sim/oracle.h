@@ -74,6 +74,10 @@ typedef struct {
     iw_time_us_t turn_us;   ///< When both wheels were handed a setpoint.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
+    bool rolling_fault;
+    iw_time_us_t turning_us;  ///< Since when a wheel turns although nothing is sent; IW_NEVER: none does.
+    iw_time_us_t turned_us;   ///< When a wheel turned last; IW_NEVER: never.
+    iw_time_us_t setpoint_us; ///< When setpoints were last due; IW_NEVER: never.
 
     int estop;
     iw_bus_state_t bus;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// What the parts of the oracle share: what it sees and what follows (oracle.c), requests (oracle_requests.c),
-/// limits of current (oracle_currents.c).
+/// limits of current (oracle_currents.c), wheels that roll (oracle_rolling.c).
 #ifndef SIM_TEST_ORACLE_PARTS_H
 #define SIM_TEST_ORACLE_PARTS_H
 
@@ -35,6 +35,9 @@ void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
 
 /// Both wheels were heard, and stood for that long.
 bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us);
+
+/// Wheels that roll, against what the gateway tells of them.
+void oracle_judge_rolling(oracle_t *self, iw_time_us_t now_us);
 
 /// A current that is a limit, before the wheel's own record of it; the answer to a drive.
 void oracle_judge_limit(oracle_t *self, iw_time_us_t now_us, size_t side, const iw_command_t *command);

@@ -247,6 +247,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     judge_pair(self, now_us);
     oracle_judge_turn(self, now_us);
     judge_estop_zero(self, now_us, before);
+    oracle_judge_rolling(self, now_us);
     self->step_us = now_us;
     self->timing_bad = self->gateway->facts.timing_contradicted;
 }

@@ -283,6 +283,8 @@ class Rig:
             setpoint_type=wheels["setpoint_type"],
             role=wheels["current_role"],
             dlc=wheels.get("setpoint_dlc", 5),
+            track_mm=wheels.get("track_mm", 540),
+            radius_mm=wheels.get("radius_mm", 192),
             invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")),
             **values,
         )

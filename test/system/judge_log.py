@@ -61,6 +61,9 @@ class Config(NamedTuple):
     accel_mm_s2: int = 800
     decel_mm_s2: int = 1500
     max_speed_mm_s: int = 1000
+    max_yaw_mrad_s: int = 1000
+    track_mm: int = 540
+    radius_mm: int = 192
     max_current_mA: int = 2000
     zero_hold_ms: int = 1500
     invert: tuple = (False, False)
@@ -195,6 +198,16 @@ class Reading:
         zero = speed == 0 and (config.role == "limit" or current == 0)
         speed = -speed if config.invert[side] else speed
         self.setpoints.append(Setpoint(frame.t_us, side, speed, current, zero))
+        self._read_turn()
+
+    def _read_turn(self):
+        """The right wheel's setpoint completes a pair, which turns the real machine. A wheel takes its radius to be 192 mm."""
+        config, (left, right) = self.config, self.setpoints[-2:] if len(self.setpoints) > 1 else (None, None)
+        if left is None or (left.side, right.side) != (0, 1) or right.t_us - left.t_us > PAIR_US:
+            return
+        yaw_mrad_s = abs(right.speed - left.speed) * 1000 * config.radius_mm / 192 / config.track_mm
+        if yaw_mrad_s > config.max_yaw_mrad_s:
+            self._say("yaw", right.t_us, f"{left.speed} and {right.speed} mm/s turn by {yaw_mrad_s:.0f} mrad/s, {config.max_yaw_mrad_s} allowed")
 
     def _sessions(self):
         sessions, current = [], None

@@ -178,6 +178,7 @@ def faults():
     yield "eight bytes", between(f, 2_000, 2_020, lambda x: x._replace(data=x.data.ljust(8, b"\0"))), e, "dlc"
     yield "too fast", between(f, 2_300, 2_320, with_data(1, 1200)), e, "speed"
     yield "too fast backwards", between(f, 2_300, 2_320, with_data(1, -32768)), e, "speed"
+    yield "a turn too fast", between(f, 2_300, 2_320, only(1, with_data(1, -300))), e, "yaw"
     yield "too much current", between(f, 2_300, 2_320, with_data(3, 2001)), e, "current"
     yield "too much negative current", between(f, 2_300, 2_320, with_data(3, -2001)), e, "current"
     steep = good(CONFIG._replace(accel_mm_s2=1000))

@@ -39,10 +39,10 @@ class Rig:
         kind = re.sub(r"^.*-", "", Path(elf).stem)
         self.machine = Machine(BOARDS[board_name](**scenarios.WIRING.get(kind, {})), image)
         self.machine.uart.baud = scenarios.BAUD.get(kind, self.machine.uart.baud)
-        self.stack_limit = scenarios.STACK.get(kind, 1024)
         if oscillator is not None:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
         self.addresses, self.stack_area, self.elf = symbols.addresses(elf), symbols.stack_area(elf), elf
+        self.stack_limit = self.stack_area[1] - self.stack_area[0] - scenarios.STACK_SPARE
         self.notes, self.expected_resets = [], []
         self.begun = None # See beginnings.py.
 

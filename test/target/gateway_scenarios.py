@@ -47,7 +47,7 @@ def start_driving(rig, span_ms=400):
 def talks(rig):
     """Every request has its answer, a stream of commands drives, and stop ends it."""
     host = start(rig)
-    assert host.line_bytes == 4608 and len(host.boot) == 16
+    assert host.line_bytes == 4480 and len(host.boot) == 16
     hello = host.ask(1, {"cmd": "hello"})
     assert (hello["state"], hello["client"], hello["rights"]) == ("listening", 1, "drive"), hello
     status = host.ask(1, {"cmd": "status"})

@@ -115,6 +115,86 @@ static void test_channel_closed_leaves_the_others(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
+/// `count` requests for a snapshot on as many channels, from `first` on, in one batch: nothing is told between them.
+static void ask_for_status(unsigned first, unsigned count) {
+    char json[64];
+    for (unsigned channel = first; channel < first + count; channel++) {
+        (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":true}", channel);
+        say(0, json);
+        (void)snprintf(json, sizeof json, "{\"cmd\":\"status\",\"id\":%u}", 100U + channel);
+        say((uint8_t)channel, json);
+    }
+}
+
+static void assert_told(const char *part) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, part), part);
+}
+
+static void test_answers_that_wait_leave_a_place_for_an_arm(void) {
+    run_until_listening();
+    say(0, "{\"cmd\":\"alive\"}");
+    gateway_judge_renew(&rig.judge);
+    all_length = 0;
+    ask_for_status(2, 4);
+    say(1, "{\"cmd\":\"arm\",\"id\":99}");
+    run_ms(60);
+    assert_told("\"id\":102,\"ok\":true");
+    assert_told("\"id\":103,\"ok\":true");
+    assert_told("\"id\":104,\"ok\":true");
+    assert_told("\"id\":105,\"ok\":false,\"error\":\"busy\"");
+    assert_told("\"id\":99,\"ok\":true");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    assert_answer("{\"cmd\":\"status\",\"id\":7}", "\"id\":7,\"ok\":true"); // Places become free again.
+}
+
+static void test_answer_that_waits_for_a_closed_channel_frees_its_place(void) {
+    all_length = 0;
+    ask_for_status(2, 3);
+    say(0, "{\"cmd\":\"close\",\"channel\":3}");
+    say(1, "{\"cmd\":\"status\",\"id\":7}");
+    run_ms(60);
+    assert_told("\"id\":102,\"ok\":true");
+    assert_told("\"id\":104,\"ok\":true");
+    assert_told("\"id\":7,\"ok\":true");
+    TEST_ASSERT_NULL(strstr(all, "\"id\":103"));
+}
+
+static void test_pending_place_is_of_one_client_and_one_request(void) {
+    static iw_pending_t pool;
+    const iwn_id_t one = {.kind = IWN_ID_NUMBER, .number = 1};
+    const iwn_id_t two = {.kind = IWN_ID_NUMBER, .number = 2};
+    memset(&pool, 0, sizeof pool);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
+    iw_pending_put(&pool, 5, IWN_CMD_ARM, &one);
+    iw_pending_put(&pool, 5, IWN_CMD_STATUS, &two);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 6, IWN_CMD_ARM)->kind);
+    iw_pending_put(&pool, 5, IWN_CMD_ARM, &two);
+    TEST_ASSERT_EQUAL_INT64(2, iw_pending_take(&pool, 5, IWN_CMD_ARM)->number);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
+    TEST_ASSERT_EQUAL_INT64(2, iw_pending_take(&pool, 5, IWN_CMD_STATUS)->number);
+}
+
+static void test_pending_pool_that_is_full_refuses_all_but_who_waits_already(void) {
+    static iw_pending_t pool;
+    const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 1};
+    memset(&pool, 0, sizeof pool);
+    for (iw_client_t client = 1; client < IW_PENDING_MAX; client++) {
+        TEST_ASSERT_TRUE(iw_pending_has_room(&pool, client, IWN_CMD_STATUS));
+        iw_pending_put(&pool, client, IWN_CMD_STATUS, &id);
+    }
+    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 9, IWN_CMD_STATUS));
+    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 1, IWN_CMD_STATUS));
+    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 9, IWN_CMD_ARM));
+    iw_pending_put(&pool, 9, IWN_CMD_STATUS, &id); // Nothing is pushed out.
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 9, IWN_CMD_STATUS)->kind);
+    iw_pending_put(&pool, 9, IWN_CMD_ARM, &id);
+    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
+    iw_pending_forget(&pool, 2);
+    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
+    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 1, IWN_CMD_STATUS)->number);
+    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 3, IWN_CMD_STATUS)->number);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_channel_opened_again_has_no_lease);
@@ -126,5 +206,9 @@ int main(void) {
     RUN_TEST(test_channel_that_only_watches_may_not_arm);
     RUN_TEST(test_channel_closed_leaves_the_others);
     RUN_TEST(test_flash_is_not_written_while_an_arm_waits);
+    RUN_TEST(test_answers_that_wait_leave_a_place_for_an_arm);
+    RUN_TEST(test_answer_that_waits_for_a_closed_channel_frees_its_place);
+    RUN_TEST(test_pending_place_is_of_one_client_and_one_request);
+    RUN_TEST(test_pending_pool_that_is_full_refuses_all_but_who_waits_already);
     return UNITY_END();
 }

@@ -355,8 +355,54 @@ static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
     TEST_ASSERT_NULL(strstr(told + strlen("\"cause\":\"still_moving"), "still_moving"));
 }
 
+/// Shows the daemon a gateway whose wheels roll, or not, and counts what a watcher is told of it.
+static unsigned count_told(bool rolling, bool is_fault, const char *words) {
+    static char text[8192];
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    seen.rolling = rolling;
+    seen.rolling_fault = is_fault;
+    gw_observe(&daemon->status, &seen);
+    gw_observe(&daemon->status, &seen);
+    gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(size > 0) ? size : 0] = '\0';
+    unsigned count = 0;
+    for (const char *at = strstr(text, words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
+static void test_rolling_is_told_when_it_begins_and_when_it_ends(void) {
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
+    TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"present\":true}"));
+    TEST_ASSERT_EQUAL_UINT(0, count_told(true, false, "rolling"));
+    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"event\":\"rolling\","));
+    TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"event\":\"rolling\","));
+    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"present\":false}"));
+}
+
+static void test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute(void) {
+    static const char *const fault = "\"cause\":\"rolling\"";
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
+    TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"rolling\",\"present\":false}"));
+    daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_UINT(0, count_told(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_told(false, false, fault));
+    daemon_rig_run(58990);
+    TEST_ASSERT_EQUAL_UINT(0, count_told(true, true, fault));
+    TEST_ASSERT_EQUAL_UINT(0, count_told(false, false, fault));
+    daemon_rig_run(20);
+    TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, "\"cause\":\"rolling\",\"present\":true}"));
+    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, fault));
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_rolling_is_told_when_it_begins_and_when_it_ends);
+    RUN_TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute);
     RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
     RUN_TEST(test_current_reaches_the_wheel_it_is_for);
     RUN_TEST(test_twist_to_the_left_turns_the_right_wheel_faster);

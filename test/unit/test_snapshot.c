@@ -22,13 +22,14 @@ typedef struct {
 
 /// Every field, in the order of the struct.
 static const place_t places[] = {
-    PLACE(at_us),        PLACE(config),       PLACE(counters),        PLACE(sent),           PLACE(stop),
-    PLACE(assumed),      PLACE(seen_us),      PLACES_OF_WHEEL(0),     PLACES_OF_WHEEL(1),    PLACE(stopped),
-    PLACE(stray_echoes), PLACE(pose_us),      PLACE(armed_us),        PLACE(lease_until_us), PLACE(stale_us),
-    PLACE(waiting_us),   PLACE(confirmed_us), PLACE(holder),          PLACE(stale_client),   PLACE(target),
-    PLACE(applied),      PLACE(present),      PLACE(assumed_changes), PLACE(pair_mm),        PLACE(pair_largest_mm),
-    PLACE(still_moving), PLACE(state),        PLACE(arm_refusal),     PLACE(demand),         PLACE(bus),
-    PLACE(doubt),        PLACE(arming),       PLACE(output_zero),     PLACE(echo_proven),    PLACE(left_behind),
+    PLACE(at_us),         PLACE(config),       PLACE(counters),        PLACE(sent),           PLACE(stop),
+    PLACE(assumed),       PLACE(seen_us),      PLACES_OF_WHEEL(0),     PLACES_OF_WHEEL(1),    PLACE(stopped),
+    PLACE(stray_echoes),  PLACE(pose_us),      PLACE(armed_us),        PLACE(lease_until_us), PLACE(stale_us),
+    PLACE(waiting_us),    PLACE(confirmed_us), PLACE(holder),          PLACE(stale_client),   PLACE(target),
+    PLACE(applied),       PLACE(present),      PLACE(assumed_changes), PLACE(pair_mm),        PLACE(pair_largest_mm),
+    PLACE(still_moving),  PLACE(state),        PLACE(arm_refusal),     PLACE(demand),         PLACE(bus),
+    PLACE(doubt),         PLACE(arming),       PLACE(output_zero),     PLACE(echo_proven),    PLACE(rolling),
+    PLACE(rolling_fault), PLACE(left_behind),
 };
 #define PLACES (sizeof places / sizeof places[0])
 
@@ -358,6 +359,7 @@ static void test_snapshot_every_count_of_sending_is_its_own(void) {
     rig.gateway.permit.still_moving = 105;
     rig.gateway.diverge.path_um = -1006999;
     rig.gateway.diverge.largest_um = 1006999;
+    rig.gateway.rolling.rolling = true;
     const iw_snapshot_t seen = look();
     TEST_ASSERT_EQUAL_UINT32(101, seen.sent->later);
     TEST_ASSERT_EQUAL_UINT32(102, seen.sent->clamped);
@@ -366,6 +368,12 @@ static void test_snapshot_every_count_of_sending_is_its_own(void) {
     TEST_ASSERT_EQUAL_UINT32(105, seen.still_moving);
     TEST_ASSERT_EQUAL_INT32(-1006, seen.pair_mm);
     TEST_ASSERT_EQUAL_INT32(1006, seen.pair_largest_mm);
+    TEST_ASSERT_TRUE(seen.rolling);
+    TEST_ASSERT_FALSE(seen.rolling_fault);
+    rig.gateway.rolling.rolling = false;
+    rig.gateway.rolling.is_fault = true;
+    TEST_ASSERT_TRUE(look().rolling_fault);
+    TEST_ASSERT_FALSE(look().rolling);
 }
 
 int main(void) {

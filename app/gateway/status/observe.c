@@ -19,6 +19,8 @@
 
 /// A wheel that has power is received within this time.
 #define FIRST_TELEMETRY_US 1000000U
+/// Of rolling at most one fault is reported in this time: clients store faults, and people push a walker by hand.
+#define ROLLING_FAULT_US 60000000U
 
 static iwn_out_t begin_event(gw_status_t *self, const char *name) {
     iwn_out_t json = gw_clients_begin_event(self->clients, name);
@@ -174,6 +176,29 @@ static void tell_ailment(gw_status_t *self, const iw_snapshot_t *seen, const gw_
     }
 }
 
+static void observe_rolling(gw_status_t *self, bool rolling) {
+    if (rolling == self->observed.rolling) {
+        return;
+    }
+    self->observed.rolling = rolling;
+    gw_log(self->log, GW_LOG_INFO, "%s",
+           rolling ? "rolling: a wheel turns although nothing is sent to it" : "rolling: no longer");
+    iwn_out_t json = begin_event(self, "rolling");
+    iwn_out_bool(&json, "present", rolling);
+    gw_clients_send_event(self->clients, &json, IWN_TOPIC_STOP);
+}
+
+/// Whether a fault of rolling is reported, or its end: not one that begins too soon after the last one.
+static bool take_rolling_fault(gw_observed_t *observed, bool is_fault, iw_time_us_t now_us) {
+    const bool again = observed->rolling_us != 0U && now_us - observed->rolling_us < ROLLING_FAULT_US;
+    if (is_fault == observed->rolling_fault || (is_fault && again)) {
+        return false;
+    }
+    observed->rolling_fault = is_fault;
+    observed->rolling_us = is_fault ? now_us : observed->rolling_us;
+    return true;
+}
+
 /// While armed or stopping a cause makes a stop, which is reported as such; these are the others.
 static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &self->observed;
@@ -188,6 +213,9 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
     if (seen->still_moving != observed->still_moving) {
         observed->still_moving = seen->still_moving;
         tell_fault(self, "still_moving", true);
+    }
+    if (take_rolling_fault(observed, seen->rolling_fault, self->wheels->now_us)) {
+        tell_fault(self, "rolling", seen->rolling_fault);
     }
     if (seen->left_behind != observed->left_behind) {
         observed->left_behind = seen->left_behind;
@@ -238,6 +266,7 @@ void gw_observe(gw_status_t *self, const iw_snapshot_t *seen) {
     observe_purge(self);
     observe_estop(self, first);
     observe_faults(self, seen);
+    observe_rolling(self, seen->rolling);
     observe_stop(self, seen->stop);
     observe_lease(self, seen);
     observe_state(self, seen, first);

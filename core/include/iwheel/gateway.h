@@ -23,6 +23,7 @@
 #include "iwheel/private/follow.h"
 #include "iwheel/private/ledger.h"
 #include "iwheel/private/permit.h"
+#include "iwheel/private/rolling.h"
 #include "iwheel/private/setpoint.h"
 #include "iwheel/private/transmit.h"
 #include "iwheel/private/wheel.h"
@@ -85,6 +86,7 @@ typedef struct iw_gateway {
     iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
     iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
     iw_diverge_t diverge;            ///< Whether both together do.
+    iw_rolling_t rolling;            ///< Whether they turn without a command.
     iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
     iw_force_t force[IW_SIDES];      ///< Its normal force.
     iw_ledger_t ledger;              ///< What is assumed of the wheels.

@@ -333,6 +333,8 @@ class Status(TypedDict):
     pair: Pair
     counters: Counters
     clients: int
+    rolling: bool
+    """a wheel turns faster than 100 mm/s and nothing is sent to it"""
     listen_only: bool
     shutting_down: bool
     warnings: List[str]

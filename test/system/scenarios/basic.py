@@ -72,6 +72,11 @@ def limits_and_twist(t):
     )
     reply = client.request("twist", v_mm_s=300, yaw_mrad_s=500)
     t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"]) == (165, 435), f"twist to wheels: {reply}")
+    reply = client.request("twist", v_mm_s=300, yaw_mrad_s=2000)
+    t.check(
+        reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (-120, 420, True),
+        f"turned by 1 rad/s, in the same curve: {reply}",
+    )
     t.drive_for(client, 165, 435, 0.8)
     client.request("stop")
     time.sleep(0.6)

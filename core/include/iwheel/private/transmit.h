@@ -18,13 +18,13 @@
 // The last check (R8) of every outgoing frame, right before it is handed to the port: does it lie within the envelope
 // of what is configured?
 //
-// It does not know why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
-// setpoint of one of the two ids, with the configured type and length, current and speed within the configured
-// maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
-// between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
-// whatever its slew. Both frames of a pair are then judged together: they turn the machine no faster than configured, and
-// its turning grows no faster; a pair that turns it no more than the last one passes, so no stop is held up. A current
-// limit below `min_current_mA` is refused; while setpoint type or current role are unset nothing passes.
+// It does not know why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a setpoint
+// of one of the two ids, with the configured type and length, current and speed within the configured maxima, and a
+// speed no further from the last one that passed than the configured slopes allow for the time between; a change of
+// sign must pass through a zero that was sent. A zero of the right type and current passes whatever its slew. Both
+// frames of a pair are first judged together: they turn the machine no faster than configured, and its turning grows
+// no faster; a pair that turns it no more than the last one passes, so no stop is held up. A current limit below
+// `min_current_mA` is refused; while setpoint type or current role are unset nothing passes.
 //
 // Written independently of the scheduler, so that an error in one is caught by the other.
 
@@ -53,8 +53,8 @@ typedef struct {
 /// Judges one frame; what does not pass is counted and must not be sent.
 iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_t *frame, iw_time_us_t now_us);
 
-/// Judges both frames of a pair together, left and right, before each of them is judged alone: against what passed last.
-/// A pair that does not pass is counted and must not be sent.
+/// Judges both frames of a pair together, left and right, before each of them is judged alone: against what passed
+/// last. A pair that does not pass is counted and must not be sent.
 iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
                                              iw_time_us_t now_us);
 

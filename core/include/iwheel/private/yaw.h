@@ -4,12 +4,12 @@
 ///
 ///     command --(yaw limit: both wheels by one factor)--> maximum speed --> ramp --(growth of yaw)--> pair
 ///
-/// Both limits hold for the real machine: a setpoint in mm/s means that speed at IW_SETPOINT_RADIUS_MM, so the real one is
-/// setpoint x `radius_mm` / IW_SETPOINT_RADIUS_MM. Yaw is right minus left by `track_mm`. Configuration and track
-/// become two bounds of that difference.
+/// Both limits hold for the real machine: a setpoint in mm/s means that speed at IW_SETPOINT_RADIUS_MM, so the real
+/// one is setpoint x `radius_mm` / IW_SETPOINT_RADIUS_MM. Yaw is right minus left by `track_mm`. Configuration and
+/// track become two bounds of that difference.
 ///
-/// No limit makes a wheel faster than asked, changes its sign, or moves one that was commanded 0. Growth is bounded under
-/// a drive command only: a stop, a command of 0/0 and a yaw that falls know no limit here.
+/// No limit makes a wheel faster than asked, changes its sign, or moves one that was commanded 0. Growth is bounded
+/// under a drive command only: a stop, a command of 0/0 and a yaw that falls know no limit here.
 #ifndef IW_YAW_H
 #define IW_YAW_H
 

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// A machine that rolls although nothing is sent to it: seen, and nothing else follows from it.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+/// 120.6 mm/s and 100.5 mm/s, and the rpm below.
+#define FAST_RPM  6
+#define LEAST_RPM 5
+#define SLOW_RPM  4
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static void turn(size_t side, int16_t rpm) {
+    rig.wheel[side].rpm_fixed = true;
+    rig.wheel[side].rpm = rpm;
+}
+
+static bool rolls(void) {
+    return gateway_rig_look(&rig).rolling;
+}
+
+static bool is_fault(void) {
+    return gateway_rig_look(&rig).rolling_fault;
+}
+
+static void test_gateway_machine_that_rolls_away_while_listening_is_seen(void) {
+    gateway_rig_run(&rig, MS(1000));
+    const uint32_t frames = rig.judge.frames;
+    turn(IW_LEFT, 75);
+    turn(IW_RIGHT, 75);
+    gateway_rig_run(&rig, MS(290));
+    TEST_ASSERT_FALSE(rolls());
+    gateway_rig_run(&rig, MS(50));
+    TEST_ASSERT_TRUE(rolls());
+    TEST_ASSERT_FALSE(is_fault());
+    TEST_ASSERT_EQUAL_UINT32(frames, rig.judge.frames);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.permit.stop.number);
+    turn(IW_LEFT, 0);
+    turn(IW_RIGHT, 0);
+    gateway_rig_run(&rig, MS(350));
+    TEST_ASSERT_FALSE(rolls());
+}
+
+static void test_gateway_one_wheel_of_either_sign_is_enough(void) {
+    static const int16_t rpm[] = {FAST_RPM, -FAST_RPM, LEAST_RPM, SLOW_RPM, -SLOW_RPM};
+    for (size_t i = 0; i < 10U; i++) {
+        gateway_rig_init(&rig);
+        turn(i % 2U, rpm[i / 2U]);
+        gateway_rig_run(&rig, MS(400));
+        TEST_ASSERT_EQUAL_INT(i / 2U < 2U, rolls());
+    }
+}
+
+/// What is driven does not roll, nor what is told to stand.
+static void test_gateway_rolling_is_not_judged_while_setpoints_are_sent(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    TEST_ASSERT_FALSE(rolls());
+    gateway_rig_stop(&rig);
+    turn(IW_LEFT, FAST_RPM);
+    turn(IW_RIGHT, FAST_RPM);
+    gateway_rig_run(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_FALSE(rolls());
+}
+
+static void test_gateway_rolling_soon_after_the_zeros_is_a_fault(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    gateway_rig_run(&rig, MS(9000));
+    turn(IW_RIGHT, -FAST_RPM);
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_TRUE(rolls());
+    TEST_ASSERT_TRUE(is_fault());
+    turn(IW_RIGHT, 0);
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_FALSE(is_fault());
+    turn(IW_RIGHT, -FAST_RPM);
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_TRUE(rolls());
+    TEST_ASSERT_FALSE(is_fault());
+}
+
+static void test_gateway_wheel_that_is_not_heard_does_not_roll(void) {
+    turn(IW_LEFT, FAST_RPM);
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_TRUE(rolls());
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_FALSE(rolls());
+}
+
+/// What a late step hears has no known time: it neither begins nor ends anything.
+static void test_gateway_late_step_does_not_judge_rolling(void) {
+    gateway_rig_run(&rig, MS(100));
+    turn(IW_LEFT, FAST_RPM);
+    gateway_rig_run(&rig, MS(10));
+    gateway_rig_stall(&rig, MS(400));
+    TEST_ASSERT_FALSE(rolls());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen);
+    RUN_TEST(test_gateway_one_wheel_of_either_sign_is_enough);
+    RUN_TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent);
+    RUN_TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault);
+    RUN_TEST(test_gateway_wheel_that_is_not_heard_does_not_roll);
+    RUN_TEST(test_gateway_late_step_does_not_judge_rolling);
+    return UNITY_END();
+}
