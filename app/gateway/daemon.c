@@ -12,6 +12,7 @@ void gw_daemon_compose(gw_daemon_t *self) {
     gw_clients_t *clients = &self->clients;
     wheels->bus = gw_report_wish(config);
     wheels->estop = config->estop.line;
+    wheels->health.limits = (gw_health_limits_t){config->health.battery_low_dV, config->health.temperature_high_degC};
     self->knowledge.wheels = wheels;
     self->knowledge.log = &self->log;
     self->knowledge.clients = clients;

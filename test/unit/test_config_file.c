@@ -166,19 +166,34 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         const char *section, *key;
         long min, max;
     } rows[] = {
-        {"bus", "bitrate", 10000, 1000000},     {"bus", "sample_point_permille", 500, 900},
-        {"wheels", "setpoint_type", 0, 255},    {"wheels", "radius_mm", 60, 400},
-        {"wheels", "track_mm", 200, 1500},      {"wheels", "setpoint_dlc", 5, 8},
-        {"drive", "period_ms", 5, 50},          {"drive", "accel_mm_s2", 50, 20000},
-        {"drive", "max_current_mA", 300, 2000}, {"drive", "zero_hold_ms", 1100, 5000},
-        {"limits", "wheel_silent_ms", 20, 200}, {"limits", "echo_ms", 20, 200},
-        {"limits", "rest_ms", 50, 2000},        {"limits", "follow_mm_s", 50, 500},
-        {"limits", "follow_ms", 100, 1000},     {"limits", "blocked_ms", 200, 2000},
-        {"limits", "pair_mm", 20, 150},         {"limits", "pair_leak_ms", 500, 3000},
-        {"limits", "wheel_lag_ms", 10, 300},    {"estop", "debounce_ms", 0, 1000},
-        {"northbound", "max_clients", 1, 64},   {"record", "blackbox_s", 0, 600},
-        {"record", "keep_stops", 8, 256},       {"drive", "min_current_mA", 300, 2000},
-        {"drive", "max_yaw_mrad_s", 50, 10000}, {"drive", "yaw_accel_mrad_s2", 100, 10000},
+        {"bus", "bitrate", 10000, 1000000},
+        {"bus", "sample_point_permille", 500, 900},
+        {"wheels", "setpoint_type", 0, 255},
+        {"wheels", "radius_mm", 60, 400},
+        {"wheels", "track_mm", 200, 1500},
+        {"wheels", "setpoint_dlc", 5, 8},
+        {"drive", "period_ms", 5, 50},
+        {"drive", "accel_mm_s2", 50, 20000},
+        {"drive", "max_current_mA", 300, 2000},
+        {"drive", "zero_hold_ms", 1100, 5000},
+        {"limits", "wheel_silent_ms", 20, 200},
+        {"limits", "echo_ms", 20, 200},
+        {"limits", "rest_ms", 50, 2000},
+        {"limits", "follow_mm_s", 50, 500},
+        {"limits", "follow_ms", 100, 1000},
+        {"limits", "blocked_ms", 200, 2000},
+        {"limits", "pair_mm", 20, 150},
+        {"limits", "pair_leak_ms", 500, 3000},
+        {"limits", "wheel_lag_ms", 10, 300},
+        {"limits", "battery_low_dV", 10, 254},
+        {"limits", "temperature_high_degC", 20, 200},
+        {"estop", "debounce_ms", 0, 1000},
+        {"northbound", "max_clients", 1, 64},
+        {"record", "blackbox_s", 0, 600},
+        {"record", "keep_stops", 8, 256},
+        {"drive", "min_current_mA", 300, 2000},
+        {"drive", "max_yaw_mrad_s", 50, 10000},
+        {"drive", "yaw_accel_mrad_s2", 100, 10000},
     };
     char text[128];
     char cure[64];
@@ -195,49 +210,6 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
             refused(text, "iw.conf:2: ", cure);
         }
     }
-}
-
-/// A refusal names key, rule, the value that was written and what is permitted.
-static void test_parse_value_that_undoes_a_rule_is_refused_with_the_rule(void) {
-    static const struct {
-        const char *line, *rule, *permitted;
-    } rows[] = {
-        {"[drive]\nmax_current_mA = 0\n", "rule R15, with less a loaded wheel", "write 300..2000 mA"},
-        {"[drive]\nmax_current_mA = 299\n", "rule R15, with less a loaded wheel", "write 300..2000 mA"},
-        {"[limits]\nfollow_mm_s = 5000\n", "rule R13, a wheel that runs away", "write 50..500 mm/s"},
-        {"[limits]\nfollow_ms = 5000\n", "rule R13, a wheel that runs away", "write 100..1000 ms"},
-        {"[limits]\nblocked_ms = 10000\n", "rule R13, a blocked wheel", "write 200..2000 ms"},
-        {"[limits]\npair_mm = 151\n", "rule R14, a machine that turns", "write 20..150 mm"},
-        {"[limits]\npair_leak_ms = 499\n", "rule R14, a machine that turns", "write 500..3000 ms"},
-        {"[wheels]\nradius_mm = 20\n", "rule R15, a wrong radius", "write 60..400 mm"},
-        {"[limits]\nrest_rpm = 3\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
-        {"[limits]\nrest_rpm = 20\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
-        {"[limits]\nrest_rpm = 1001\n", "rule R15, a wheel that rolls", "write 0..1000 rpm"},
-    };
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        char where[64];
-        (void)snprintf(where, sizeof where, "iw.conf:2: %.*s", (int)strcspn(strchr(rows[i].line, '\n') + 1, "\n"),
-                       strchr(rows[i].line, '\n') + 1);
-        refused(rows[i].line, where, rows[i].rule);
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, rows[i].permitted), messages);
-    }
-}
-
-/// Left out, it follows from radius and gear, wherever these stand in the file; given, it is judged by them.
-static void test_parse_rest_rpm_is_by_radius_and_gear(void) {
-    accepted("[limits]\nrest_ms = 300\n[wheels]\nradius_mm = 60\n");
-    TEST_ASSERT_EQUAL_UINT16(7, config.core.rest_rpm);
-    accepted("[wheels]\nradius_mm = 400\n");
-    TEST_ASSERT_EQUAL_UINT16(1, config.core.rest_rpm);
-    accepted("[wheels]\nrpm_of = rotor\ngear_ratio = 27/2\n");
-    TEST_ASSERT_EQUAL_UINT16(30, config.core.rest_rpm);
-    accepted("[wheels]\nradius_mm = 60\n[limits]\nrest_rpm = 9\n");
-    TEST_ASSERT_EQUAL_UINT16(9, config.core.rest_rpm);
-    before = config;
-    assert_fixed_point(&before);
-    refused("[limits]\nrest_rpm = 10\n[wheels]\nradius_mm = 60\n", "iw.conf:2: rest_rpm = 10 is more than 60 mm/s",
-            "radius_mm = 60: rule R15");
-    refused("[wheels]\nradius_mm = 400\n[limits]\nrest_rpm = 2\n", "iw.conf:4: ", "write 0..1 rpm");
 }
 
 static void test_parse_numbers_with_anything_around_them_are_refused(void) {
@@ -579,8 +551,6 @@ int main(void) {
     RUN_TEST(test_parse_every_key_reaches_its_field);
     RUN_TEST(test_parse_accepts_comments_indentation_crlf_and_bom);
     RUN_TEST(test_parse_range_ends_are_accepted_and_beyond_refused);
-    RUN_TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule);
-    RUN_TEST(test_parse_rest_rpm_is_by_radius_and_gear);
     RUN_TEST(test_parse_numbers_with_anything_around_them_are_refused);
     RUN_TEST(test_parse_value_in_quotes_is_refused_for_every_key);
     RUN_TEST(test_parse_lease_zero_says_that_it_cannot_be_disabled);

@@ -135,10 +135,10 @@ static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry(IW_LEDGER_GEAR_RATIO)->state);
 }
 
-static bool is_warned_of_the_button(void) {
+static bool is_warned_of(const char *what) {
     const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     for (uint32_t i = 0; i < wheels->warnings; i++) {
-        if (strstr(wheels->warning[i], "was never seen to work on this wiring") != NULL) {
+        if (strstr(wheels->warning[i], what) != NULL) {
             return true;
         }
     }
@@ -151,13 +151,28 @@ static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
     daemon_rig_run(50);
     TEST_ASSERT_TRUE(wheels->estop_untried);
     TEST_ASSERT_EQUAL_INT64(0, wheels->estop_tried_us);
-    TEST_ASSERT_TRUE(is_warned_of_the_button());
+    TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
     stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .line = "ESTOP", .active_high = true};
     tell_stored();
     daemon_rig_run(50);
     TEST_ASSERT_FALSE(wheels->estop_untried);
     TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
-    TEST_ASSERT_FALSE(is_warned_of_the_button());
+    TEST_ASSERT_FALSE(is_warned_of("was never seen to work on this wiring"));
+}
+
+/// A battery beyond its threshold is told and warned of, and stops nothing.
+static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    wheels->health.limits.battery_low_dV = 254;
+    daemon_rig_begin_driving(client);
+    for (unsigned i = 0; i < 60U; i++) {
+        (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
+        daemon_rig_run(100);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_TRUE(wheels->health.present[IW_LEFT][GW_BATTERY_LOW]);
+    TEST_ASSERT_TRUE(is_warned_of("the right wheel's battery has "));
+    TEST_ASSERT_FALSE(is_warned_of("degC"));
 }
 
 static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
@@ -404,6 +419,7 @@ int main(void) {
     RUN_TEST(test_memory_contradiction_stays_one);
     RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
     RUN_TEST(test_memory_button_that_was_tried_before_is_not_warned_of);
+    RUN_TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop);
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
     RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);

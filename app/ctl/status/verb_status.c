@@ -64,21 +64,30 @@ static void draw_lease(const paper_t *paper, const json_t *lease) {
     paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
 }
 
+/// Of a real button: when it was last seen to work. Nothing, if the gateway does not tell that.
+static const char *tell_tried(const json_t *estop, char *out_text, size_t size) {
+    const json_t *tried = json_object_get(estop, "tried_wall_us");
+    char when[TEXT_CELL] = "never";
+    if (json_is_integer(tried)) {
+        text_when(json_integer_value(tried), when);
+    }
+    (void)snprintf(out_text, size, "; button tried: %s", when);
+    return (tried == NULL) ? "" : out_text;
+}
+
 static void draw_surroundings(const paper_t *paper, const json_t *status) {
     char text[512];
+    char tried[TEXT_CELL + 32U];
     const json_t *bus = get(status, "bus");
     const json_t *estop = get(status, "estop");
     const char *button = text_word(estop, "state");
     (void)snprintf(text, sizeof text, "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
                    text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
     paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
-    char when[TEXT_CELL] = "never";
-    const json_t *tried = get(estop, "tried_wall_us");
-    if (json_is_integer(tried)) {
-        text_when(json_integer_value(tried), when);
-    }
-    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s; button tried: %s", is(button, "none") ? "NONE" : button,
-                   json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"), when);
+    const bool simulated = json_is_true(get(estop, "simulated"));
+    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s%s", is(button, "none") ? "NONE" : button,
+                   simulated ? " (SIMULATED)" : "", text_word(estop, "line"),
+                   (simulated || is(button, "none")) ? "" : tell_tried(estop, tried, sizeof tried));
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 

@@ -37,6 +37,19 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_wheels_t *wheels, cons
     }
 }
 
+static void warn_of_health(gw_wheels_t *wheels) {
+    const iw_snapshot_t seen = gw_wheels_look(wheels);
+    char sentence[GW_WARNING_SIZE];
+    for (unsigned i = 0; i < (unsigned)IW_SIDES * GW_AILMENTS; i++) {
+        const iw_side_t side = (iw_side_t)(i / GW_AILMENTS);
+        const gw_ailment_t ailment = (gw_ailment_t)(i % GW_AILMENTS);
+        if (wheels->health.present[side][ailment]) {
+            gw_health_sentence(&wheels->health, &seen, side, ailment, sentence, sizeof sentence);
+            warn(wheels, "%s", sentence);
+        }
+    }
+}
+
 static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
     const iw_linux_hal_t *hal = &wheels->hal;
     char sentence[GW_WARNING_SIZE];
@@ -47,6 +60,7 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
     } else if (hal->estop_ops->simulated) {
         warn(wheels, "the e-stop %s is SIMULATED: no button of this machine stops the wheels", wheels->estop);
     }
+    warn_of_health(wheels);
     if (wheels->estop_untried) {
         warn(wheels, GW_ESTOP_UNTRIED, wheels->estop);
     }
@@ -68,7 +82,8 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
 void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_behind) {
     const iw_bus_link_t *link = iw_linux_hal_link(&wheels->hal);
     const bool news = !self->known || link->changes != self->changes;
-    if (!news && left_behind == self->left_behind && wheels->estop_untried == self->untried) {
+    if (!news && left_behind == self->left_behind && wheels->estop_untried == self->untried &&
+        wheels->health.changes == self->health) {
         return;
     }
     if (news) {
@@ -82,6 +97,7 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
     }
     self->left_behind = left_behind;
     self->untried = wheels->estop_untried;
+    self->health = wheels->health.changes;
     note_warnings(wheels, left_behind);
 }
 

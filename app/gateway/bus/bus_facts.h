@@ -11,6 +11,7 @@ typedef struct gw_bus_facts {
     uint32_t changes; ///< Of the link, when last passed on.
     bool known;       ///< It has been passed on once.
     bool left_behind; ///< What was warned of.
+    uint32_t health;  ///< Changes of the wheels' health when last warned of.
     bool untried;     ///< The same: nobody has seen the button of the e-stop work.
 } gw_bus_facts_t;
 

@@ -157,6 +157,11 @@ static const settings_key_t keys[] = {
      CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK), RULE("rule R14, a machine that turns by itself must stop")},
     {"limits", "wheel_lag_ms", " ms", "A wheel follows its setpoint with this time constant.",
      CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
+    {"limits", "battery_low_dV", " dV",
+     "A wheel whose battery is below this for 5 s is a fault: told, never a stop. The document gives no limit.",
+     NUMBER(health.battery_low_dV, 10, 254), .set = offsetof(gateway_config_t, health.has_battery)},
+    {"limits", "temperature_high_degC", " degC", "The same of a wheel that is hotter than this.",
+     NUMBER(health.temperature_high_degC, 20, 200), .set = offsetof(gateway_config_t, health.has_temperature)},
 
     {"estop", "line", "", "gpiod line name, gpiochipN:OFFSET, unix:PATH (the simulator's button), or none.",
      TEXT(estop.line, settings_wrong_address)},

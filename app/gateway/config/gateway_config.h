@@ -55,6 +55,12 @@ typedef struct gateway_config {
         uint16_t max_age_ms;   ///< The oldest `t_us` of arm, reset and confirm, 200..2000.
     } northbound;
     struct {
+        bool has_battery;               ///< There is a threshold; there is no default.
+        bool has_temperature;           ///< The same.
+        uint16_t battery_low_dV;        ///< 10..254; 0 without a threshold.
+        uint16_t temperature_high_degC; ///< 20..200; the same.
+    } health;                           ///< [limits]
+    struct {
         uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none) ..600.
         char directory[GATEWAY_PATH_SIZE];
         uint16_t keep_stops; ///< 8..GW_BOX_KEEP_MAX.

@@ -156,6 +156,26 @@ static uint32_t faults_of(const gw_status_t *self, const iw_snapshot_t *seen) {
     return seen->present & ~lost;
 }
 
+static bool is_any_unwell(const gw_health_t *health, gw_ailment_t ailment) {
+    return health->present[IW_LEFT][ailment] || health->present[IW_RIGHT][ailment];
+}
+
+/// A fault while any wheel has it; the log and the warnings name the wheel.
+static void tell_ailment(gw_status_t *self, const iw_snapshot_t *seen, const gw_health_t *before, gw_ailment_t ailment,
+                         const char *name) {
+    const gw_health_t *health = &self->wheels->health;
+    char sentence[GW_WARNING_SIZE];
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        if (health->present[side][ailment] && !before->present[side][ailment]) {
+            gw_health_sentence(health, seen, (iw_side_t)side, ailment, sentence, sizeof sentence);
+            gw_log(self->log, GW_LOG_WARNING, "%s", sentence);
+        }
+    }
+    if (is_any_unwell(health, ailment) != is_any_unwell(before, ailment)) {
+        tell_fault(self, name, is_any_unwell(health, ailment));
+    }
+}
+
 static void observe_rolling(gw_status_t *self, bool rolling) {
     if (rolling == self->observed.rolling) {
         return;
@@ -204,6 +224,10 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
         }
         tell_fault(self, "setpoint_left", seen->left_behind);
     }
+    const gw_health_t before = self->wheels->health;
+    gw_health_look(&self->wheels->health, seen);
+    tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
+    tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
 }
 
 static void observe_purge(gw_status_t *self) {

@@ -6,6 +6,7 @@
 #ifndef GATEWAY_WHEELS_H
 #define GATEWAY_WHEELS_H
 
+#include "health.h"
 #include "tape.h"
 
 #include "inspect.h"
@@ -57,6 +58,7 @@ typedef struct gw_wheels {
     bool time_used;       ///< A request was carried out at `now_us` already.
     bool shutting_down;
     bool estop_untried;     ///< Its button was never seen to work on this wiring; not before what was kept is read.
+    gw_health_t health;     ///< Its limits are set already.
     int64_t estop_tried_us; ///< When it was last, by the wall clock; 0: never.
     uint32_t warnings;      ///< What is wrong enough to be said at start, in `status` and with every arm.
     char warning[GW_WARNINGS][GW_WARNING_SIZE];

@@ -195,12 +195,18 @@ function showWheel(side, wheel) {
   for (const [name, read] of figures) text(`${side}-${name}`, wheel ? read(wheel) : null, name === "heard" && wheel && !wheel.heard ? "bad" : "");
 }
 
+// Of a real button: when it was last seen to work.
+function tried(estop) {
+  if (estop.simulated || estop.state === "none") return "";
+  return fill(STRINGS.tried_says, { when: estop.tried_wall_us ? new Date(estop.tried_wall_us / 1000).toLocaleString() : STRINGS.never });
+}
+
 function showState(state) {
   const word = state.arming ? STRINGS.state_arming : STRINGS.states[state.state] ?? state.state;
   text("state", state.cause ? `${word} (${state.cause})` : word, state.state === "latched" ? "bad" : state.state === "listening" ? "" : "care");
   list("advice", advise(state));
   const { estop, bus, lease, budget } = state;
-  text("estop", fill(STRINGS.estop_says, { state: estop.state === "none" ? "NONE" : estop.state, simulated: estop.simulated ? STRINGS.simulated : "", line: estop.line, tried: estop.tried_wall_us ? new Date(estop.tried_wall_us / 1000).toLocaleString() : STRINGS.never }), estop.state === "released" ? "good" : "bad");
+  text("estop", fill(STRINGS.estop_says, { state: estop.state === "none" ? "NONE" : estop.state, simulated: estop.simulated ? STRINGS.simulated : "", line: estop.line, tried: tried(estop) }), estop.state === "released" ? "good" : "bad");
   text("bus", fill(STRINGS.bus_says, bus), bus.state === "active" ? "good" : "bad");
   text("lease", lease.holder === null ? fill(STRINGS.lease_none, { whole: lease.lease_ms })
     : fill(STRINGS.lease_says, { ...lease, name: lease.name ?? STRINGS.unknown, left: lease.remaining_ms, whole: lease.lease_ms }), lease.holder === null ? "" : "care");

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// Values in the gateway's configuration file that would undo a safety rule: refused, with key, rule, value and what is permitted.
+#include "config/gateway_config.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static char messages[4096];
+static gateway_config_t config;
+
+static int parse(const char *text) {
+    memset(messages, 0, sizeof messages);
+    FILE *err = fmemopen(messages, sizeof messages, "w");
+    const int result = gateway_config_parse("iw.conf", text, strlen(text), &config, err);
+    fclose(err);
+    return result;
+}
+
+static void accepted(const char *text) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, parse(text), messages);
+}
+
+static void refused(const char *text, const char *where, const char *what) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(GATEWAY_CONFIG_ERROR, parse(text), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, where), messages);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, what), messages);
+}
+
+/// What is printed is accepted, and the same.
+static void assert_fixed_point(void) {
+    const uint16_t rest_rpm = config.core.rest_rpm;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    gateway_config_print(&config, out);
+    fclose(out);
+    accepted(text);
+    TEST_ASSERT_EQUAL_UINT16(rest_rpm, config.core.rest_rpm);
+    free(text);
+}
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+/// A refusal names key, rule, the value that was written and what is permitted.
+static void test_parse_value_that_undoes_a_rule_is_refused_with_the_rule(void) {
+    static const struct {
+        const char *line, *rule, *permitted;
+    } rows[] = {
+        {"[drive]\nmax_current_mA = 0\n", "rule R15, with less a loaded wheel", "write 300..2000 mA"},
+        {"[drive]\nmax_current_mA = 299\n", "rule R15, with less a loaded wheel", "write 300..2000 mA"},
+        {"[limits]\nfollow_mm_s = 5000\n", "rule R13, a wheel that runs away", "write 50..500 mm/s"},
+        {"[limits]\nfollow_ms = 5000\n", "rule R13, a wheel that runs away", "write 100..1000 ms"},
+        {"[limits]\nblocked_ms = 10000\n", "rule R13, a blocked wheel", "write 200..2000 ms"},
+        {"[limits]\npair_mm = 151\n", "rule R14, a machine that turns", "write 20..150 mm"},
+        {"[limits]\npair_leak_ms = 499\n", "rule R14, a machine that turns", "write 500..3000 ms"},
+        {"[wheels]\nradius_mm = 20\n", "rule R15, a wrong radius", "write 60..400 mm"},
+        {"[limits]\nrest_rpm = 3\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
+        {"[limits]\nrest_rpm = 20\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
+        {"[limits]\nrest_rpm = 1001\n", "rule R15, a wheel that rolls", "write 0..1000 rpm"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char where[64];
+        (void)snprintf(where, sizeof where, "iw.conf:2: %.*s", (int)strcspn(strchr(rows[i].line, '\n') + 1, "\n"),
+                       strchr(rows[i].line, '\n') + 1);
+        refused(rows[i].line, where, rows[i].rule);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, rows[i].permitted), messages);
+    }
+}
+
+/// Left out, it follows from radius and gear, wherever these stand in the file; given, it is judged by them.
+static void test_parse_rest_rpm_is_by_radius_and_gear(void) {
+    accepted("[limits]\nrest_ms = 300\n[wheels]\nradius_mm = 60\n");
+    TEST_ASSERT_EQUAL_UINT16(7, config.core.rest_rpm);
+    accepted("[wheels]\nradius_mm = 400\n");
+    TEST_ASSERT_EQUAL_UINT16(1, config.core.rest_rpm);
+    accepted("[wheels]\nrpm_of = rotor\ngear_ratio = 27/2\n");
+    TEST_ASSERT_EQUAL_UINT16(30, config.core.rest_rpm);
+    accepted("[wheels]\nradius_mm = 60\n[limits]\nrest_rpm = 9\n");
+    TEST_ASSERT_EQUAL_UINT16(9, config.core.rest_rpm);
+    assert_fixed_point();
+    refused("[limits]\nrest_rpm = 10\n[wheels]\nradius_mm = 60\n", "iw.conf:2: rest_rpm = 10 is more than 60 mm/s",
+            "radius_mm = 60: rule R15");
+    refused("[wheels]\nradius_mm = 400\n[limits]\nrest_rpm = 2\n", "iw.conf:4: ", "write 0..1 rpm");
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule);
+    RUN_TEST(test_parse_rest_rpm_is_by_radius_and_gear);
+    return UNITY_END();
+}

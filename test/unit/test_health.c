@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+// Battery and temperature against thresholds: what is a fault, how long it must last, and that none is without a threshold.
+#include "wheels/health.h"
+
+#include "iwheel/codec.h"
+#include "unity.h"
+
+#include <string.h>
+
+static iw_codec_wheel_t told[IW_SIDES];
+static iw_snapshot_t seen;
+static gw_health_t health;
+
+void setUp(void) {
+    memset(&seen, 0, sizeof seen);
+    memset(told, 0, sizeof told);
+    health = (gw_health_t){.limits = {.battery_low_dV = 220, .temperature_high_degC = 60}};
+    seen.at_us = 10000000U;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        seen.wheel[side].told = &told[side];
+        told[side].status.battery_dV = 220;
+        told[side].status.temperature_degC = 60;
+    }
+}
+
+void tearDown(void) {}
+
+static void step(iw_time_us_t after_us) {
+    seen.at_us += after_us;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        seen.wheel[side].status_us = seen.at_us;
+    }
+    gw_health_look(&health, &seen);
+}
+
+static void test_health_at_the_thresholds_is_no_fault(void) {
+    step(0);
+    step(2U * GW_HEALTH_US);
+    TEST_ASSERT_EQUAL_UINT32(0, health.changes);
+}
+
+static void test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel(void) {
+    told[IW_LEFT].status.battery_dV = 219;
+    told[IW_RIGHT].status.temperature_degC = 61;
+    step(0);
+    step(GW_HEALTH_US - 1U);
+    TEST_ASSERT_EQUAL_UINT32(0, health.changes);
+    step(1);
+    TEST_ASSERT_EQUAL_UINT32(2, health.changes);
+    TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
+    TEST_ASSERT_FALSE(health.present[IW_RIGHT][GW_BATTERY_LOW]);
+    TEST_ASSERT_FALSE(health.present[IW_LEFT][GW_TEMPERATURE_HIGH]);
+    TEST_ASSERT_TRUE(health.present[IW_RIGHT][GW_TEMPERATURE_HIGH]);
+}
+
+static void test_health_fault_is_gone_after_five_seconds_within(void) {
+    told[IW_LEFT].status.battery_dV = 100;
+    step(0);
+    step(GW_HEALTH_US);
+    told[IW_LEFT].status.battery_dV = 220;
+    step(1000);
+    step(GW_HEALTH_US - 1U);
+    TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
+    step(1);
+    TEST_ASSERT_FALSE(health.present[IW_LEFT][GW_BATTERY_LOW]);
+    TEST_ASSERT_EQUAL_UINT32(2, health.changes);
+}
+
+static void test_health_dip_in_between_begins_anew(void) {
+    told[IW_LEFT].status.battery_dV = 100;
+    step(0);
+    step(GW_HEALTH_US - 1U);
+    told[IW_LEFT].status.battery_dV = 230;
+    step(1);
+    told[IW_LEFT].status.battery_dV = 100;
+    step(1);
+    step(GW_HEALTH_US - 1U);
+    TEST_ASSERT_EQUAL_UINT32(0, health.changes);
+    step(1);
+    TEST_ASSERT_EQUAL_UINT32(1, health.changes);
+}
+
+static void test_health_without_thresholds_knows_no_fault(void) {
+    health.limits = (gw_health_limits_t){0, 0};
+    told[IW_LEFT].status.battery_dV = 0;
+    told[IW_LEFT].status.temperature_degC = 200;
+    step(0);
+    step(GW_HEALTH_US);
+    TEST_ASSERT_EQUAL_UINT32(0, health.changes);
+}
+
+static void test_health_value_that_is_not_known_changes_nothing(void) {
+    told[IW_LEFT].status.battery_dV = 100;
+    told[IW_RIGHT].status.temperature_degC = IW_TEMPERATURE_MAX_degC + 1U;
+    step(0);
+    seen.wheel[IW_LEFT].status_us = seen.at_us;
+    seen.at_us += GW_HEALTH_FRESH_US + 1U;
+    gw_health_look(&health, &seen); // Too old: the time begins anew.
+    step(GW_HEALTH_US - GW_HEALTH_FRESH_US);
+    step(GW_HEALTH_US - 1U);
+    TEST_ASSERT_EQUAL_UINT32(0, health.changes);
+    step(1);
+    TEST_ASSERT_EQUAL_UINT32(1, health.changes);
+    seen.wheel[IW_LEFT].status_us = IW_NEVER;
+    seen.at_us += 2U * GW_HEALTH_US;
+    gw_health_look(&health, &seen);
+    TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
+}
+
+static void test_health_sentences_name_wheel_value_and_threshold(void) {
+    char text[128];
+    told[IW_LEFT].status.battery_dV = 219;
+    told[IW_RIGHT].status.temperature_degC = 61;
+    step(0);
+    gw_health_sentence(&health, &seen, IW_LEFT, GW_BATTERY_LOW, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("the left wheel's battery has 219 dV, below battery_low_dV 220; charge it", text);
+    gw_health_sentence(&health, &seen, IW_RIGHT, GW_TEMPERATURE_HIGH, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("the right wheel has 61 degC, above temperature_high_degC 60; let it cool", text);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_health_at_the_thresholds_is_no_fault);
+    RUN_TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel);
+    RUN_TEST(test_health_fault_is_gone_after_five_seconds_within);
+    RUN_TEST(test_health_dip_in_between_begins_anew);
+    RUN_TEST(test_health_without_thresholds_knows_no_fault);
+    RUN_TEST(test_health_value_that_is_not_known_changes_nothing);
+    RUN_TEST(test_health_sentences_name_wheel_value_and_threshold);
+    return UNITY_END();
+}
