@@ -104,7 +104,8 @@ static void test_parse_every_key_reaches_its_field(void) {
         "[wheels]\nsetpoint_type=0\ncurrent_role=setpoint\nrpm_of=rotor\nradius_mm=200\ngear_ratio=27/2\ntrack_mm=600\n"
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
-        "max_current_mA=1500\nmin_current_mA=400\nasymmetric_current=yes\nzero_hold_ms=1200\n[limits]\nwheel_silent_ms="
+        "max_current_mA=1500\nmin_current_mA=400\nasymmetric_current=yes\nzero_hold_ms=1200\nhold_max_s=61\n[limits]"
+        "\nwheel_silent_ms="
         "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\n"
@@ -132,8 +133,9 @@ static void test_parse_every_key_reaches_its_field(void) {
                                 core->max_speed_mm_s, core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms,
                                 core->echo_ms,        core->rest_rpm,       core->rest_ms,      core->follow_mm_s,
                                 core->follow_ms,      core->blocked_ms,     core->pair_mm,      core->pair_leak_ms,
-                                core->wheel_lag_ms,   core->min_current_mA};
-    const uint16_t wanted[] = {10, 300, 500, 2000, 900, 1500, 1200, 60, 70, 3, 250, 310, 510, 1100, 61, 1001, 62, 400};
+                                core->wheel_lag_ms,   core->min_current_mA, core->hold_max_s};
+    const uint16_t wanted[] = {10,  300, 500, 2000, 900, 1500, 1200, 60,  70, 3,
+                               250, 310, 510, 1100, 61,  1001, 62,   400, 61};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_TRUE(core->asymmetric_current);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
@@ -176,7 +178,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         {"limits", "pair_leak_ms", 500, 3000},  {"limits", "wheel_lag_ms", 10, 300},
         {"estop", "debounce_ms", 0, 1000},      {"northbound", "max_clients", 1, 64},
         {"record", "blackbox_s", 0, 600},       {"record", "keep_stops", 8, 256},
-        {"drive", "min_current_mA", 300, 2000},
+        {"drive", "min_current_mA", 300, 2000}, {"drive", "hold_max_s", 10, 600},
     };
     char text[128];
     char cure[64];
