@@ -182,7 +182,7 @@ class Story(unittest.TestCase):
         self.ears = [Ear(self.connect(*(topic for topic in TOPICS if topic != "frame"))), Ear(self.connect("frame"))]
         slow = self.connect("frame")  # It does not read, and so loses some.
         me, other = self.connect(), self.connect()
-        for part in (self.without_wheels, self.wheels_appear, self.zeros, self.driving, self.stops, self.bus, self.files):
+        for part in (self.without_wheels, self.wheels_appear, self.rolling, self.zeros, self.driving, self.stops, self.bus, self.files):
             part(me, other)
         self.assertIsNotNone(slow.wait_event("lost"))  # The gateway writes it once there is room again.
         self.hear(slow)
@@ -207,6 +207,13 @@ class Story(unittest.TestCase):
         self.wait_rest(me)
         for frame in ("frame 12345678#0102", "frame 7FF#R"):
             self.rig.sim.ask(frame)
+
+    def rolling(self, me, _):
+        self.rig.sim.ask("slope 12")
+        self.wait(me, lambda s: s["rolling"])
+        self.rig.sim.ask("slope 0")
+        self.wait(me, lambda s: not s["rolling"])
+        self.wait_rest(me)
 
     def zeros(self, me, _):
         self.wait(me, lambda s: s["left"]["offset_window"] == "saturated")

@@ -20,12 +20,13 @@ static int32_t larger(int32_t a, int32_t b) {
 static void sweep(int32_t lowest, bool zero) {
     for (int32_t left = 0; left <= config.max_current_mA; left += 50) {
         for (int32_t right = 0; right <= config.max_current_mA; right += 50) {
-            int32_t limit[IW_SIDES] = {left, right};
+            int32_t limit[IW_SIDES + 1] = {left, right, -7};
             const bool apart = config.asymmetric_current;
             const int32_t wanted[IW_SIDES] = {larger(apart ? left : larger(left, right), lowest),
                                               larger(apart ? right : larger(left, right), lowest)};
             const bool limited = iw_current_limit(&config, limit, zero);
             TEST_ASSERT_EQUAL_INT32_ARRAY(wanted, limit, IW_SIDES);
+            TEST_ASSERT_EQUAL_INT32(-7, limit[IW_SIDES]); // No third wheel.
             TEST_ASSERT_EQUAL_INT(wanted[IW_LEFT] != left || wanted[IW_RIGHT] != right, limited);
         }
     }

@@ -151,6 +151,19 @@ static void test_gateway_unequal_limits_become_the_larger_one(void) {
     TEST_ASSERT_TRUE(applied.limited);
 }
 
+/// Around a wheel that stands: still a command of motion, with the client's own limit.
+static void test_gateway_limit_holds_while_one_wheel_is_commanded_zero(void) {
+    static const iw_drive_t requests[] = {{{300, 0}, {500, 500}, true}, {{0, 300}, {500, 500}, true}};
+    iw_applied_t applied;
+    gateway_rig_arm(&rig);
+    for (size_t i = 0; i < 2U; i++) {
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&requests[i], &applied));
+        TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_LEFT].current_mA);
+        TEST_ASSERT_EQUAL_INT(500, applied.pair.wheel[IW_RIGHT].current_mA);
+        TEST_ASSERT_FALSE(applied.limited);
+    }
+}
+
 /// A current that is a setpoint is the client's own: below any floor, unequal, of either sign.
 static void test_gateway_current_setpoints_have_no_floor(void) {
     const iw_drive_t request = {{100, -100}, {5, -400}, true};
@@ -339,6 +352,7 @@ int main(void) {
     RUN_TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint);
     RUN_TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor);
     RUN_TEST(test_gateway_unequal_limits_become_the_larger_one);
+    RUN_TEST(test_gateway_limit_holds_while_one_wheel_is_commanded_zero);
     RUN_TEST(test_gateway_current_setpoints_have_no_floor);
     RUN_TEST(test_gateway_limit_of_the_client_ends_with_the_stop);
     RUN_TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only);
