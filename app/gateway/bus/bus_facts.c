@@ -44,7 +44,7 @@ static void warn_of_health(gw_wheels_t *wheels) {
         const iw_side_t side = (iw_side_t)(i / GW_AILMENTS);
         const gw_ailment_t ailment = (gw_ailment_t)(i % GW_AILMENTS);
         if (wheels->health.present[side][ailment]) {
-            gw_health_sentence(&wheels->health, &seen, side, ailment, sentence, sizeof sentence);
+            gw_health_sentence(&wheels->health, &seen, side, ailment, sentence);
             warn(wheels, "%s", sentence);
         }
     }
