@@ -17,7 +17,7 @@ EVIDENCE = "iw_motion_evidence_init iw_motion_evidence_look"
 # What is used: its headers, its functions, and the most that it may cost on a Cortex-M4.
 USES = {
     "codec": ("codec.h", CODEC, 350),
-    "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2500),
+    "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2900),
     "gateway": ("gateway.h", GATEWAY, 13000),
     "gateway, snapshot": ("gateway.h", f"{GATEWAY} iw_gateway_snapshot", None),
     "all": ("gateway.h evidence.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {EVIDENCE}", None),

@@ -16,6 +16,7 @@ static const iw_config_t standard = {
     .max_current_mA = IW_CURRENT_LIMIT_mA,
     .min_current_mA = 300,
     .zero_hold_ms = 1500,
+    .hold_max_s = 60,
     .wheel_silent_ms = 50,
     .echo_ms = 50,
     .rest_rpm = 2,
@@ -46,6 +47,7 @@ static const iw_config_range_t ranges[] = {
     {300, IW_CURRENT_LIMIT_mA},         // max_current_mA
     {300, IW_CURRENT_LIMIT_mA},         // min_current_mA
     {1100, 5000},                       // zero_hold_ms
+    {10, 600},                          // hold_max_s
     {20, 200},                          // wheel_silent_ms
     {20, 200},                          // echo_ms
     {0, 1000},                          // rest_rpm; see check_relations

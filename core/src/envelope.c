@@ -109,7 +109,7 @@ static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t tur
     const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
     const uint32_t span_mm2 = config->track_mm * SETPOINT_RADIUS_MM;
     const uint32_t most = turn_of(config, self->last_mm_s[IW_LEFT], self->last_mm_s[IW_RIGHT]) + TURN_ROUNDING_MM_S;
-    if ((uint64_t)turn_mm_s * (config->radius_mm * 1000U) > (uint64_t)span_mm2 * config->max_yaw_mrad_s) {
+    if ((uint64_t)turn_mm_s * config->radius_mm * 1000U > (uint64_t)span_mm2 * config->max_yaw_mrad_s) {
         return false;
     }
     return turn_mm_s <= most || (uint64_t)((turn_mm_s - most) * config->radius_mm) * 1000000000U <=

@@ -28,6 +28,8 @@ static const phase_row_t phases[IW_PHASES] = {
 
 IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_permit);
 
+#define US_PER_S 1000000U
+
 /// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U
 
@@ -227,15 +229,22 @@ static bool is_ramping(const iw_permit_t *self) {
     return self->phase == IW_PHASE_CUT && !self->at_once && !self->view.output_zero;
 }
 
-/// Zeros for `zero_hold_ms` and until the wheels stand, but at most IW_PERMIT_HOLD_MAX_US: a wheel that is pushed or
-/// has a fault would otherwise be fed for ever.
+/// The longest time that zeros are held. A second master who moves the wheels is not fought for longer than needed.
+static uint32_t longest_us(const iw_permit_t *self) {
+    const iw_time_us_t other_us = self->seen_us[IW_CAUSE_SECOND_MASTER];
+    const bool contested = other_us != IW_NEVER && other_us >= self->hold_us;
+    return contested ? IW_PERMIT_CONTESTED_US : self->config->hold_max_s * US_PER_S;
+}
+
+/// Zeros for `zero_hold_ms` and until the wheels stand, but at most `hold_max_s`: a wheel that is pushed or has a fault
+/// would otherwise be fed for ever.
 static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
     if (is_ramping(self)) {
         self->hold_us = now_us;
     }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
     // Silence with a moving wheel is an event that the operator must hear of.
-    const bool gives_up = held_us >= IW_PERMIT_HOLD_MAX_US && !self->view.settled;
+    const bool gives_up = held_us >= longest_us(self) && !self->view.settled;
     self->still_moving += gives_up ? 1U : 0U;
     if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
         self->phase = (self->phase == IW_PHASE_CUT) ? IW_PHASE_LATCHED : IW_PHASE_LISTENING;
@@ -245,6 +254,11 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
 /// Zeros are held, and time ends it.
 static bool is_holding(iw_phase_t phase) {
     return phase >= IW_PHASE_HOLDING && phase <= IW_PHASE_CUT;
+}
+
+bool iw_permit_ending(const iw_permit_t *self, iw_time_us_t now_us) {
+    return is_holding(self->phase) && !time_is_enough(self) &&
+           iw_age_us(self->hold_us, now_us) >= longest_us(self) - IW_PERMIT_ENDING_US;
 }
 
 static void step_phase(iw_permit_t *self, iw_time_us_t now_us) {
@@ -356,7 +370,7 @@ iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
         return self->lease_until_us;
     }
     if (is_holding(self->phase)) {
-        return self->hold_us + (time_is_enough(self) ? config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US);
+        return self->hold_us + (time_is_enough(self) ? config->zero_hold_ms * IW_US_PER_MS : longest_us(self));
     }
     return IW_NEVER;
 }

@@ -151,7 +151,7 @@ static IW_APART void level(axis_t *axes, size_t count) {
     }
 }
 
-static int32_t part_of_way(const axis_t *axis) {
+static IW_APART int32_t part_of_way(const axis_t *axis) {
     return (int32_t)((int64_t)axis->fraction * axis->way / (int64_t)FRACTION_ONE);
 }
 
@@ -191,7 +191,7 @@ static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uin
     }
 }
 
-static IW_APART void move(int32_t *values, const axis_t *axes) {
+static void move(int32_t *values, const axis_t *axes) {
     values[IW_LEFT] += part_of_way(&axes[IW_LEFT]);
     values[IW_RIGHT] += part_of_way(&axes[IW_RIGHT]);
 }

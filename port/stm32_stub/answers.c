@@ -7,9 +7,6 @@
 /// A software e-stop that is in force is not put in force again within this time: a flood of it costs no step.
 #define ESTOP_AGAIN_US 200000U
 
-static const char ALL_WAIT[] =
-    "the answers to other requests still wait, and there is no place for this one; try again";
-
 static void send_refusal(iw_host_t *self, iw_host_client_t *client) {
     iw_host_send_refusal(self, client, &self->request.id);
 }
@@ -69,11 +66,7 @@ static void do_status(iw_host_t *self, iw_host_client_t *client) {
         REFUSE(self, client, IWN_BUSY, "the answer to an earlier status still waits for the serial line; wait for it");
         return;
     }
-    if (!iw_pending_has_room(&self->pending, client->id, IWN_CMD_STATUS)) {
-        REFUSE(self, client, IWN_BUSY, ALL_WAIT);
-        return;
-    }
-    client->owed_status = true;
+    client->owed_status = true; // A status of every client has a place.
     iw_pending_put(&self->pending, client->id, IWN_CMD_STATUS, &self->request.id);
 }
 
@@ -94,7 +87,7 @@ static void do_arm(iw_host_t *self, iw_host_client_t *client) {
         return;
     }
     if (!iw_pending_has_room(&self->pending, client->id, IWN_CMD_ARM)) {
-        REFUSE(self, client, IWN_BUSY, ALL_WAIT);
+        REFUSE(self, client, IWN_BUSY, "the answers to other requests still wait for the serial line; try again");
         return;
     }
     const iw_refusal_t refusal = iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);

@@ -79,6 +79,7 @@ typedef struct {
     uint32_t assumed_changes;
     uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
     bool left_behind;
+    bool zeros_ending;
     bool rolling;
     bool rolling_fault;
     bool estop_high;

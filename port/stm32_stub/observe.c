@@ -35,6 +35,13 @@ static void tell_fault(iw_host_t *self, const char *cause, bool present) {
     iw_host_send_event(self, IWN_TOPIC_STOP, &json);
 }
 
+static void tell_flag(iw_host_t *self, const char *cause, bool present, bool *told) {
+    if (present != *told) {
+        *told = present;
+        tell_fault(self, cause, present);
+    }
+}
+
 /// While armed or stopping a cause makes a stop, which is told as such; here are the others.
 static void observe_faults(iw_host_t *self, const iw_snapshot_t *seen) {
     const uint32_t changed = seen->present ^ self->told.present;
@@ -48,10 +55,9 @@ static void observe_faults(iw_host_t *self, const iw_snapshot_t *seen) {
         self->told.still_moving = seen->still_moving;
         tell_fault(self, "still_moving", true);
     }
-    if (seen->left_behind != self->told.left_behind) {
-        self->told.left_behind = seen->left_behind;
-        tell_fault(self, "setpoint_left", seen->left_behind);
-    }
+    tell_flag(self, "zeros_ending", seen->zeros_ending, &self->told.zeros_ending);
+    tell_flag(self, "rolling", seen->rolling_fault, &self->told.rolling_fault);
+    tell_flag(self, "setpoint_left", seen->left_behind, &self->told.left_behind);
 }
 
 static void observe_rolling(iw_host_t *self, const iw_snapshot_t *seen) {
@@ -60,10 +66,6 @@ static void observe_rolling(iw_host_t *self, const iw_snapshot_t *seen) {
         iwn_out_t json = begin(self, "rolling");
         iwn_out_bool(&json, "present", seen->rolling);
         iw_host_send_event(self, IWN_TOPIC_STOP, &json);
-    }
-    if (seen->rolling_fault != self->told.rolling_fault) {
-        self->told.rolling_fault = seen->rolling_fault;
-        tell_fault(self, "rolling", seen->rolling_fault);
     }
 }
 

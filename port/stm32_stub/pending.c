@@ -11,10 +11,11 @@ static size_t place_of(const iw_pending_t *self, iw_client_t client, iwn_cmd_t c
     return at;
 }
 
-/// IW_PENDING_MAX: none. The last place is an arm's.
+/// IW_PENDING_MAX: none. The last places are those of arms, so that neither kind uses up the other's.
 static size_t free_place(const iw_pending_t *self, iwn_cmd_t cmd) {
-    const size_t end = (cmd == IWN_CMD_ARM) ? IW_PENDING_MAX : IW_PENDING_MAX - 1U;
-    for (size_t at = 0; at < end; at++) {
+    const bool arms = cmd == IWN_CMD_ARM;
+    const size_t end = arms ? IW_PENDING_MAX : IWN_LINE_CHANNELS;
+    for (size_t at = arms ? IWN_LINE_CHANNELS : 0U; at < end; at++) {
         if (self->place[at].client == IW_CLIENT_NONE) {
             return at;
         }

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 /// The ids of requests whose answers wait: an arm for its TX confirmation, a status for the long line. One pool for all
-/// clients, since an id takes 88 bytes and few wait at the same time. One place is kept for an arm.
+/// clients, since an id takes 88 bytes and hardly ever more than one arm waits.
 ///
 /// Pure, no heap. All zero: nobody waits.
 #ifndef IW_STM32_PENDING_H
 #define IW_STM32_PENDING_H
 
 #include "iwheel/gateway.h"
+#include "iwheel_northbound/line.h"
 #include "iwheel_northbound/request.h"
 
-#define IW_PENDING_MAX 4U
+/// A status of every channel, and as many arms: one that waits, and one that takes the lease over.
+#define IW_PENDING_ARMS 2U
+#define IW_PENDING_MAX  (IWN_LINE_CHANNELS + IW_PENDING_ARMS)
 
 typedef struct {
     iw_client_t client; ///< IW_CLIENT_NONE: the place is free.

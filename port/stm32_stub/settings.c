@@ -6,7 +6,7 @@
 #include <string.h>
 
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
-enum { TYPE = 25, ROLE, SWITCHES, SETTINGS_END };
+enum { TYPE = 26, ROLE, SWITCHES, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
 IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * sizeof(uint16_t),
@@ -53,6 +53,7 @@ static const row_t rows[] = {
     {"drive", "min_current_mA", INDEX(MIN_CURRENT), NUMBER, {NULL, NULL}},
     {"drive", "asymmetric_current", ASYMMETRIC, SWITCH, {"no", "yes"}},
     {"drive", "zero_hold_ms", INDEX(ZERO_HOLD), NUMBER, {NULL, NULL}},
+    {"drive", "hold_max_s", INDEX(HOLD_MAX), NUMBER, {NULL, NULL}},
     {"limits", "wheel_silent_ms", INDEX(WHEEL_SILENT), NUMBER, {NULL, NULL}},
     {"limits", "echo_ms", INDEX(ECHO), NUMBER, {NULL, NULL}},
     {"limits", "rest_rpm", INDEX(REST_RPM), NUMBER, {NULL, NULL}},
@@ -195,9 +196,7 @@ static void set_word(iw_settings_t *self, const row_t *row, unsigned word) {
 bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
     const row_t *const row = find(key);
     if (row == NULL) {
-        IWN_TEXT_JOIN(why, key,
-                      " is no key of this gateway: it has those of wheels, left, right, drive and limits; bus, estop, "
-                      "northbound and record are a daemon's, here they are built in");
+        IWN_TEXT_JOIN(why, key, " is no key of a board: those of wheels, left, right, drive and limits are");
         return false;
     }
     if (row->kind < WORDS) {

@@ -10,7 +10,7 @@
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/text.h"
 
-#define IW_SETTINGS 28U
+#define IW_SETTINGS 29U
 /// Version 0.2 had so many, in its own order.
 #define IW_SETTINGS_BEFORE 26U
 

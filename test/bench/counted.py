@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What can be counted rather than timed: instructions and bytes. The same on every machine with the same compiler."""
+import collections
 import re
 import subprocess
 import sys
@@ -90,6 +91,32 @@ def arm_profile(work, cpu):
     shown = sorted({name for name, count in [*idle.items(), *pair.items()] if count >= PROFILE_FROM}, key=lambda name: (-idle[name], -pair[name]))
     rest = [sum(count for name, count in of.items() if name not in shown) for of in (idle, pair)]
     return [*[(name, idle[name], pair[name]) for name in shown], ("all others together", *rest)]
+
+
+# What each source of the core is there for; one that is not named here stands under its own name.
+RULES = {
+    "setpoint": "R1, R4: ramps, periods, the zero hold", "envelope": "R8: the last check", "sender": "R5: both or none", "confirmation": "R6: no queue of old setpoints",
+    "follow": "a wheel that is faster, blocked or turns backwards", "diverge": "P1: the pair diverges", "watch_pair": "P1: the pair diverges",
+    "yaw": "P2: yaw", "current": "P4: current", "permit": "R2, R3: permission, causes and states", "cause": "R2, R3: permission, causes and states",
+    "codec": "frames", "wheel": "frames", "age": "ages of everything", "step": "the step itself", "gateway": "the step itself",
+}
+
+
+def sources_of_core():
+    """{function: source without its ending}"""
+    return {name: path.stem for path in sorted((ROOT / "core/src").glob("*.c"))
+            for name in re.findall(r"^(?!static const|typedef)[\w \*]*?\b(\w+)\([^;{}]*\) \{$", path.read_text(), re.M)}
+
+
+def arm_rules(work, cpu):
+    """Rows of (rule, instructions with nothing due, the same with a pair due), the costliest first."""
+    program, source = driving(work, cpu), sources_of_core()
+    costs = collections.defaultdict(lambda: [0, 0])
+    for column, profile in enumerate((program.profile("bench_idle"), program.profile("bench_pair"))):
+        for name, count in profile.items():
+            stem = source.get(name, "HAL of the benchmark, runtime library")
+            costs[RULES.get(stem, stem)][column] += count
+    return sorted(((rule, *cost) for rule, cost in costs.items()), key=lambda row: -row[2])
 
 
 def arm_steps(work, cpu, more=()):

@@ -16,7 +16,7 @@
 #define GAP_US      (100U * MS)
 #define RESTART_US  (100U * MS) ///< From the start of the process to the zeros.
 #define START_US    (5U * MS)   ///< The calls of a start take less.
-#define HOLD_MAX_US (13U * S)   ///< Ramp, ten seconds of zeros for wheels that will not stand, and some.
+#define HOLD_MAX_US (63U * S)   ///< Ramp, a minute of zeros for wheels that will not stand, and some.
 #define CALM_US     (300U * MS) ///< After trouble with the bus, gaps are not judged for so long.
 #define WATCHDOG_US S           ///< Of the wheels.
 #define WANTED      3U          ///< Commands that may still be followed: the last ones.

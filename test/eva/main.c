@@ -117,6 +117,7 @@ static void any_config(iw_config_t *out_config) {
     out_config->max_current_mA = any_within(IW_CONFIG_MAX_CURRENT);
     out_config->min_current_mA = any_within(IW_CONFIG_MIN_CURRENT);
     out_config->zero_hold_ms = any_within(IW_CONFIG_ZERO_HOLD);
+    out_config->hold_max_s = any_within(IW_CONFIG_HOLD_MAX);
     out_config->wheel_silent_ms = any_within(IW_CONFIG_WHEEL_SILENT);
     out_config->echo_ms = any_within(IW_CONFIG_ECHO);
     out_config->rest_rpm = any_within(IW_CONFIG_REST_RPM);

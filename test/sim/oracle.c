@@ -64,6 +64,11 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     }
 }
 
+iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us) {
+    const bool contested = self->foreign_us != IW_NEVER && self->foreign_us >= from_us;
+    return contested ? CONTESTED_US : (iw_time_us_t)self->config->hold_max_s * 1000U * MS;
+}
+
 static void lose_permission(oracle_t *self) {
     self->armed = false;
     self->fresh = false;
@@ -326,7 +331,8 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
         oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent || oracle_elapsed(now_us, self->held_us, HOLD_MAX_US + oracle_us(100)))) {
+        (self->latched_silent ||
+         oracle_elapsed(now_us, self->held_us, oracle_hold_max_us(self, self->held_us) + oracle_us(100)))) {
         oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -515,13 +521,15 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_STOPPING && !self->restarting) {
         if (!oracle_elapsed(now_us, self->stopped_us, oracle_us(self->config->zero_hold_ms)) ||
-            (!oracle_rested(self, now_us, SETTLED_US) && !oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US))) {
+            (!oracle_rested(self, now_us, SETTLED_US) &&
+             !oracle_elapsed(now_us, self->stopped_us, oracle_hold_max_us(self, self->stopped_us)))) {
             oracle_break(self, now_us, 506, "silent too early, %llu us after the stop",
                          (unsigned long long)(now_us - self->stopped_us));
         }
     }
     // A request before the first step after a stall finds the state of before it.
-    if (state == IW_STATE_STOPPING && oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US + oracle_us(1300)) &&
+    if (state == IW_STATE_STOPPING &&
+        oracle_elapsed(now_us, self->stopped_us, oracle_hold_max_us(self, self->stopped_us) + oracle_us(1300)) &&
         now_us - self->late_us > oracle_us(1000) && now_us - self->step_us < GAP_US) {
         oracle_break(self, now_us, 507, "STOPPING without end");
     }

@@ -17,8 +17,9 @@
 #define FIRST_LEASE_US (1000U * MS)
 
 /// Wheels that stood for this long end the zeros of a stop, and so does this much time.
-#define SETTLED_US  (500U * MS)
-#define HOLD_MAX_US (10000U * MS)
+#define SETTLED_US (500U * MS)
+/// Against a second master.
+#define CONTESTED_US (10000U * MS)
 
 /// A rule is broken; the first one is kept.
 __attribute__((format(printf, 4, 5))) void oracle_break(oracle_t *self, iw_time_us_t now_us, uint32_t rule,
@@ -32,6 +33,9 @@ iw_time_us_t oracle_us(uint32_t ms);
 /// Permission is over: zero at once, or by a ramp from then on.
 void oracle_hard_stop(oracle_t *self);
 void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
+
+/// The longest time of zeros that began then.
+iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us);
 
 /// Both wheels were heard, and stood for that long.
 bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us);

@@ -131,20 +131,21 @@ static void assert_told(const char *part) {
 }
 
 static void test_answers_that_wait_leave_a_place_for_an_arm(void) {
+    char part[64];
     run_until_listening();
     say(0, "{\"cmd\":\"alive\"}");
     gateway_judge_renew(&rig.judge);
     all_length = 0;
-    ask_for_status(2, 4);
+    say(1, "{\"cmd\":\"status\",\"id\":101}");
+    ask_for_status(2, IWN_LINE_CHANNELS - 1U);
     say(1, "{\"cmd\":\"arm\",\"id\":99}");
-    run_ms(60);
-    assert_told("\"id\":102,\"ok\":true");
-    assert_told("\"id\":103,\"ok\":true");
-    assert_told("\"id\":104,\"ok\":true");
-    assert_told("\"id\":105,\"ok\":false,\"error\":\"busy\"");
+    run_ms(120);
+    for (unsigned channel = 1; channel <= IWN_LINE_CHANNELS; channel++) {
+        (void)snprintf(part, sizeof part, "\"id\":%u,\"ok\":true", 100U + channel);
+        assert_told(part);
+    }
     assert_told("\"id\":99,\"ok\":true");
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-    assert_answer("{\"cmd\":\"status\",\"id\":7}", "\"id\":7,\"ok\":true"); // Places become free again.
 }
 
 static void test_answer_that_waits_for_a_closed_channel_frees_its_place(void) {
@@ -178,21 +179,25 @@ static void test_pending_pool_that_is_full_refuses_all_but_who_waits_already(voi
     static iw_pending_t pool;
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 1};
     memset(&pool, 0, sizeof pool);
-    for (iw_client_t client = 1; client < IW_PENDING_MAX; client++) {
+    for (iw_client_t client = 1; client <= IWN_LINE_CHANNELS; client++) {
         TEST_ASSERT_TRUE(iw_pending_has_room(&pool, client, IWN_CMD_STATUS));
         iw_pending_put(&pool, client, IWN_CMD_STATUS, &id);
     }
-    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 9, IWN_CMD_STATUS));
+    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 99, IWN_CMD_STATUS));
     TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 1, IWN_CMD_STATUS));
-    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 9, IWN_CMD_ARM));
-    iw_pending_put(&pool, 9, IWN_CMD_STATUS, &id); // Nothing is pushed out.
-    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 9, IWN_CMD_STATUS)->kind);
-    iw_pending_put(&pool, 9, IWN_CMD_ARM, &id);
+    iw_pending_put(&pool, 99, IWN_CMD_STATUS, &id); // Nothing is pushed out.
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 99, IWN_CMD_STATUS)->kind);
+    for (iw_client_t client = 1; client <= IW_PENDING_ARMS; client++) {
+        TEST_ASSERT_TRUE(iw_pending_has_room(&pool, client, IWN_CMD_ARM));
+        iw_pending_put(&pool, client, IWN_CMD_ARM, &id);
+    }
     TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
     iw_pending_forget(&pool, 2);
     TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
+    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 99, IWN_CMD_STATUS));
     TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 1, IWN_CMD_STATUS)->number);
-    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 3, IWN_CMD_STATUS)->number);
+    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 1, IWN_CMD_ARM)->number);
+    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, IWN_LINE_CHANNELS, IWN_CMD_STATUS)->number);
 }
 
 int main(void) {

@@ -47,18 +47,19 @@ static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void
     seen.present |= 1U << IW_CAUSE_ESTOP_LINE;
     iw_observe(&host, &seen);
     iw_observe(&host, &seen);
-    seen.rolling = seen.rolling_fault = true;
+    seen.rolling = seen.rolling_fault = seen.zeros_ending = true;
     iw_observe(&host, &seen);
     iw_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"rolling\",\"present\":true"));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"rolling\""));
-    seen.rolling = seen.rolling_fault = false;
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"zeros_ending\",\"present\":true"));
+    seen.rolling = seen.rolling_fault = seen.zeros_ending = false;
     iw_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"rolling\",\"present\":false"));
     TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"rolling\""));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"still_moving\",\"present\":true"));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"estop_line\",\"present\":true"));
-    TEST_ASSERT_EQUAL_UINT(4, count_of("\"event\":\"fault\""));
+    TEST_ASSERT_EQUAL_UINT(6, count_of("\"event\":\"fault\""));
 }
 
 static void test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others(void) {

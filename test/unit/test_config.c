@@ -24,6 +24,7 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, max_current_mA), 300, 2000, IW_CONFIG_MAX_CURRENT},
     {offsetof(iw_config_t, min_current_mA), 300, 2000, IW_CONFIG_MIN_CURRENT},
     {offsetof(iw_config_t, zero_hold_ms), 1100, 5000, IW_CONFIG_ZERO_HOLD},
+    {offsetof(iw_config_t, hold_max_s), 10, 600, IW_CONFIG_HOLD_MAX},
     {offsetof(iw_config_t, wheel_silent_ms), 20, 200, IW_CONFIG_WHEEL_SILENT},
     {offsetof(iw_config_t, echo_ms), 20, 200, IW_CONFIG_ECHO},
     {offsetof(iw_config_t, rest_rpm), 0, 1000, IW_CONFIG_REST_RPM},
@@ -78,6 +79,7 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT16(300, config.min_current_mA);
     TEST_ASSERT_FALSE(config.asymmetric_current);
     TEST_ASSERT_EQUAL_UINT16(1500, config.zero_hold_ms);
+    TEST_ASSERT_EQUAL_UINT16(60, config.hold_max_s);
     TEST_ASSERT_EQUAL_UINT16(50, config.wheel_silent_ms);
     TEST_ASSERT_EQUAL_UINT16(50, config.echo_ms);
     TEST_ASSERT_EQUAL_UINT16(2, config.rest_rpm);

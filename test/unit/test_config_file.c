@@ -105,7 +105,7 @@ static void test_parse_every_key_reaches_its_field(void) {
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
         "max_yaw_mrad_s=900\nyaw_accel_mrad_s2=1900\nmax_current_mA=1500\nmin_current_mA=400\nasymmetric_current=yes\n"
-        "zero_hold_ms=1200\n[limits]\nwheel_silent_ms="
+        "zero_hold_ms=1200\nhold_max_s=61\n[limits]\nwheel_silent_ms="
         "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\n"
@@ -133,9 +133,10 @@ static void test_parse_every_key_reaches_its_field(void) {
         core->period_ms,      core->lease_ms,     core->accel_mm_s2,     core->decel_mm_s2,       core->max_speed_mm_s,
         core->max_current_mA, core->zero_hold_ms, core->wheel_silent_ms, core->echo_ms,           core->rest_rpm,
         core->rest_ms,        core->follow_mm_s,  core->follow_ms,       core->blocked_ms,        core->pair_mm,
-        core->pair_leak_ms,   core->wheel_lag_ms, core->max_yaw_mrad_s,  core->yaw_accel_mrad_s2, core->min_current_mA};
-    const uint16_t wanted[] = {10,  300, 500, 2000, 900, 1500, 1200, 60,  70,   3,
-                               250, 310, 510, 1100, 61,  1001, 62,   900, 1900, 400};
+        core->pair_leak_ms,   core->wheel_lag_ms, core->max_yaw_mrad_s,  core->yaw_accel_mrad_s2, core->min_current_mA,
+        core->hold_max_s};
+    const uint16_t wanted[] = {10,  300, 500,  2000, 900,  1500, 1200, 60,   70,  3, 250,
+                               310, 510, 1100, 61,   1001, 62,   900,  1900, 400, 61};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_TRUE(core->asymmetric_current);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
@@ -194,6 +195,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         {"drive", "min_current_mA", 300, 2000},
         {"drive", "max_yaw_mrad_s", 50, 10000},
         {"drive", "yaw_accel_mrad_s2", 100, 10000},
+        {"drive", "hold_max_s", 10, 600},
     };
     char text[128];
     char cure[64];

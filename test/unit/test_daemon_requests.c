@@ -374,6 +374,16 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     return count;
 }
 
+static void test_end_of_zeros_is_told_before_it_comes(void) {
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
+    seen.zeros_ending = true;
+    gw_observe(&daemon->status, &seen);
+    TEST_ASSERT_TRUE(daemon->status.observed.zeros_ending);
+    TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
+}
+
 static void test_rolling_is_told_when_it_begins_and_when_it_ends(void) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"present\":true}"));
@@ -401,6 +411,7 @@ static void test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_end_of_zeros_is_told_before_it_comes);
     RUN_TEST(test_rolling_is_told_when_it_begins_and_when_it_ends);
     RUN_TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute);
     RUN_TEST(test_drive_reaches_the_wheel_it_is_for);

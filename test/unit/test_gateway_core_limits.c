@@ -166,13 +166,17 @@ static void test_gateway_hold_lasts_until_half_a_second_of_rest(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.permit.still_moving);
 }
 
-static void test_gateway_hold_ends_after_ten_seconds_with_a_rolling_wheel(void) {
+static void test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel(void) {
     drive_on();
     gateway_rig_stop(&rig);
     turn(5);
-    gateway_rig_run(&rig, MS(10200));
+    gateway_rig_run(&rig, MS(55000));
+    TEST_ASSERT_FALSE(gateway_rig_look(&rig).zeros_ending);
+    gateway_rig_run(&rig, MS(5200));
+    TEST_ASSERT_TRUE(gateway_rig_look(&rig).zeros_ending);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     gateway_rig_run(&rig, MS(150));
+    TEST_ASSERT_FALSE(gateway_rig_look(&rig).zeros_ending);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
 }
@@ -242,7 +246,7 @@ int main(void) {
     RUN_TEST(test_gateway_rest_counts_after_its_time_only);
     RUN_TEST(test_gateway_one_moving_wheel_is_enough_to_refuse);
     RUN_TEST(test_gateway_hold_lasts_until_half_a_second_of_rest);
-    RUN_TEST(test_gateway_hold_ends_after_ten_seconds_with_a_rolling_wheel);
+    RUN_TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel);
     RUN_TEST(test_gateway_late_step_starts_the_comparison_of_speeds_anew);
     RUN_TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet);
     RUN_TEST(test_gateway_takes_no_more_than_its_share_in_one_step);

@@ -156,7 +156,7 @@ static void test_gateway_drives_again_after_a_port_that_took_nothing_until_silen
     rig.bus.send_result[IW_LEFT] = 0;
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
-    gateway_rig_run(&rig, MS(12000)); // Longer than the longest hold.
+    gateway_rig_run(&rig, MS(62000)); // Longer than the longest hold.
     TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT);
     rig.bus.send_result[IW_LEFT] = 1;
     rig.bus.send_result[IW_RIGHT] = 1;

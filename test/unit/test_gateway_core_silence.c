@@ -33,7 +33,7 @@ static void drive_on(void) {
 
 /// To the step that ends the zeros of a stop.
 static void run_to_silence(void) {
-    for (unsigned n = 0; n < 12000U && (rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
+    for (unsigned n = 0; n < 70000U && (rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
          n++) {
         gateway_rig_run(&rig, 1000);
     }

@@ -61,16 +61,67 @@ static void test_permit_hold_waits_for_settled_wheels(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-static void test_permit_hold_ends_after_ten_seconds_and_tells_of_moving_wheels(void) {
+static void test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels(void) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
-    assert_holding_until(MS(10000), IW_STATE_LISTENING);
+    assert_holding_until(MS(60000), IW_STATE_LISTENING);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
     permit_rig_begin(&rig, PERMIT_HOLDING);
-    permit_rig_wait(&rig, MS(9999));
+    permit_rig_wait(&rig, MS(59999));
     rig.view.settled = true;
     permit_rig_wait(&rig, MS(1));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void test_permit_longest_hold_follows_the_configuration(void) {
+    rig.config.hold_max_s = 10;
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    assert_holding_until(MS(10000), IW_STATE_LISTENING);
+    rig.config.hold_max_s = 600;
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    assert_holding_until(MS(600000), IW_STATE_LATCHED);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+}
+
+/// Zeros between another master's setpoints only make the wheels jerk.
+static void test_permit_second_master_is_fought_for_ten_seconds(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(3000));
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    permit_rig_step(&rig);
+    assert_holding_until(MS(10000), IW_STATE_LATCHED);
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    permit_rig_wait(&rig, MS(20000));
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+}
+
+static void test_permit_second_master_of_before_the_hold_does_not_shorten_it(void) {
+    permit_rig_begin(&rig, PERMIT_LISTENING);
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    assert_holding_until(MS(60000), IW_STATE_LISTENING);
+}
+
+static void test_permit_end_of_zeros_is_told_five_seconds_before(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(54999));
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_wait(&rig, MS(1));
+    TEST_ASSERT_TRUE(iw_permit_ending(&rig.permit, rig.now_us));
+    rig.view.settled = true;
+    permit_rig_wait(&rig, 1);
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    permit_rig_wait(&rig, MS(59999));
+    TEST_ASSERT_TRUE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_wait(&rig, MS(1));
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(100000)));
 }
 
 static void test_permit_hold_of_a_cut_stop_begins_at_once(void) {
@@ -87,7 +138,7 @@ static void test_permit_latched_holds_zeros_as_stopping_does(void) {
     rig.view.settled = true;
     assert_holding_until(MS(1500), IW_STATE_LATCHED);
     permit_rig_begin(&rig, PERMIT_LATCHED);
-    assert_holding_until(MS(10000), IW_STATE_LATCHED);
+    assert_holding_until(MS(60000), IW_STATE_LATCHED);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
     permit_rig_wait(&rig, MS(60000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
@@ -376,7 +427,11 @@ int main(void) {
     RUN_TEST(test_permit_hold_begins_when_the_output_is_zero);
     RUN_TEST(test_permit_hold_follows_the_configuration);
     RUN_TEST(test_permit_hold_waits_for_settled_wheels);
-    RUN_TEST(test_permit_hold_ends_after_ten_seconds_and_tells_of_moving_wheels);
+    RUN_TEST(test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels);
+    RUN_TEST(test_permit_longest_hold_follows_the_configuration);
+    RUN_TEST(test_permit_second_master_is_fought_for_ten_seconds);
+    RUN_TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it);
+    RUN_TEST(test_permit_end_of_zeros_is_told_five_seconds_before);
     RUN_TEST(test_permit_hold_of_a_cut_stop_begins_at_once);
     RUN_TEST(test_permit_latched_holds_zeros_as_stopping_does);
     RUN_TEST(test_permit_latch_during_the_hold_begins_a_new_hold);

@@ -258,7 +258,7 @@ static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
 }
 
 static void test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after(void) {
-    static const iw_time_us_t after_us[] = {0, MS(1), MS(1000), MS(1600), MS(12000), MS(60000)};
+    static const iw_time_us_t after_us[] = {0, MS(1), MS(1000), MS(1600), MS(12000), MS(62000)};
     const iw_event_t estop = {IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, (uint32_t)OTHER, IW_REACT_BY_CAUSE};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
         permit_rig_begin(&rig, ((i & 1U) == 0U) ? PERMIT_ARMED : PERMIT_LISTENING);

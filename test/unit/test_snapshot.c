@@ -22,14 +22,14 @@ typedef struct {
 
 /// Every field, in the order of the struct.
 static const place_t places[] = {
-    PLACE(at_us),         PLACE(config),       PLACE(counters),        PLACE(sent),           PLACE(stop),
-    PLACE(assumed),       PLACE(seen_us),      PLACES_OF_WHEEL(0),     PLACES_OF_WHEEL(1),    PLACE(stopped),
-    PLACE(stray_echoes),  PLACE(pose_us),      PLACE(armed_us),        PLACE(lease_until_us), PLACE(stale_us),
-    PLACE(waiting_us),    PLACE(confirmed_us), PLACE(holder),          PLACE(stale_client),   PLACE(target),
-    PLACE(applied),       PLACE(present),      PLACE(assumed_changes), PLACE(pair_mm),        PLACE(pair_largest_mm),
-    PLACE(still_moving),  PLACE(state),        PLACE(arm_refusal),     PLACE(demand),         PLACE(bus),
-    PLACE(doubt),         PLACE(arming),       PLACE(output_zero),     PLACE(echo_proven),    PLACE(rolling),
-    PLACE(rolling_fault), PLACE(left_behind),
+    PLACE(at_us),        PLACE(config),        PLACE(counters),        PLACE(sent),           PLACE(stop),
+    PLACE(assumed),      PLACE(seen_us),       PLACES_OF_WHEEL(0),     PLACES_OF_WHEEL(1),    PLACE(stopped),
+    PLACE(stray_echoes), PLACE(pose_us),       PLACE(armed_us),        PLACE(lease_until_us), PLACE(stale_us),
+    PLACE(waiting_us),   PLACE(confirmed_us),  PLACE(holder),          PLACE(stale_client),   PLACE(target),
+    PLACE(applied),      PLACE(present),       PLACE(assumed_changes), PLACE(pair_mm),        PLACE(pair_largest_mm),
+    PLACE(still_moving), PLACE(state),         PLACE(arm_refusal),     PLACE(demand),         PLACE(bus),
+    PLACE(doubt),        PLACE(arming),        PLACE(output_zero),     PLACE(echo_proven),    PLACE(zeros_ending),
+    PLACE(rolling),      PLACE(rolling_fault), PLACE(left_behind),
 };
 #define PLACES (sizeof places / sizeof places[0])
 

@@ -134,6 +134,8 @@ static const settings_key_t keys[] = {
      "no: both wheels get the larger limit of a client, since unequal torque turns the machine.",
      WORD(core.asymmetric_current, no_yes)},
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
+    {"drive", "hold_max_s", " s", "With a wheel still moving zeros go on, but end after this: then the parking brake.",
+     CORE(hold_max_s, IW_CONFIG_HOLD_MAX)},
 
     {"limits", "wheel_silent_ms", " ms",
      "A wheel not heard for this long is lost; raise it for adapters that deliver late.",

@@ -214,6 +214,10 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
         observed->still_moving = seen->still_moving;
         tell_fault(self, "still_moving", true);
     }
+    if (seen->zeros_ending != observed->zeros_ending) {
+        observed->zeros_ending = seen->zeros_ending;
+        tell_fault(self, "zeros_ending", seen->zeros_ending);
+    }
     if (take_rolling_fault(observed, seen->rolling_fault, self->wheels->now_us)) {
         tell_fault(self, "rolling", seen->rolling_fault);
     }

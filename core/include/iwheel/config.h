@@ -32,6 +32,7 @@ typedef struct {
     uint16_t max_current_mA;  ///< 300..2000: with less a loaded wheel may have no torque to brake with.
     uint16_t min_current_mA;  ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..2000. Ours, no physics.
     uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
+    uint16_t hold_max_s;      ///< Zeros for a wheel that still moves end after this, 10..600.
     uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
     uint16_t echo_ms;         ///< A setpoint not echoed for this long is stalled, 20..200.
     uint16_t rest_rpm;        ///< At rest means |rpm| <= this, at most 60 mm/s at the wheel (iw_config_rest) ...
@@ -72,6 +73,7 @@ typedef enum {
     IW_CONFIG_MAX_CURRENT,
     IW_CONFIG_MIN_CURRENT,
     IW_CONFIG_ZERO_HOLD,
+    IW_CONFIG_HOLD_MAX,
     IW_CONFIG_WHEEL_SILENT,
     IW_CONFIG_ECHO,
     IW_CONFIG_REST_RPM,

@@ -87,8 +87,9 @@ typedef struct {
     bool arming;              ///< An arm that was granted waits for its TX confirmation.
     bool output_zero;         ///< The pair last sent was zero, or a stop without ramp has made the next one so.
     bool echo_proven;         ///< See `iw_bus_facts_t`.
-    bool rolling;             ///< A wheel turns faster than 100 mm/s and nothing is sent to it.
-    bool rolling_fault;       ///< That began within 10 s after the last setpoint: the machine rolls away.
+    bool zeros_ending;  ///< A wheel still moves after a stop, and in 5 s at the latest nothing is sent to it any more.
+    bool rolling;       ///< A wheel turns faster than 100 mm/s and nothing is sent to it.
+    bool rolling_fault; ///< That began within 10 s after the last setpoint: the machine rolls away.
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;

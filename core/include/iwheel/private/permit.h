@@ -37,8 +37,10 @@
 #define IW_PERMIT_EVENT_US 1000000U
 /// Zeros are held until both wheels were at rest for this long ...
 #define IW_PERMIT_SETTLED_US 500000U
-/// ... but at most this long.
-#define IW_PERMIT_HOLD_MAX_US 10000000U
+/// ... but at most for `hold_max_s`, and no longer than this against a second master.
+#define IW_PERMIT_CONTESTED_US 10000000U
+/// So long before the end of zeros for a wheel that still moves that is reported.
+#define IW_PERMIT_ENDING_US 5000000U
 
 /// The states of the diagram above. Those in which time ends the zeros stand together; the latched ones come last.
 typedef enum {
@@ -83,7 +85,7 @@ typedef struct {
     iw_client_t blocked;        ///< Whose wheels did not follow when they stopped: refused as such until the hold ends.
     uint32_t raised;            ///< Bit per cause: raised since the last step.
     uint32_t present;           ///< Bit per cause: raised in the step before.
-    uint32_t still_moving;      ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
+    uint32_t still_moving;      ///< Holds that ended by their longest time with a wheel not at rest.
     iw_time_us_t armed_us;      ///< When ARMED began or the lease was taken over: only later commands are fresh.
     iw_time_us_t lease_from_us; ///< The last accepted drive command, or arm.
     iw_time_us_t lease_until_us;     ///< Without another one the lease ends here.
@@ -167,6 +169,9 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us);
 /// Bit per latching cause that keeps reset from succeeding now (present, or event-like and seen less than
 /// IW_PERMIT_EVENT_US ago).
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us);
+
+/// A wheel still moves, or is not heard, and in IW_PERMIT_ENDING_US at the latest the zeros end all the same.
+bool iw_permit_ending(const iw_permit_t *self, iw_time_us_t now_us);
 
 /// When `iw_permit_step` has something to do although nothing happened; IW_NEVER if it has not.
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self);
