@@ -56,11 +56,10 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
 
 static void tell_estop(const ros_facts_t *facts, ros_status_t *status) {
     const char *state = facts->machine.estop;
-    if (strcmp(state, "released") == 0 && !facts->machine.estop_tried && !facts->machine.estop_simulated) {
-        say(status, ROS_WARN,
-            "released, but its button was never seen to work on this wiring: press it, then release it");
-    } else if (strcmp(state, "released") == 0) {
-        say(status, ROS_OK, "released");
+    const bool untried = !facts->machine.estop_tried && !facts->machine.estop_simulated;
+    if (strcmp(state, "released") == 0) {
+        say(status, untried ? ROS_WARN : ROS_OK, "released%s",
+            untried ? ", but its button was never seen to work on this wiring: press it, then release it" : "");
     } else if (strcmp(state, "none") == 0) {
         say(status, ROS_WARN,
             "there is no e-stop line: no button of this machine stops the wheels; see [estop] line in gateway.conf");

@@ -173,6 +173,11 @@ static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
     TEST_ASSERT_TRUE(wheels->health.present[IW_LEFT][GW_BATTERY_LOW]);
     TEST_ASSERT_TRUE(is_warned_of("the right wheel's battery has "));
     TEST_ASSERT_FALSE(is_warned_of("degC"));
+    wheels->health.present[IW_RIGHT][GW_BATTERY_LOW] = false;
+    wheels->health.changes++;
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(is_warned_of("the left wheel's battery has "));
+    TEST_ASSERT_FALSE(is_warned_of("the right wheel's battery has "));
 }
 
 static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {

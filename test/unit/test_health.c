@@ -112,9 +112,9 @@ static void test_health_sentences_name_wheel_value_and_threshold(void) {
     told[IW_LEFT].status.battery_dV = 219;
     told[IW_RIGHT].status.temperature_degC = 61;
     step(0);
-    gw_health_sentence(&health, &seen, IW_LEFT, GW_BATTERY_LOW, text, sizeof text);
+    gw_health_sentence(&health, &seen, IW_LEFT, GW_BATTERY_LOW, text);
     TEST_ASSERT_EQUAL_STRING("the left wheel's battery has 219 dV, below battery_low_dV 220; charge it", text);
-    gw_health_sentence(&health, &seen, IW_RIGHT, GW_TEMPERATURE_HIGH, text, sizeof text);
+    gw_health_sentence(&health, &seen, IW_RIGHT, GW_TEMPERATURE_HIGH, text);
     TEST_ASSERT_EQUAL_STRING("the right wheel has 61 degC, above temperature_high_degC 60; let it cool", text);
 }
 

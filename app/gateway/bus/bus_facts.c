@@ -28,8 +28,8 @@ const char *gw_bus_facts_timing(const inspect_wish_t *wish, const iw_bus_link_t 
 }
 
 __attribute__((format(printf, 2, 3))) static void warn(gw_wheels_t *wheels, const char *format, ...) {
+    va_list arguments;
     if (wheels->warnings < GW_WARNINGS) {
-        va_list arguments;
         va_start(arguments, format);
         (void)vsnprintf(wheels->warning[wheels->warnings], GW_WARNING_SIZE, format, arguments);
         va_end(arguments);
@@ -44,7 +44,7 @@ static void warn_of_health(gw_wheels_t *wheels) {
         const iw_side_t side = (iw_side_t)(i / GW_AILMENTS);
         const gw_ailment_t ailment = (gw_ailment_t)(i % GW_AILMENTS);
         if (wheels->health.present[side][ailment]) {
-            gw_health_sentence(&wheels->health, &seen, side, ailment, sentence, sizeof sentence);
+            gw_health_sentence(&wheels->health, &seen, side, ailment, sentence);
             warn(wheels, "%s", sentence);
         }
     }

@@ -164,10 +164,10 @@ static bool is_any_unwell(const gw_health_t *health, gw_ailment_t ailment) {
 static void tell_ailment(gw_status_t *self, const iw_snapshot_t *seen, const gw_health_t *before, gw_ailment_t ailment,
                          const char *name) {
     const gw_health_t *health = &self->wheels->health;
-    char sentence[GW_WARNING_SIZE];
+    char sentence[GW_HEALTH_TEXT_SIZE];
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if (health->present[side][ailment] && !before->present[side][ailment]) {
-            gw_health_sentence(health, seen, (iw_side_t)side, ailment, sentence, sizeof sentence);
+            gw_health_sentence(health, seen, (iw_side_t)side, ailment, sentence);
             gw_log(self->log, GW_LOG_WARNING, "%s", sentence);
         }
     }

@@ -47,15 +47,17 @@ void gw_health_look(gw_health_t *self, const iw_snapshot_t *seen) {
 }
 
 void gw_health_sentence(const gw_health_t *self, const iw_snapshot_t *seen, iw_side_t side, gw_ailment_t ailment,
-                        char *out_text, size_t size) {
+                        char out_text[GW_HEALTH_TEXT_SIZE]) {
     const char *name = (side == IW_LEFT) ? "left" : "right";
     unsigned value = 0;
     (void)find_value(seen, side, ailment, &value);
     if (ailment == GW_BATTERY_LOW) {
-        (void)snprintf(out_text, size, "the %s wheel's battery has %u dV, below battery_low_dV %u; charge it", name,
-                       value, self->limits.battery_low_dV);
+        (void)snprintf(out_text, GW_HEALTH_TEXT_SIZE,
+                       "the %s wheel's battery has %u dV, below battery_low_dV %u; charge it", name, value,
+                       self->limits.battery_low_dV);
     } else {
-        (void)snprintf(out_text, size, "the %s wheel has %u degC, above temperature_high_degC %u; let it cool", name,
-                       value, self->limits.temperature_high_degC);
+        (void)snprintf(out_text, GW_HEALTH_TEXT_SIZE,
+                       "the %s wheel has %u degC, above temperature_high_degC %u; let it cool", name, value,
+                       self->limits.temperature_high_degC);
     }
 }

@@ -11,6 +11,8 @@
 
 /// A value must last this long: a battery's voltage dips with every start.
 #define GW_HEALTH_US 5000000U
+/// A sentence about it, with its terminator.
+#define GW_HEALTH_TEXT_SIZE 128U
 /// A status older than this is not known.
 #define GW_HEALTH_FRESH_US 1000000U
 
@@ -35,6 +37,6 @@ void gw_health_look(gw_health_t *self, const iw_snapshot_t *seen);
 
 /// "the left wheel's battery has 228 dV, below battery_low_dV 230", of a fault that is present.
 void gw_health_sentence(const gw_health_t *self, const iw_snapshot_t *seen, iw_side_t side, gw_ailment_t ailment,
-                        char *out_text, size_t size);
+                        char out_text[GW_HEALTH_TEXT_SIZE]);
 
 #endif
