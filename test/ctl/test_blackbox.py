@@ -393,14 +393,14 @@ class ShortBox(WithRig):
     config = {"record": {"blackbox_s": 2}}
 
     def test_recording_that_begins_in_the_middle_of_a_drive_is_taken_up(self):
-        stream = self.drive(4.0, 700, -500)
+        stream = self.drive(4.0, 300, -200)
         self.rig.press()
         time.sleep(0.3)
         stream.stop()
         _, out, err = self.ctl("replay", self.wait_whole(1) + ".log")
         self.assertEqual("", err)
         self.assertIn("its state is taken over", out)
-        self.assertIn("pressed while driving 700/-500 mm/s", out)
+        self.assertIn("pressed while driving 300/-200 mm/s", out)
         self.assertRegex(out, r"stops: (\d+) of \1 as recorded")
         self.assertRegex(out, r"answers to requests: (\d+) of \1 as recorded")
         self.assertNotIn("DIFFERENT", out)
