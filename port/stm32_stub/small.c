@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// What the C library and the compiler's own library have in faster and larger forms: the gateway image would not fit into the 62 KiB of an
+// STM32F103. Nothing here runs within a step of the core; texts and lines use it.
+#include <stddef.h>
+#include <stdint.h>
+
+void *memcpy(void *restrict to, const void *restrict from, size_t size);
+void *memmove(void *to, const void *from, size_t size);
+void *memset(void *to, int value, size_t size);
+int memcmp(const void *one, const void *other, size_t size);
+size_t strlen(const char *text);
+int strncmp(const char *one, const char *other, size_t size);
+int strcmp(const char *one, const char *other);
+char *strchr(const char *text, int wanted);
+uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest);
+
+void *memmove(void *to, const void *from, size_t size) {
+    uint8_t *const target = to;
+    const uint8_t *const source = from;
+    if (target <= source) {
+        for (size_t i = 0; i < size; i++) {
+            target[i] = source[i];
+        }
+    } else {
+        for (size_t i = size; i > 0; i--) {
+            target[i - 1U] = source[i - 1U];
+        }
+    }
+    return to;
+}
+
+void *memcpy(void *restrict to, const void *restrict from, size_t size) {
+    uint8_t *const target = to;
+    const uint8_t *const source = from;
+    for (size_t i = 0; i < size; i++) {
+        target[i] = source[i];
+    }
+    return to;
+}
+
+void *memset(void *to, int value, size_t size) {
+    uint8_t *const target = to;
+    for (size_t i = 0; i < size; i++) {
+        target[i] = (uint8_t)value;
+    }
+    return to;
+}
+
+int memcmp(const void *one, const void *other, size_t size) {
+    const uint8_t *const left = one;
+    const uint8_t *const right = other;
+    for (size_t i = 0; i < size; i++) {
+        if (left[i] != right[i]) {
+            return (int)left[i] - (int)right[i];
+        }
+    }
+    return 0;
+}
+
+size_t strlen(const char *text) {
+    size_t length = 0;
+    while (text[length] != '\0') {
+        length++;
+    }
+    return length;
+}
+
+int strncmp(const char *one, const char *other, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        if (one[i] != other[i] || one[i] == '\0') {
+            return (int)(uint8_t)one[i] - (int)(uint8_t)other[i];
+        }
+    }
+    return 0;
+}
+
+int strcmp(const char *one, const char *other) {
+    return strncmp(one, other, SIZE_MAX);
+}
+
+char *strchr(const char *text, int wanted) {
+    for (; *text != (char)wanted; text++) {
+        if (*text == '\0') {
+            return NULL;
+        }
+    }
+    return (char *)(uintptr_t)text;
+}
+
+/// For the run-time functions of a division of 64 bits; one bit after the other. A division by 0 gives 0, as Cortex-M's own.
+uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
+    uint64_t quotient = 0;
+    uint64_t rest = 0;
+    for (unsigned bit = 64; bit > 0U && divisor != 0U; bit--) {
+        const uint64_t carry = rest >> 63U;
+        rest = rest << 1U | number >> 63U;
+        number <<= 1U;
+        quotient <<= 1U;
+        if (carry != 0U || rest >= divisor) {
+            rest -= divisor;
+            quotient |= 1U;
+        }
+    }
+    if (out_rest != NULL) {
+        *out_rest = rest;
+    }
+    return quotient;
+}
