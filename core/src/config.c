@@ -126,6 +126,9 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->rest_rpm > iw_config_rest(config).max) {
         return IW_CONFIG_REST_SPEED;
     }
+    if (config->min_current_mA > config->max_current_mA) {
+        return IW_CONFIG_MIN_CURRENT;
+    }
     return (client_lost_ms(config) > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;
 }
 

@@ -229,6 +229,9 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
         iwn_text_int(why, iw_config_rest(&config).standard);
         IWN_TEXT_JOIN(why, " first");
         return false;
+    case IW_CONFIG_MIN_CURRENT:
+        IWN_TEXT_JOIN(why, "min_current_mA must not be more than max_current_mA");
+        return false;
     case IW_CONFIG_GEAR_RATIO:
         IWN_TEXT_JOIN(why, "gear_ratio must lie within 1 and 100");
         return false;

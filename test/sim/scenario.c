@@ -116,6 +116,9 @@ static void draw_config(scenario_t *self, sim_random_t *random) {
     config->wheel_lag_ms = (uint16_t)(60U + self->slow_permille * 2U / 1000U);
     config->pair_mm = (uint16_t)(60U + self->seed % 4U * 30U);
     config->min_current_mA = (uint16_t)(300U + self->seed % 5U * 200U);
+    if (config->min_current_mA > config->max_current_mA) {
+        config->min_current_mA = config->max_current_mA;
+    }
     config->hold_max_s = (uint16_t)(10U + self->seed % 3U * 8U);
     config->asymmetric_current = self->seed % 7U == 3U;
     config->max_yaw_mrad_s = yaws[self->seed / 4U % 4U].max_mrad_s;

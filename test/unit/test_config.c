@@ -301,6 +301,17 @@ static void test_rest_default_is_permitted_with_every_radius(void) {
     }
 }
 
+static void test_check_current_floor_is_at_most_the_maximum(void) {
+    for (uint16_t max_mA = 300; max_mA <= 2000U; max_mA = (uint16_t)(max_mA + 100U)) {
+        config.max_current_mA = max_mA;
+        config.min_current_mA = max_mA;
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+        config.max_current_mA--;
+        TEST_ASSERT_EQUAL_INT((max_mA > 300U) ? IW_CONFIG_MIN_CURRENT : IW_CONFIG_MAX_CURRENT,
+                              iw_config_check(&config));
+    }
+}
+
 static void test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget(void) {
     config.decel_mm_s2 = 100;
     config.rest_rpm = 3;
@@ -384,6 +395,7 @@ int main(void) {
     RUN_TEST(test_check_gear_ratio_comes_before_the_stop_budget);
     RUN_TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel);
     RUN_TEST(test_rest_default_is_permitted_with_every_radius);
+    RUN_TEST(test_check_current_floor_is_at_most_the_maximum);
     RUN_TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget);
     RUN_TEST(test_stop_budget_is_of_the_configured_radius);
     RUN_TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand);

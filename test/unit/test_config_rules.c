@@ -60,6 +60,8 @@ static void test_parse_value_that_undoes_a_rule_is_refused_with_the_rule(void) {
         {"[wheels]\nradius_mm = 20\n", "rule R15, a wrong radius", "write 60..400 mm"},
         {"[limits]\nrest_rpm = 3\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
         {"[limits]\nrest_rpm = 20\n", "rule R15, a wheel that rolls", "write 0..2 rpm, or leave the key out to have 2"},
+        {"[drive]\nmin_current_mA = 2000\nmax_current_mA = 1999\n", "rule R15, no limit of a client",
+         "max_current_mA = 2000 at least"},
         {"[limits]\nrest_rpm = 1001\n", "rule R15, a wheel that rolls", "write 0..1000 rpm"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {

@@ -292,6 +292,12 @@ static void relate(settings_report_t *report, const void *values, const unsigned
             (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
     } else if (fault == IW_CONFIG_REST_SPEED) {
         complain_rest(report, core, line_of(IW_CONFIG_REST_RPM, lines));
+    } else if (fault == IW_CONFIG_MIN_CURRENT) {
+        settings_complain(
+            report, line_of(IW_CONFIG_MIN_CURRENT, lines),
+            "min_current_mA = %u is more than max_current_mA = %u: rule R15, no limit of a client would be "
+            "permitted; write min_current_mA = %u at most, or max_current_mA = %u at least",
+            core->min_current_mA, core->max_current_mA, core->max_current_mA, core->min_current_mA);
     } else if (fault != IW_CONFIG_OK) {
         settings_complain(report, 0, "the values do not fit together (fault %d); compare with share/gateway.conf",
                           (int)fault);

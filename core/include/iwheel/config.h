@@ -30,7 +30,7 @@ typedef struct {
     uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
     uint16_t max_speed_mm_s;  ///< 10..5000. Faster commands are scaled, both wheels by one factor.
     uint16_t max_current_mA;  ///< 300..2000: with less a loaded wheel may have no torque to brake with.
-    uint16_t min_current_mA;  ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..2000. Ours, no physics.
+    uint16_t min_current_mA;  ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..`max_current_mA`. Ours, no physics.
     uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
     uint16_t hold_max_s;      ///< Zeros for a wheel that still moves end after this, 10..600.
     uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
