@@ -10,13 +10,17 @@
 /// More time than this between two steps does not count: the steps would be late, and late ones do not compare.
 #define ELAPSED_MAX_US 50000U
 /// No speed and no deviation counts beyond these: far more than is configurable.
-#define MEASURED_MAX_MM_S 40000
-#define PATH_MAX_UM       1000000
+#define SPEED_MAX_MM_S 40000
+#define PATH_MAX_UM    1000000
 
-void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm) {
+/// 1 rpm of a wheel of IW_SETPOINT_RADIUS_MM, in um/s: 2 pi x 192 mm / 60 s.
+#define UM_S_PER_RPM 20106U
+
+void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config) {
     memset(self, 0, sizeof *self);
     self->config = config;
-    self->um_s_per_rpm = (int32_t)um_s_per_rpm;
+    self->um_s_per_rpm =
+        (int32_t)(config->rpm_of_rotor ? UM_S_PER_RPM * config->gear_per / config->gear_turns : UM_S_PER_RPM);
 }
 
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us) {
@@ -35,7 +39,7 @@ static int32_t clamp(int32_t value, int32_t bound) {
 }
 
 static IW_APART int32_t measured_um_s(const iw_diverge_t *self, size_t side) {
-    return clamp(self->measured_mm_s[side], MEASURED_MAX_MM_S) * 1000;
+    return clamp(self->measured_mm_s[side], SPEED_MAX_MM_S) * 1000;
 }
 
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us) {
@@ -79,7 +83,8 @@ static void integrate(iw_diverge_t *self, uint32_t elapsed_us) {
     const iw_config_t *const config = self->config;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t short_of = self->applied_mm_s[side] * 1000 - self->expected_um_s[side];
-        self->expected_um_s[side] += lagging(short_of, elapsed_us, config->wheel_lag_ms);
+        const int32_t next = self->expected_um_s[side] + lagging(short_of, elapsed_us, config->wheel_lag_ms);
+        self->expected_um_s[side] = clamp(next, SPEED_MAX_MM_S * 1000);
     }
     const int32_t left = beyond_um_s(self, IW_LEFT);
     const int32_t right = beyond_um_s(self, IW_RIGHT);

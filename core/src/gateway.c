@@ -46,8 +46,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     self->purged_us = IW_NEVER;
     init_wheel(self, IW_LEFT, now_us);
     init_wheel(self, IW_RIGHT, now_us);
-    iw_diverge_init(&self->diverge, &self->config,
-                    self->wheel[IW_LEFT].um_s_per_rpm * IW_SETPOINT_RADIUS_MM / self->config.radius_mm);
+    iw_diverge_init(&self->diverge, &self->config);
     iw_rolling_init(&self->rolling);
     iw_permit_init(&self->permit, &self->config, now_us, restarted);
     iw_setpoint_init(&self->setpoint, &self->config);

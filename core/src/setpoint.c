@@ -13,7 +13,7 @@
 
 /// One of the quantities that ramp: its way in this step, and which share of that it may go.
 typedef struct {
-    int32_t way;
+    int32_t aim;
     bool braking; ///< Towards zero.
     uint32_t fraction;
 } axis_t;
@@ -126,7 +126,7 @@ static void plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t aw
     const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
     const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value);
     const uint32_t allowed = braking ? towards : away;
-    axis->way = aim - *value;
+    axis->aim = aim;
     axis->braking = braking;
     axis->fraction = (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
 }
@@ -139,61 +139,64 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// One common share of all ways; braking quantities do not wait for accelerating ones.
-static IW_APART void level(axis_t *axes, size_t count) {
+static IW_APART void level(axis_t *axes) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < AXES; i++) {
         all = (axes[i].fraction < all) ? axes[i].fraction : all;
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    for (axis_t *axis = axes; axis < axes + count; axis++) {
+    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
         axis->fraction = axis->braking ? braking : all;
     }
 }
 
-static IW_APART int32_t part_of_way(const axis_t *axis) {
-    return (int32_t)((int64_t)axis->fraction * axis->way / (int64_t)FRACTION_ONE);
+static IW_APART int32_t part_of_way(const axis_t *axis, int32_t value) {
+    const int32_t way = axis->aim - value;
+    return (int32_t)((int64_t)axis->fraction * way / (int64_t)FRACTION_ONE);
 }
 
 /// What wheels that brake, or those that do not, would do to the difference of both: right minus left.
-static IW_APART int32_t turn_by(const axis_t *axes, bool braking) {
-    const int32_t left = (axes[IW_LEFT].braking == braking) ? part_of_way(&axes[IW_LEFT]) : 0;
-    const int32_t right = (axes[IW_RIGHT].braking == braking) ? part_of_way(&axes[IW_RIGHT]) : 0;
+static IW_APART int32_t turn_by(const int32_t *values, const axis_t *axes, bool braking) {
+    const int32_t left = (axes[IW_LEFT].braking == braking) ? part_of_way(&axes[IW_LEFT], values[IW_LEFT]) : 0;
+    const int32_t right = (axes[IW_RIGHT].braking == braking) ? part_of_way(&axes[IW_RIGHT], values[IW_RIGHT]) : 0;
     return right - left;
 }
 
 /// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
-static IW_APART void cut_step(axis_t *axes, size_t count, bool braking, uint32_t fraction) {
-    for (axis_t *axis = axes; axis < axes + count; axis++) {
-        if (axis->braking == braking) {
-            axis->fraction = (uint32_t)((uint64_t)axis->fraction * fraction / FRACTION_ONE);
+static IW_APART void cut_step(axis_t *axes, bool braking, uint32_t fraction) {
+    for (size_t i = 0; i < AXES; i++) {
+        const uint32_t cut = (uint32_t)((uint64_t)axes[i].fraction * fraction / FRACTION_ONE);
+        if (axes[i].braking == braking && cut < axes[i].fraction) {
+            axes[i].fraction = cut;
         }
     }
 }
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
 /// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
-/// it gets there.
-static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uint32_t us) {
+/// it gets there. A stop is not slowed: towards 0/0 all speeds brake by one share, and yaw only falls.
+static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
-    const int32_t braking = turn_by(axes, true);
-    const int32_t faster = turn_by(axes, false);
+    const int32_t braking = turn_by(self->speed_um_s, axes, true);
+    const int32_t faster = turn_by(self->speed_um_s, axes, false);
     const int32_t braked = from + braking;
     if (iw_magnitude(braked + faster) <= bound) {
         return;
     }
-    if (iw_magnitude(braked) <= bound) {
-        cut_step(axes, count, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
-    } else {
-        cut_step(axes, count, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
-        cut_step(axes, count, false, 0);
+    if (faster != 0 && iw_magnitude(braked) <= bound) {
+        cut_step(axes, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+    } else if (braking != 0) {
+        cut_step(axes, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        cut_step(axes, false, 0);
     }
 }
 
 static void move(int32_t *values, const axis_t *axes) {
-    values[IW_LEFT] += part_of_way(&axes[IW_LEFT]);
-    values[IW_RIGHT] += part_of_way(&axes[IW_RIGHT]);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        values[side] += part_of_way(&axes[side], values[side]);
+    }
 }
 
 /// True if this wheel's speed and current are where they should be.
@@ -214,27 +217,18 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const uint32_t away = ramp_step(config->accel_mm_s2, away_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
+    const uint32_t current_away = current_step(config, away);
+    const uint32_t current_towards = current_step(config, towards);
     axis_t axes[AXES];
     for (size_t side = 0; side < IW_SIDES; side++) {
+        const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
         plan(&axes[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
+        plan(&axes[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
     }
-    if (ramps_current) {
-        const uint32_t current_away = current_step(config, away);
-        const uint32_t current_towards = current_step(config, towards);
-        for (size_t side = 0; side < IW_SIDES; side++) {
-            plan(&axes[IW_SIDES + side], &self->current_uA[side], target[side].current_mA * 1000, current_away,
-                 current_towards);
-        }
-    }
-    const size_t count = ramps_current ? AXES : IW_SIDES;
-    level(axes, count);
-    if (target[IW_LEFT].speed_mm_s != 0 || target[IW_RIGHT].speed_mm_s != 0) { // A stop is not for it to slow.
-        limit_yaw(self, axes, count, away_us);
-    }
+    level(axes);
+    limit_yaw(self, axes, away_us);
     move(self->speed_um_s, axes);
-    if (ramps_current) {
-        move(self->current_uA, &axes[IW_SIDES]);
-    }
+    move(self->current_uA, &axes[IW_SIDES]);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {

@@ -22,8 +22,8 @@ bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {
     if (turn_mm_s <= self->most_mm_s) {
         return false;
     }
-    speed_mm_s[IW_LEFT] = speed_mm_s[IW_LEFT] * self->most_mm_s / turn_mm_s;
-    speed_mm_s[IW_RIGHT] = speed_mm_s[IW_RIGHT] * self->most_mm_s / turn_mm_s;
+    speed_mm_s[IW_LEFT] = (int16_t)(speed_mm_s[IW_LEFT] * self->most_mm_s / turn_mm_s);
+    speed_mm_s[IW_RIGHT] = (int16_t)(speed_mm_s[IW_RIGHT] * self->most_mm_s / turn_mm_s);
     return true;
 }
 

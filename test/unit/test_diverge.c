@@ -19,7 +19,7 @@ static iw_diverge_verdict_t verdict;
 static void begin(void) {
     memset(&pair, FIXTURE_POISON, sizeof pair);
     now_us = FIXTURE_START_US;
-    iw_diverge_init(&pair, &config, UM_S_PER_RPM);
+    iw_diverge_init(&pair, &config);
     iw_diverge_restart(&pair, now_us);
 }
 

@@ -52,8 +52,8 @@ typedef struct {
     iw_time_us_t begun_us;           ///< When the drive began.
 } iw_diverge_t;
 
-/// `config` must be checked and outlive it. `um_s_per_rpm`: of both wheels.
-void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm);
+/// `config` must be checked and outlive it.
+void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config);
 
 /// The drive that began at that time is going on: with a new one the deviation, and the largest of it, begin from zero.
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us);
