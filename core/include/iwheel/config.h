@@ -25,14 +25,14 @@ typedef struct {
     bool invert[IW_SIDES];          ///< This wheel is mounted mirrored: negate its speed, both ways.
     iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
     uint16_t period_ms;                   ///< Spacing of setpoint pairs, 5..50.
-    uint16_t lease_ms;        ///< A drive command holds this long, 20..500. Three client periods are a good value.
-    uint16_t accel_mm_s2;     ///< Slope away from zero, 50..20000.
-    uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
-    uint16_t max_speed_mm_s;  ///< 10..5000. Faster commands are scaled, both wheels by one factor.
-    uint16_t max_current_mA;  ///< 300..2000: with less a loaded wheel may have no torque to brake with.
-    uint16_t min_current_mA;  ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..`max_current_mA`. Ours, no physics.
-    uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
-    uint16_t hold_max_s;      ///< Zeros for a wheel that still moves end after this, 10..600.
+    uint16_t lease_ms;       ///< A drive command holds this long, 20..500. Three client periods are a good value.
+    uint16_t accel_mm_s2;    ///< Slope away from zero, 50..20000.
+    uint16_t decel_mm_s2;    ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
+    uint16_t max_speed_mm_s; ///< 10..5000. Faster commands are scaled, both wheels by one factor.
+    uint16_t max_current_mA; ///< 300..2000: with less a loaded wheel may have no torque to brake with.
+    uint16_t min_current_mA; ///< IW_ROLE_LIMIT: no limit of a client is lower, 300..`max_current_mA`. Ours, no physics.
+    uint16_t zero_hold_ms;   ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
+    uint16_t hold_max_s;     ///< Zeros for a wheel that still moves end after this, 10..600.
     uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
     uint16_t echo_ms;         ///< A setpoint not echoed for this long is stalled, 20..200.
     uint16_t rest_rpm;        ///< At rest means |rpm| <= this, at most 60 mm/s at the wheel (iw_config_rest) ...
@@ -111,7 +111,8 @@ typedef struct {
     uint16_t standard; ///< The largest whole rpm of telemetry that is at most 45 mm/s at the wheel, at least 1.
     uint16_t max;      ///< The same for 60 mm/s: more would call a wheel that rolls at rest.
 } iw_config_rest_t;
-/// Of a configuration whose radius and gear are within their ranges. Whoever sets them sets `rest_rpm` by this.
+/// Of a configuration whose radius, gear and gear ratio are within their ranges. Whoever sets them sets `rest_rpm` by
+/// this.
 iw_config_rest_t iw_config_rest(const iw_config_t *config);
 
 /// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
