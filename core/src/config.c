@@ -36,6 +36,8 @@ static const iw_config_t standard = {
     .setpoint_dlc = IW_DLC_SETPOINT,
 };
 
+#define RADIUS_MAX_MM 400
+
 /// Ranges of the numbers of iw_config_t, in its order: so one loop checks all of them. Indexed by
 /// iw_config_fault_t - IW_CONFIG_PERIOD.
 static const iw_config_range_t ranges[] = {
@@ -61,7 +63,7 @@ static const iw_config_range_t ranges[] = {
     {50, 10000},                        // max_yaw_mrad_s
     {100, 10000},                       // yaw_accel_mrad_s2
     {200, 1500},                        // track_mm
-    {60, 400},                          // radius_mm
+    {60, RADIUS_MAX_MM},                // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per
     {IW_DLC_SETPOINT, IW_CAN_DATA_MAX}, // setpoint_dlc
@@ -79,6 +81,8 @@ IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (FIELDS - 1U) * 
 /// 1 rpm at a radius of 1 mm is 0.10472 mm/s: 2618 / 25000.
 #define RPM_TERM  2618U
 #define MM_S_TERM 25000U
+// A rotor turns at least as often as its wheel (check_relations): then its rpm are more, not fewer.
+IW_STATIC_ASSERT(REST_STANDARD_MM_S *MM_S_TERM >= RPM_TERM * RADIUS_MAX_MM, one_rpm_is_rest_with_every_wheel);
 
 static uint32_t divide_up(uint32_t numerator, uint32_t denominator) {
     return (numerator + denominator - 1U) / denominator;
@@ -96,8 +100,8 @@ static uint32_t slowest_rpm(const iw_config_t *config, uint32_t speed_mm_s) {
 }
 
 iw_config_rest_t iw_config_rest(const iw_config_t *config) {
-    const uint32_t usual = slowest_rpm(config, REST_STANDARD_MM_S);
-    const iw_config_rest_t rest = {(uint16_t)((usual > 0U) ? usual : 1U), (uint16_t)slowest_rpm(config, REST_MAX_MM_S)};
+    const iw_config_rest_t rest = {(uint16_t)slowest_rpm(config, REST_STANDARD_MM_S),
+                                   (uint16_t)slowest_rpm(config, REST_MAX_MM_S)};
     return rest;
 }
 

@@ -19,11 +19,11 @@ void gateway_rig_init(gateway_rig_t *self) {
     gateway_rig_begin(self, false);
 }
 
-void gateway_rig_begin(gateway_rig_t *self, bool restarted) {
+static void begin_at(gateway_rig_t *self, iw_time_us_t now_us, bool restarted) {
     const iw_config_t config = self->config;
     memset(self, 0, sizeof *self);
     self->config = config;
-    self->now_us = FIXTURE_START_US;
+    self->now_us = now_us;
     self->wake_us = self->now_us;
     self->speed_period_us = SPEED_PERIOD_US;
     fake_bus_init(&self->bus, self->now_us);
@@ -35,6 +35,14 @@ void gateway_rig_begin(gateway_rig_t *self, bool restarted) {
         self->wheel[side].speed_us = self->now_us + 1000U * side;
         self->wheel[side].status_us = self->now_us + 2000U;
     }
+}
+
+void gateway_rig_begin(gateway_rig_t *self, bool restarted) {
+    begin_at(self, FIXTURE_START_US, restarted);
+}
+
+void gateway_rig_power_on(gateway_rig_t *self) {
+    begin_at(self, 0, false);
 }
 
 /// What the wheel does: what it was told last, until its own watchdog stops it.

@@ -35,6 +35,9 @@ void gateway_rig_init(gateway_rig_t *self);
 /// Anew, with the configuration that is there. Makes no step.
 void gateway_rig_begin(gateway_rig_t *self, bool restarted);
 
+/// The same on a board that has just got power: its clock begins at zero.
+void gateway_rig_power_on(gateway_rig_t *self);
+
 /// Anew, with the widest limits of the pair: so that what one wheel does alone is judged by the rules of that wheel.
 void gateway_rig_begin_apart(gateway_rig_t *self);
 

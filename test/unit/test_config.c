@@ -263,6 +263,7 @@ static const struct {
     {400, false, 1, 1, {1, 1}},       // 41.888 mm/s: 1.07, 1.43
     {192, false, 27, 2, {2, 2}},      // A gear does not matter where the wheel's turns count ...
     {192, true, 27, 2, {30, 40}},     // ... and does where the rotor's do: 1.4893 mm/s: 30.2, 40.3
+    {60, true, 37, 1, {264, 353}},    // 0.16982 mm/s: 264.99, 353.3
     {60, true, 1000, 10, {716, 954}}, // 0.062832 mm/s: 716.2, 954.9
     {400, true, 1000, 1000, {1, 1}},  // As without.
 };

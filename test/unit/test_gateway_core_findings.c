@@ -229,14 +229,17 @@ static void test_gateway_pose_is_kept_with_its_time(void) {
 
 static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
     gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 400, -400, MS(1500));
+    (void)gateway_rig_cruise(&rig, 200, -200, MS(300));
+    assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_FEEDBACK_SIGN_LEFT)->evidence);
+    (void)gateway_rig_cruise(&rig, 200, -200, MS(1200));
     assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
     assert_entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
     assert_entry(IW_LEDGER_MOUNT_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_MOUNT_SIGN_LEFT)->evidence);
     TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_LEFT)->figure);
     TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT)->figure); // As at a positive command.
     const uint32_t changes = rig.gateway.ledger.changes;
-    (void)gateway_rig_cruise(&rig, 500, -500, MS(1500));
+    (void)gateway_rig_cruise(&rig, 250, -250, MS(1500)); // Faster, and still slower than a machine may turn.
+    TEST_ASSERT_EQUAL_INT32(241, rig.gateway.diverge.measured_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
 }
 

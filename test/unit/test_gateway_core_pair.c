@@ -192,6 +192,16 @@ static void test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave(void
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
+static void test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine(void) {
+    rig.config.invert[IW_RIGHT] = true;
+    gateway_rig_begin(&rig, false);
+    turn(IW_LEFT, 50);
+    turn(IW_RIGHT, 50);
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT32(1005, rig.gateway.diverge.measured_mm_s[IW_LEFT]); // 50 x 20.106
+    TEST_ASSERT_EQUAL_INT32(-1005, rig.gateway.diverge.measured_mm_s[IW_RIGHT]);
+}
+
 static void test_gateway_compares_whole_millimetres_and_tells_them(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
@@ -277,6 +287,7 @@ int main(void) {
     RUN_TEST(test_gateway_pair_after_a_late_loop_is_not_compared);
     RUN_TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared);
     RUN_TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave);
+    RUN_TEST(test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine);
     RUN_TEST(test_gateway_compares_whole_millimetres_and_tells_them);
     RUN_TEST(test_gateway_deviation_begins_anew_with_each_drive);
     RUN_TEST(test_gateway_third_divergence_within_a_minute_latches);

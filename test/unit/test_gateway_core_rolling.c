@@ -5,7 +5,7 @@
 
 static gateway_rig_t rig;
 
-/// 120.6 mm/s and 100.5 mm/s, and the rpm below.
+/// 120.6 mm/s and 100.5 mm/s, and the rpm below. With one millimetre of radius more the middle one is 101 mm/s.
 #define FAST_RPM  6
 #define LEAST_RPM 5
 #define SLOW_RPM  4
@@ -57,6 +57,23 @@ static void test_gateway_one_wheel_of_either_sign_is_enough(void) {
         gateway_rig_run(&rig, MS(400));
         TEST_ASSERT_EQUAL_INT(i / 2U < 2U, rolls());
     }
+}
+
+static void test_gateway_wheel_faster_than_100_mm_s_turns(void) {
+    rig.config.radius_mm = 193;
+    gateway_rig_begin(&rig, false);
+    turn(IW_RIGHT, LEAST_RPM);
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_EQUAL_INT32(101, rig.gateway.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_TRUE(rolls());
+}
+
+static void test_gateway_rolling_of_a_board_just_powered_is_no_fault(void) {
+    gateway_rig_power_on(&rig);
+    turn(IW_LEFT, FAST_RPM);
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_TRUE(rolls());
+    TEST_ASSERT_FALSE(is_fault());
 }
 
 /// What is driven does not roll, nor what is told to stand.
@@ -113,6 +130,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen);
     RUN_TEST(test_gateway_one_wheel_of_either_sign_is_enough);
+    RUN_TEST(test_gateway_wheel_faster_than_100_mm_s_turns);
+    RUN_TEST(test_gateway_rolling_of_a_board_just_powered_is_no_fault);
     RUN_TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent);
     RUN_TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault);
     RUN_TEST(test_gateway_wheel_that_is_not_heard_does_not_roll);

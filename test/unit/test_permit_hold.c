@@ -102,15 +102,22 @@ static void test_permit_second_master_is_fought_for_ten_seconds(void) {
 static void test_permit_second_master_of_before_the_hold_does_not_shorten_it(void) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
-    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(2000)); // Long gone.
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    rig.view.proven = true;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
+    rig.view.settled = false;
+    iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
+    permit_rig_step(&rig);
     assert_holding_until(MS(60000), IW_STATE_LISTENING);
 }
 
 static void test_permit_end_of_zeros_is_told_five_seconds_before(void) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
-    permit_rig_wait(&rig, MS(54999));
+    permit_rig_wait(&rig, MS(55000) - 1U);
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
-    permit_rig_wait(&rig, MS(1));
+    permit_rig_wait(&rig, 1);
     TEST_ASSERT_TRUE(iw_permit_ending(&rig.permit, rig.now_us));
     rig.view.settled = true;
     permit_rig_wait(&rig, 1);
@@ -122,6 +129,18 @@ static void test_permit_end_of_zeros_is_told_five_seconds_before(void) {
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
     permit_rig_begin(&rig, PERMIT_ARMED);
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(100000)));
+}
+
+/// Asked between two steps, and late: the next step ends what time is enough for.
+static void test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    rig.view.settled = true;
+    permit_rig_step(&rig);
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(59999)));
+    permit_rig_init_restarted(&rig);
+    rig.view.settled = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(59999)));
 }
 
 static void test_permit_hold_of_a_cut_stop_begins_at_once(void) {
@@ -432,6 +451,7 @@ int main(void) {
     RUN_TEST(test_permit_second_master_is_fought_for_ten_seconds);
     RUN_TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it);
     RUN_TEST(test_permit_end_of_zeros_is_told_five_seconds_before);
+    RUN_TEST(test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first);
     RUN_TEST(test_permit_hold_of_a_cut_stop_begins_at_once);
     RUN_TEST(test_permit_latched_holds_zeros_as_stopping_does);
     RUN_TEST(test_permit_latch_during_the_hold_begins_a_new_hold);

@@ -111,7 +111,8 @@ typedef struct {
     uint16_t standard; ///< The largest whole rpm of telemetry that is at most 45 mm/s at the wheel, at least 1.
     uint16_t max;      ///< The same for 60 mm/s: more would call a wheel that rolls at rest.
 } iw_config_rest_t;
-/// Of a configuration whose radius and gear are within their ranges. Whoever sets them sets `rest_rpm` by this.
+/// Of a configuration whose radius, gear and gear ratio are within their ranges. Whoever sets them sets `rest_rpm` by
+/// this.
 iw_config_rest_t iw_config_rest(const iw_config_t *config);
 
 /// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
