@@ -139,14 +139,14 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// One common share of all ways; braking quantities do not wait for accelerating ones.
-static IW_APART void level(axis_t *axes, size_t count) {
+static IW_APART void level(axis_t *axes) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < AXES; i++) {
         all = (axes[i].fraction < all) ? axes[i].fraction : all;
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    for (axis_t *axis = axes; axis < axes + count; axis++) {
+    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
         axis->fraction = axis->braking ? braking : all;
     }
 }
@@ -163,8 +163,8 @@ static IW_APART int32_t turn_by(const axis_t *axes, bool braking) {
 }
 
 /// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
-static IW_APART void cut_step(axis_t *axes, size_t count, bool braking, uint32_t fraction) {
-    for (axis_t *axis = axes; axis < axes + count; axis++) {
+static IW_APART void cut_step(axis_t *axes, bool braking, uint32_t fraction) {
+    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
         if (axis->braking == braking) {
             axis->fraction = (uint32_t)((uint64_t)axis->fraction * fraction / FRACTION_ONE);
         }
@@ -173,8 +173,8 @@ static IW_APART void cut_step(axis_t *axes, size_t count, bool braking, uint32_t
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
 /// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
-/// it gets there.
-static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uint32_t us) {
+/// it gets there. A stop is not slowed: towards 0/0 all speeds brake by one share, and yaw only falls.
+static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
     const int32_t braking = turn_by(axes, true);
@@ -184,10 +184,10 @@ static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, size_t count, uin
         return;
     }
     if (iw_magnitude(braked) <= bound) {
-        cut_step(axes, count, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+        cut_step(axes, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
     } else {
-        cut_step(axes, count, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
-        cut_step(axes, count, false, 0);
+        cut_step(axes, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        cut_step(axes, false, 0);
     }
 }
 
@@ -214,27 +214,18 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const uint32_t away = ramp_step(config->accel_mm_s2, away_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
+    const uint32_t current_away = current_step(config, away);
+    const uint32_t current_towards = current_step(config, towards);
     axis_t axes[AXES];
     for (size_t side = 0; side < IW_SIDES; side++) {
+        const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
         plan(&axes[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
+        plan(&axes[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
     }
-    if (ramps_current) {
-        const uint32_t current_away = current_step(config, away);
-        const uint32_t current_towards = current_step(config, towards);
-        for (size_t side = 0; side < IW_SIDES; side++) {
-            plan(&axes[IW_SIDES + side], &self->current_uA[side], target[side].current_mA * 1000, current_away,
-                 current_towards);
-        }
-    }
-    const size_t count = ramps_current ? AXES : IW_SIDES;
-    level(axes, count);
-    if (target[IW_LEFT].speed_mm_s != 0 || target[IW_RIGHT].speed_mm_s != 0) { // A stop is not for it to slow.
-        limit_yaw(self, axes, count, away_us);
-    }
+    level(axes);
+    limit_yaw(self, axes, away_us);
     move(self->speed_um_s, axes);
-    if (ramps_current) {
-        move(self->current_uA, &axes[IW_SIDES]);
-    }
+    move(self->current_uA, &axes[IW_SIDES]);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
