@@ -21,6 +21,12 @@ typedef struct {
 /// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
 
+/// All of them, and how much of its way each goes: a share of those that do not brake, and one of those that do.
+typedef struct {
+    axis_t axis[AXES];
+    uint32_t share[2];
+} step_t;
+
 /// The command is zero from now on.
 static void forget_command(iw_setpoint_t *self) {
     const bool limit = self->config->current_role == IW_ROLE_LIMIT;
@@ -139,61 +145,52 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// One common share of all ways; braking quantities do not wait for accelerating ones.
-static IW_APART void level(axis_t *axes) {
+static IW_APART void level(step_t *step) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < AXES; i++) {
-        all = (axes[i].fraction < all) ? axes[i].fraction : all;
-        braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
+    for (const axis_t *axis = step->axis; axis < step->axis + AXES; axis++) {
+        all = (axis->fraction < all) ? axis->fraction : all;
+        braking = (axis->braking && axis->fraction < braking) ? axis->fraction : braking;
     }
-    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
-        axis->fraction = axis->braking ? braking : all;
-    }
+    step->share[false] = all;
+    step->share[true] = braking;
 }
 
-static IW_APART int32_t part_of_way(const axis_t *axis) {
-    return (int32_t)((int64_t)axis->fraction * axis->way / (int64_t)FRACTION_ONE);
+static IW_APART int32_t part_of_way(const step_t *step, size_t i) {
+    const axis_t *const axis = &step->axis[i];
+    return (int32_t)((int64_t)step->share[axis->braking] * axis->way / (int64_t)FRACTION_ONE);
 }
 
 /// What wheels that brake, or those that do not, would do to the difference of both: right minus left.
-static IW_APART int32_t turn_by(const axis_t *axes, bool braking) {
-    const int32_t left = (axes[IW_LEFT].braking == braking) ? part_of_way(&axes[IW_LEFT]) : 0;
-    const int32_t right = (axes[IW_RIGHT].braking == braking) ? part_of_way(&axes[IW_RIGHT]) : 0;
+static IW_APART int32_t turn_by(const step_t *step, bool braking) {
+    const int32_t left = (step->axis[IW_LEFT].braking == braking) ? part_of_way(step, IW_LEFT) : 0;
+    const int32_t right = (step->axis[IW_RIGHT].braking == braking) ? part_of_way(step, IW_RIGHT) : 0;
     return right - left;
 }
 
 /// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
-static IW_APART void cut_step(axis_t *axes, bool braking, uint32_t fraction) {
-    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
-        if (axis->braking == braking) {
-            axis->fraction = (uint32_t)((uint64_t)axis->fraction * fraction / FRACTION_ONE);
-        }
-    }
+static IW_APART void cut_step(step_t *step, bool braking, uint32_t fraction) {
+    step->share[braking] = (uint32_t)((uint64_t)step->share[braking] * fraction / FRACTION_ONE);
 }
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
 /// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
 /// it gets there. A stop is not slowed: towards 0/0 all speeds brake by one share, and yaw only falls.
-static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, uint32_t us) {
+static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
-    const int32_t braking = turn_by(axes, true);
-    const int32_t faster = turn_by(axes, false);
+    const int32_t braking = turn_by(step, true);
+    const int32_t faster = turn_by(step, false);
     const int32_t braked = from + braking;
     if (iw_magnitude(braked + faster) <= bound) {
         return;
     }
     if (iw_magnitude(braked) <= bound) {
-        cut_step(axes, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+        cut_step(step, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
     } else {
-        cut_step(axes, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
-        cut_step(axes, false, 0);
+        cut_step(step, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        step->share[false] = 0;
     }
-}
-
-static void move(int32_t *values, const axis_t *axes) {
-    values[IW_LEFT] += part_of_way(&axes[IW_LEFT]);
-    values[IW_RIGHT] += part_of_way(&axes[IW_RIGHT]);
 }
 
 /// True if this wheel's speed and current are where they should be.
@@ -216,16 +213,18 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     const uint32_t current_away = current_step(config, away);
     const uint32_t current_towards = current_step(config, towards);
-    axis_t axes[AXES];
+    step_t step;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
-        plan(&axes[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
-        plan(&axes[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
+        plan(&step.axis[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
+        plan(&step.axis[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
     }
-    level(axes);
-    limit_yaw(self, axes, away_us);
-    move(self->speed_um_s, axes);
-    move(self->current_uA, &axes[IW_SIDES]);
+    level(&step);
+    limit_yaw(self, &step, away_us);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->speed_um_s[side] += part_of_way(&step, side);
+        self->current_uA[side] += part_of_way(&step, IW_SIDES + side);
+    }
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
