@@ -11,11 +11,10 @@
 #define FRACTION_BITS 24U
 #define FRACTION_ONE  (1U << FRACTION_BITS)
 
-/// One of the quantities that ramp: its way in this step, and which share of that it may go.
+/// One of the quantities that ramp, and its way in this step.
 typedef struct {
     int32_t way;
     bool braking; ///< Towards zero.
-    uint32_t fraction;
 } axis_t;
 
 /// A speed and a current for each wheel.
@@ -124,9 +123,8 @@ static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
-/// Where a quantity may go now: not past zero in one step. Writes in place, since a copy would add to the deepest stack
-/// of the core.
-static void plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
+/// Where a quantity goes: not past zero in one step. Returns which share of that way it may go now.
+static uint32_t plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
     const bool through_zero = *value != 0 && (target < 0) != (*value < 0);
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
@@ -134,7 +132,7 @@ static void plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t aw
     const uint32_t allowed = braking ? towards : away;
     axis->way = aim - *value;
     axis->braking = braking;
-    axis->fraction = (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
+    return (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
 }
 
 /// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
@@ -144,16 +142,10 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
-/// One common share of all ways; braking quantities do not wait for accelerating ones.
-static IW_APART void level(step_t *step) {
-    uint32_t braking = FRACTION_ONE;
-    uint32_t all = FRACTION_ONE;
-    for (const axis_t *axis = step->axis; axis < step->axis + AXES; axis++) {
-        all = (axis->fraction < all) ? axis->fraction : all;
-        braking = (axis->braking && axis->fraction < braking) ? axis->fraction : braking;
-    }
-    step->share[false] = all;
-    step->share[true] = braking;
+/// One common share of all ways; braking quantities do not wait for accelerating ones. `fraction`: what this one may go.
+static IW_APART void level(step_t *step, bool braking, uint32_t fraction) {
+    step->share[false] = (fraction < step->share[false]) ? fraction : step->share[false];
+    step->share[true] = (braking && fraction < step->share[true]) ? fraction : step->share[true];
 }
 
 static IW_APART int32_t part_of_way(const step_t *step, size_t i) {
@@ -213,13 +205,16 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     const uint32_t current_away = current_step(config, away);
     const uint32_t current_towards = current_step(config, towards);
-    step_t step;
+    step_t step = {.share = {FRACTION_ONE, FRACTION_ONE}};
     for (size_t side = 0; side < IW_SIDES; side++) {
+        axis_t *const speed = &step.axis[side];
+        axis_t *const current = &step.axis[IW_SIDES + side];
         const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
-        plan(&step.axis[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
-        plan(&step.axis[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
+        const uint32_t speed_part = plan(speed, &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
+        level(&step, speed->braking, speed_part);
+        const uint32_t current_part = plan(current, &self->current_uA[side], current_uA, current_away, current_towards);
+        level(&step, current->braking, current_part);
     }
-    level(&step);
     limit_yaw(self, &step, away_us);
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->speed_um_s[side] += part_of_way(&step, side);
