@@ -53,8 +53,7 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
     // A wheel with a limit near 0 has no torque; the document does not say what a limit below zero means.
-    const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA &&
-                           current_mA < (int32_t)config->max_current_mA;
+    const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA;
     return !low_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
 
@@ -120,7 +119,10 @@ iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_f
                                              iw_time_us_t now_us) {
     const uint32_t turn_mm_s = turn_of(self->config, as_the_wheel_reads(frame[IW_LEFT].data).speed_mm_s,
                                        as_the_wheel_reads(frame[IW_RIGHT].data).speed_mm_s);
-    if (!turn_ok(self, iw_age_us(self->last_us[IW_RIGHT], now_us), turn_mm_s)) {
+    // A zero may have passed for one wheel alone: what the pair does counts from the later of both.
+    const iw_time_us_t last_us =
+        (self->last_us[IW_LEFT] > self->last_us[IW_RIGHT]) ? self->last_us[IW_LEFT] : self->last_us[IW_RIGHT];
+    if (!turn_ok(self, iw_age_us(last_us, now_us), turn_mm_s)) {
         self->stopped++;
         return IW_ENVELOPE_YAW;
     }

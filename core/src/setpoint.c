@@ -11,15 +11,16 @@
 #define FRACTION_BITS 24U
 #define FRACTION_ONE  (1U << FRACTION_BITS)
 
-/// One of the quantities that ramp: its way in this step, and which share of that it may go.
-typedef struct {
-    int32_t aim;
-    bool braking; ///< Towards zero.
-    uint32_t fraction;
-} axis_t;
-
 /// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
+
+/// Where each quantity goes in this step, and how much of its way: a share of those that do not brake, and one of those
+/// that do.
+typedef struct {
+    int32_t aim[AXES];
+    uint32_t share[2];
+    bool braking[AXES]; ///< Towards zero.
+} step_t;
 
 /// The command is zero from now on.
 static void forget_command(iw_setpoint_t *self) {
@@ -118,19 +119,6 @@ static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
-/// Where a quantity may go now: not past zero in one step. Writes in place, since a copy would add to the deepest stack
-/// of the core.
-static void plan(axis_t *axis, const int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
-    const bool through_zero = *value != 0 && (target < 0) != (*value < 0);
-    const int32_t aim = through_zero ? 0 : target;
-    const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
-    const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value);
-    const uint32_t allowed = braking ? towards : away;
-    axis->aim = aim;
-    axis->braking = braking;
-    axis->fraction = (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
-}
-
 /// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
 /// bits suffice.
 static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) {
@@ -138,64 +126,57 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
-/// One common share of all ways; braking quantities do not wait for accelerating ones.
-static IW_APART void level(axis_t *axes) {
-    uint32_t braking = FRACTION_ONE;
-    uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < AXES; i++) {
-        all = (axes[i].fraction < all) ? axes[i].fraction : all;
-        braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
-    }
-    for (axis_t *axis = axes; axis < axes + AXES; axis++) {
-        axis->fraction = axis->braking ? braking : all;
-    }
+/// Where a quantity goes: not past zero in one step. All get one common share of their ways; braking ones do not wait for
+/// accelerating ones. `allowed`: how much it may go now, away from zero and towards it.
+static void plan(step_t *step, size_t i, int32_t value, int32_t target, const uint32_t allowed[2]) {
+    const bool through_zero = value != 0 && (target < 0) != (value < 0);
+    const int32_t aim = through_zero ? 0 : target;
+    const uint32_t way = (uint32_t)iw_magnitude(aim - value);
+    const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(value);
+    const uint32_t part = allowed[braking ? 1U : 0U];
+    const uint32_t fraction = (part < way) ? fraction_of(part, way) : FRACTION_ONE;
+    step->aim[i] = aim;
+    step->braking[i] = braking;
+    step->share[0] = (fraction < step->share[0]) ? fraction : step->share[0];
+    step->share[1] = (braking && fraction < step->share[1]) ? fraction : step->share[1];
 }
 
-static IW_APART int32_t part_of_way(const axis_t *axis, int32_t value) {
-    const int32_t way = axis->aim - value;
-    return (int32_t)((int64_t)axis->fraction * way / (int64_t)FRACTION_ONE);
+static IW_APART int32_t part_of_way(const step_t *step, size_t i, int32_t value) {
+    const int32_t way = step->aim[i] - value;
+    return (int32_t)((int64_t)step->share[step->braking[i] ? 1U : 0U] * way / (int64_t)FRACTION_ONE);
 }
 
 /// What wheels that brake, or those that do not, would do to the difference of both: right minus left.
-static IW_APART int32_t turn_by(const int32_t *values, const axis_t *axes, bool braking) {
-    const int32_t left = (axes[IW_LEFT].braking == braking) ? part_of_way(&axes[IW_LEFT], values[IW_LEFT]) : 0;
-    const int32_t right = (axes[IW_RIGHT].braking == braking) ? part_of_way(&axes[IW_RIGHT], values[IW_RIGHT]) : 0;
+static IW_APART int32_t turn_by(const step_t *step, const int32_t *speed, bool braking) {
+    const int32_t left = (step->braking[IW_LEFT] == braking) ? part_of_way(step, IW_LEFT, speed[IW_LEFT]) : 0;
+    const int32_t right = (step->braking[IW_RIGHT] == braking) ? part_of_way(step, IW_RIGHT, speed[IW_RIGHT]) : 0;
     return right - left;
 }
 
 /// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
-static IW_APART void cut_step(axis_t *axes, bool braking, uint32_t fraction) {
-    for (size_t i = 0; i < AXES; i++) {
-        const uint32_t cut = (uint32_t)((uint64_t)axes[i].fraction * fraction / FRACTION_ONE);
-        if (axes[i].braking == braking && cut < axes[i].fraction) {
-            axes[i].fraction = cut;
-        }
-    }
+static IW_APART void cut_step(step_t *step, bool braking, uint32_t fraction) {
+    uint32_t *const share = &step->share[braking ? 1U : 0U];
+    const uint32_t cut = (uint32_t)((uint64_t)*share * fraction / FRACTION_ONE);
+    *share = (cut < *share) ? cut : *share;
 }
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
 /// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
 /// it gets there. A stop is not slowed: towards 0/0 all speeds brake by one share, and yaw only falls.
-static void limit_yaw(const iw_setpoint_t *self, axis_t *axes, uint32_t us) {
+static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
-    const int32_t braking = turn_by(self->speed_um_s, axes, true);
-    const int32_t faster = turn_by(self->speed_um_s, axes, false);
+    const int32_t braking = turn_by(step, self->speed_um_s, true);
+    const int32_t faster = turn_by(step, self->speed_um_s, false);
     const int32_t braked = from + braking;
     if (iw_magnitude(braked + faster) <= bound) {
         return;
     }
     if (faster != 0 && iw_magnitude(braked) <= bound) {
-        cut_step(axes, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+        cut_step(step, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
     } else if (braking != 0) {
-        cut_step(axes, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
-        cut_step(axes, false, 0);
-    }
-}
-
-static void move(int32_t *values, const axis_t *axes) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        values[side] += part_of_way(&axes[side], values[side]);
+        cut_step(step, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        step->share[0] = 0;
     }
 }
 
@@ -214,21 +195,22 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? elapsed_us : IW_WHEEL_WATCHDOG_US;
     const uint32_t granted_us = 2U * config->period_ms * IW_US_PER_MS;
     const uint32_t away_us = (us < granted_us) ? us : granted_us;
-    const uint32_t away = ramp_step(config->accel_mm_s2, away_us);
-    const uint32_t towards = ramp_step(config->decel_mm_s2, us);
+    const uint32_t speeds[2] = {ramp_step(config->accel_mm_s2, away_us), ramp_step(config->decel_mm_s2, us)};
+    const uint32_t currents[2] = {current_step(config, speeds[0]), current_step(config, speeds[1])};
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
-    const uint32_t current_away = current_step(config, away);
-    const uint32_t current_towards = current_step(config, towards);
-    axis_t axes[AXES];
+    step_t step; // Without an initializer: it would clear what is planned anyway.
+    step.share[0] = FRACTION_ONE;
+    step.share[1] = FRACTION_ONE;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
-        plan(&axes[side], &self->speed_um_s[side], target[side].speed_mm_s * 1000, away, towards);
-        plan(&axes[IW_SIDES + side], &self->current_uA[side], current_uA, current_away, current_towards);
+        plan(&step, side, self->speed_um_s[side], target[side].speed_mm_s * 1000, speeds);
+        plan(&step, IW_SIDES + side, self->current_uA[side], current_uA, currents);
     }
-    level(axes);
-    limit_yaw(self, axes, away_us);
-    move(self->speed_um_s, axes);
-    move(self->current_uA, &axes[IW_SIDES]);
+    limit_yaw(self, &step, away_us);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->speed_um_s[side] += part_of_way(&step, side, self->speed_um_s[side]);
+        self->current_uA[side] += part_of_way(&step, IW_SIDES + side, self->current_uA[side]);
+    }
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {

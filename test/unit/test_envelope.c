@@ -156,8 +156,7 @@ static void test_check_role_not_configured_stops_everything(void) {
 /// A limit has no sign and a floor: a negative one is no current that may leave, nor one below the floor.
 static void sweep_currents(int32_t speed_mm_s) {
     const int32_t highest = config.max_current_mA;
-    const int32_t floor = (config.min_current_mA < highest) ? config.min_current_mA : highest;
-    const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? floor : -highest;
+    const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? config.min_current_mA : -highest;
     for (int32_t current = -32768; current <= 32767; current++) {
         const bool within = current >= lowest && current <= highest;
         const iw_envelope_verdict_t verdict = check(START_US, IW_LEFT, speed_mm_s, current);

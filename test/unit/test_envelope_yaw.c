@@ -89,9 +89,11 @@ static void test_envelope_turn_grows_no_faster_than_configured(void) {
         uint16_t accel_mrad_s2, track_mm, radius_mm;
         uint32_t after_us;
         int32_t most_mm_s; ///< With 2 mm/s for the rounding of both speeds.
-    } cases[] = {{2000, 540, 192, 20000, 23}, {2000, 540, 192, 0, 2},        {2000, 540, 192, 925, 2},
-                 {2000, 540, 192, 926, 3},    {2000, 540, 192, 300000, 326}, {2000, 540, 192, 9000000, 326},
-                 {2000, 540, 60, 20000, 71},  {2000, 540, 400, 20000, 12},   {100, 200, 400, 20000, 2}};
+    } cases[] = {{2000, 540, 192, 20000, 23},   {2000, 540, 192, 0, 2},        {2000, 540, 192, 925, 2},
+                 {2000, 540, 192, 926, 3},      {2000, 540, 192, 300000, 326}, {2000, 540, 192, 9000000, 326},
+                 {2000, 540, 60, 20000, 71},    {2000, 540, 400, 20000, 12},   {100, 200, 400, 20000, 2},
+                 {1001, 333, 192, 300001, 101}, // A microsecond more of what counts would be 102.
+                 {1999, 477, 100, 27311, 51}};  // 52 would be beyond by less than a billionth.
     config.max_yaw_mrad_s = 10000;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const int32_t most = cases[i].most_mm_s;
@@ -119,6 +121,17 @@ static void test_envelope_turn_that_does_not_pass_counts_for_nothing(void) {
     TEST_ASSERT_EQUAL_INT32(100, turn());
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(20000, 0, 145)); // From the last that passed, 40 ms ago.
     TEST_ASSERT_EQUAL_UINT32(1, envelope.stopped);
+}
+
+/// A zero may leave for one wheel alone: it does not make the time longer in which the turning may have grown.
+static void test_envelope_turn_grows_from_the_later_frame_of_both_wheels(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        begin();
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(0, 0, 0));
+        envelope.last_us[side] += 20000;
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(40000, 0, 24));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(0, 0, 23));
+    }
 }
 
 static void test_envelope_turn_that_falls_passes_at_any_pace(void) {
@@ -156,6 +169,7 @@ int main(void) {
     RUN_TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine);
     RUN_TEST(test_envelope_turn_grows_no_faster_than_configured);
     RUN_TEST(test_envelope_turn_that_does_not_pass_counts_for_nothing);
+    RUN_TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels);
     RUN_TEST(test_envelope_turn_that_falls_passes_at_any_pace);
     RUN_TEST(test_envelope_turn_is_judged_in_the_frame_of_the_machine);
     return UNITY_END();

@@ -161,6 +161,52 @@ static void test_yaw_growth_by_one_braking_wheel_is_bounded(void) {
     TEST_ASSERT_EQUAL_INT(400, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
 }
 
+/// From 0/0 to 64 mm/s of the right wheel, which it could reach in one step: growth of 1000 mm/s2 gives it 20 mm/s, and as
+/// a current that is a setpoint it gets the same share of the way.
+static void test_yaw_that_holds_up_a_speed_holds_up_its_current(void) {
+    static const iw_pair_t target = {{{0, 0}, {64, 640}}};
+    rig.config.track_mm = 500;
+    rig.config.accel_mm_s2 = 20000;
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    setpoint_rig_begin(&rig);
+    setpoint_rig_follow(&rig);
+    iw_setpoint_command(&rig.setpoint, rig.now_us, &target);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, 20002); // 2 um/s are for the rounding.
+    TEST_ASSERT_EQUAL_INT(20, pair.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(200, pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_LEFT].current_mA);
+}
+
+/// The same where a wheel brakes: its current falls by the share that its speed falls by.
+static void test_yaw_that_holds_up_braking_holds_up_its_current(void) {
+    static const iw_pair_t target = {{{400, 400}, {900, 900}}};
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    rig.config.max_current_mA = 1000;
+    setpoint_rig_begin(&rig);
+    setpoint_rig_cruise(&rig, 900, 900, 900);
+    iw_setpoint_command(&rig.setpoint, rig.now_us, &target);
+    for (uint32_t n = 0; n < 40; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        TEST_ASSERT_INT_WITHIN(1, pair.wheel[IW_LEFT].speed_mm_s, pair.wheel[IW_LEFT].current_mA);
+        TEST_ASSERT_EQUAL_INT(900, pair.wheel[IW_RIGHT].current_mA);
+    }
+    TEST_ASSERT_EQUAL_INT(400, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].current_mA);
+}
+
+/// Braking that alone leads exactly to the bound is not held up: only the wheel that would become faster waits.
+static void test_yaw_braking_up_to_its_bound_goes_all_the_way(void) {
+    rig.config.track_mm = 500;
+    rig.config.max_yaw_mrad_s = 2000;
+    rig.config.decel_mm_s2 = 1000;
+    setpoint_rig_begin(&rig);
+    setpoint_rig_cruise(&rig, 900, 900, 2000);
+    setpoint_rig_command(&rig, 388, 1000, 2000);
+    (void)setpoint_rig_take_after(&rig, 20000);
+    TEST_ASSERT_EQUAL_INT32(880000, rig.setpoint.speed_um_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(900000, rig.setpoint.speed_um_s[IW_RIGHT]);
+}
+
 /// Nothing but the slope towards zero: in a stop, at a command of 0/0, and where yaw falls.
 static void test_yaw_slows_no_stop_and_no_fall(void) {
     static const struct {
@@ -185,6 +231,32 @@ static void test_yaw_slows_no_stop_and_no_fall(void) {
                 TEST_ASSERT_INT_WITHIN(1, (ideal < least) ? least : ideal, pair.wheel[IW_RIGHT].speed_mm_s);
             }
         }
+    }
+}
+
+/// Out of any curve 0/0 is reached as early as the slope of the faster wheel allows, however slowly yaw may grow.
+static void test_yaw_slows_no_stop_out_of_any_curve(void) {
+    static const int16_t curves[][IW_SIDES] = {{300, 800},   {800, 300},   {-270, 270}, {0, 540},
+                                               {-700, -701}, {1000, 1000}, {-100, 400}};
+    static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
+    for (size_t i = 0; i < 2 * sizeof curves / sizeof curves[0]; i++) {
+        const int32_t left = curves[i / 2U][IW_LEFT];
+        const int32_t right = curves[i / 2U][IW_RIGHT];
+        const int32_t most = (abs(left) > abs(right)) ? abs(left) : abs(right);
+        rig.config.current_role = roles[i % 2U];
+        setpoint_rig_begin(&rig);
+        setpoint_rig_cruise(&rig, (int16_t)left, (int16_t)right, 0);
+        rig.setpoint.yaw.growth_mm_s2 = 1;
+        const iw_time_us_t start_us = rig.setpoint.last_us;
+        setpoint_rig_command(&rig, 0, 0, 0);
+        do {
+            const iw_pair_t pair = setpoint_rig_take_next(&rig);
+            const int32_t ideal = most - (int32_t)((rig.now_us - start_us) * 1500U / 1000000U);
+            const int32_t rest = (ideal > 0) ? ideal : 0;
+            TEST_ASSERT_INT_WITHIN(1, rest * left / most, pair.wheel[IW_LEFT].speed_mm_s);
+            TEST_ASSERT_INT_WITHIN(1, rest * right / most, pair.wheel[IW_RIGHT].speed_mm_s);
+        } while (rig.now_us - start_us < 700000U);
+        TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
     }
 }
 
@@ -267,7 +339,11 @@ int main(void) {
     RUN_TEST(test_yaw_late_call_is_granted_two_periods_of_growth);
     RUN_TEST(test_yaw_of_a_faster_curve_keeps_the_curve);
     RUN_TEST(test_yaw_growth_by_one_braking_wheel_is_bounded);
+    RUN_TEST(test_yaw_that_holds_up_a_speed_holds_up_its_current);
+    RUN_TEST(test_yaw_that_holds_up_braking_holds_up_its_current);
+    RUN_TEST(test_yaw_braking_up_to_its_bound_goes_all_the_way);
     RUN_TEST(test_yaw_slows_no_stop_and_no_fall);
+    RUN_TEST(test_yaw_slows_no_stop_out_of_any_curve);
     RUN_TEST(test_yaw_at_its_limit_waits_and_gets_there);
     RUN_TEST(test_yaw_stays_bounded_and_every_target_is_reached);
     return UNITY_END();
