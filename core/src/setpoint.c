@@ -12,7 +12,7 @@
 #define FRACTION_ONE  (1U << FRACTION_BITS)
 
 /// A speed and a current for each wheel.
-#define AXES ((size_t)2 * IW_SIDES)
+#define AXES (2 * IW_SIDES)
 
 /// Where each quantity goes in this step, and how much of its way: a share of those that do not brake, and one of those
 /// that do.
@@ -114,6 +114,11 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     return fraction;
 }
 
+/// The same for any part, and 1 for what is no part.
+static uint32_t share_of(uint32_t part, uint32_t whole) {
+    return (part < whole) ? fraction_of(part, whole) : FRACTION_ONE;
+}
+
 /// slope x time in thousandths of the slope's unit, for at most a second.
 static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
@@ -133,8 +138,7 @@ static void plan(step_t *step, size_t i, int32_t value, int32_t target, const ui
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - value);
     const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(value);
-    const uint32_t part = allowed[braking ? 1U : 0U];
-    const uint32_t fraction = (part < way) ? fraction_of(part, way) : FRACTION_ONE;
+    const uint32_t fraction = share_of(allowed[braking ? 1U : 0U], way);
     step->aim[i] = aim;
     step->braking[i] = braking;
     step->share[0] = (fraction < step->share[0]) ? fraction : step->share[0];
@@ -172,10 +176,10 @@ static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     if (iw_magnitude(braked + faster) <= bound) {
         return;
     }
-    if (faster != 0 && iw_magnitude(braked) <= bound) {
-        cut_step(step, false, fraction_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
-    } else if (braking != 0) {
-        cut_step(step, true, fraction_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+    if (iw_magnitude(braked) <= bound) {
+        cut_step(step, false, share_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+    } else {
+        cut_step(step, true, share_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
         step->share[0] = 0;
     }
 }
@@ -198,9 +202,7 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const uint32_t speeds[2] = {ramp_step(config->accel_mm_s2, away_us), ramp_step(config->decel_mm_s2, us)};
     const uint32_t currents[2] = {current_step(config, speeds[0]), current_step(config, speeds[1])};
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
-    step_t step; // Without an initializer: it would clear what is planned anyway.
-    step.share[0] = FRACTION_ONE;
-    step.share[1] = FRACTION_ONE;
+    step_t step = {.share = {FRACTION_ONE, FRACTION_ONE}};
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t current_uA = ramps_current ? target[side].current_mA * 1000 : 0;
         plan(&step, side, self->speed_um_s[side], target[side].speed_mm_s * 1000, speeds);

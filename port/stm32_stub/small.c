@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the C library and the compiler's own library have in faster and larger forms: the gateway image would not fit into the 62 KiB of an
-// STM32F103. Nothing here runs within a step of the core; texts and lines use it.
+// What the C library and the compiler's own library have in faster and larger forms: the gateway image would not fit
+// into the 62 KiB of an STM32F103. Nothing here runs within a step of the core; texts and lines use it.
 #include <stddef.h>
 #include <stdint.h>
 
@@ -87,7 +87,8 @@ char *strchr(const char *text, int wanted) {
     return (char *)(uintptr_t)text;
 }
 
-/// For the run-time functions of a division of 64 bits; one bit after the other. A division by 0 gives 0, as Cortex-M's own.
+/// For the run-time functions of a division of 64 bits; one bit after the other. A division by 0 gives 0, as Cortex-M's
+/// own.
 uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
     uint64_t quotient = 0;
     uint64_t rest = 0;

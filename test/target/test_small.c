@@ -53,13 +53,13 @@ static void test_small_memory_is_that_of_the_library(void) {
         TEST_ASSERT_EQUAL_INT(sign(memcmp(mine + from, mine + to, size)),
                               sign(small_memcmp(mine + from, mine + to, size)));
         TEST_ASSERT_EQUAL_PTR(mine + to, small_memmove(mine + to, mine + from, size));
-        (void)memmove(theirs + to, theirs + from, size);
+        memmove(theirs + to, theirs + from, size);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
         TEST_ASSERT_EQUAL_PTR(mine + SIZE / 2U, small_memcpy(mine + SIZE / 2U, mine, size));
-        (void)memcpy(theirs + SIZE / 2U, theirs, size);
+        memcpy(theirs + SIZE / 2U, theirs, size);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
         TEST_ASSERT_EQUAL_PTR(mine + from, small_memset(mine + from, (int)i, size));
-        (void)memset(theirs + from, (int)i, size);
+        memset(theirs + from, (int)i, size);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
     }
 }

@@ -349,6 +349,16 @@ static void test_diverge_absurd_values_stay_within_bounds(void) {
     TEST_ASSERT_EQUAL_INT32(1000000, pair.largest_um);
 }
 
+static void test_diverge_step_of_telemetry_is_that_of_the_rotor(void) {
+    config.gear_turns = 5;
+    config.gear_per = 4;
+    iw_diverge_init(&pair, &config);
+    TEST_ASSERT_EQUAL_INT32(UM_S_PER_RPM, pair.um_s_per_rpm);
+    config.rpm_of_rotor = true;
+    iw_diverge_init(&pair, &config);
+    TEST_ASSERT_EQUAL_INT32(16084, pair.um_s_per_rpm); // 20106 x 4 / 5.
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_diverge_pair_that_follows_does_not);
@@ -379,5 +389,6 @@ int main(void) {
     RUN_TEST(test_diverge_names_the_wheel_that_differs_more);
     RUN_TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second);
     RUN_TEST(test_diverge_absurd_values_stay_within_bounds);
+    RUN_TEST(test_diverge_step_of_telemetry_is_that_of_the_rotor);
     return UNITY_END();
 }
