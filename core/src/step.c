@@ -157,6 +157,8 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
         hear_force(self, kind, side);
     } else if (kind == IW_CODEC_POSE) {
         self->pose_us = self->now_us;
+    } else if (kind == IW_CODEC_SPEED) {
+        self->diverge.measured_mm_s[side] = iw_watch_own_mm_s(self, side);
     }
 }
 
@@ -279,7 +281,7 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
     };
     iw_follow_t *const follow = &self->follow[side];
     const iw_ledger_item_t item = sign_item(side);
-    const int32_t measured_mm_s = iw_watch_own_mm_s(self, side);
+    const int32_t measured_mm_s = self->diverge.measured_mm_s[side];
     const iw_follow_verdict_t verdict = iw_follow_step(follow, self->now_us, applied_mm_s, measured_mm_s);
     // As at a positive command.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;

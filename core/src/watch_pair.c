@@ -11,6 +11,9 @@ int32_t iw_watch_own_mm_s(const iw_gateway_t *self, size_t side) {
 
 static void compare(iw_gateway_t *self) {
     iw_diverge_t *const diverge = &self->diverge;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
+    }
     const iw_diverge_verdict_t verdict = iw_diverge_step(diverge, self->now_us);
     if (verdict != IW_DIVERGE_NOT) {
         const iw_event_t event = {IW_CAUSE_PAIR_DIVERGES, (uint8_t)(IW_SIDES_LEFT << diverge->side),
@@ -28,10 +31,6 @@ static bool has_ended(const iw_gateway_t *self) {
 
 void iw_watch_pair(iw_gateway_t *self, bool heard) {
     iw_diverge_t *const diverge = &self->diverge;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
-        diverge->measured_mm_s[side] = iw_watch_own_mm_s(self, side);
-    }
     iw_diverge_begin(diverge, self->permit.armed_us);
     if (has_ended(self) || !heard || self->setpoint.from_zero) {
         iw_diverge_restart(diverge, self->now_us);

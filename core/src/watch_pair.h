@@ -9,7 +9,7 @@
 
 struct iw_gateway;
 
-/// The last measured speed in the machine's frame, in the unit of setpoints: at IW_SETPOINT_RADIUS_MM.
+/// The measured speed, of the last frame, in the machine's frame, in the unit of setpoints: at IW_SETPOINT_RADIUS_MM.
 int32_t iw_watch_own_mm_s(const struct iw_gateway *self, size_t side);
 
 /// `heard`: both wheels are. Nothing is compared while nothing or zero at once is sent, or zeros are held: wheels then

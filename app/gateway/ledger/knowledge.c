@@ -84,13 +84,16 @@ static void observe_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_
 static void observe_button(gw_knowledge_t *self) {
     gw_wheels_t *wheels = self->wheels;
     const iw_estop_ops_t *kind = wheels->hal.estop_ops;
+    if (!kind->present || kind->simulated) {
+        return;
+    }
     const gw_button_news_t news = gw_button_look(&self->button, &wheels->hal, wheels->now_us, &self->known.tried);
     if (news != GW_BUTTON_NO_NEWS) {
         self->changed = true;
         gw_knowledge_tell_button(self, news);
     }
     wheels->estop_tried_us = self->known.tried.wall_us;
-    const bool untried = kind->present && !kind->simulated && self->known.tried.wall_us == 0;
+    const bool untried = self->known.tried.wall_us == 0;
     if (untried && !wheels->estop_untried) {
         gw_log(self->log, GW_LOG_WARNING, GW_ESTOP_UNTRIED, wheels->estop);
     }

@@ -176,6 +176,17 @@ static void tell_ailment(gw_status_t *self, const iw_snapshot_t *seen, const gw_
     }
 }
 
+static void observe_health(gw_status_t *self, const iw_snapshot_t *seen) {
+    gw_health_t *health = &self->wheels->health;
+    if (health->limits.battery_low_dV == 0U && health->limits.temperature_high_degC == 0U) {
+        return; // Without a threshold a frame costs nothing here.
+    }
+    const gw_health_t before = *health;
+    gw_health_look(health, seen);
+    tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
+    tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
+}
+
 static void observe_rolling(gw_status_t *self, bool rolling) {
     if (rolling == self->observed.rolling) {
         return;
@@ -228,10 +239,7 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
         }
         tell_fault(self, "setpoint_left", seen->left_behind);
     }
-    const gw_health_t before = self->wheels->health;
-    gw_health_look(&self->wheels->health, seen);
-    tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
-    tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
+    observe_health(self, seen);
 }
 
 static void observe_purge(gw_status_t *self) {
