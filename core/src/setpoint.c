@@ -131,8 +131,8 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
-/// Where a quantity goes: not past zero in one step. All get one common share of their ways; braking ones do not wait for
-/// accelerating ones. `allowed`: how much it may go now, away from zero and towards it.
+/// Where a quantity goes: not past zero in one step. All get one common share of their ways; braking ones do not wait
+/// for accelerating ones. `allowed`: how much it may go now, away from zero and towards it.
 static void plan(step_t *step, size_t i, int32_t value, int32_t target, const uint32_t allowed[2]) {
     const bool through_zero = value != 0 && (target < 0) != (value < 0);
     const int32_t aim = through_zero ? 0 : target;

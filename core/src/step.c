@@ -269,10 +269,6 @@ static void watch_echo(iw_gateway_t *self) {
     }
 }
 
-static iw_ledger_item_t sign_item(size_t side) {
-    return (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
-}
-
 static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     static const uint8_t causes[IW_FOLLOW_VERDICTS] = {
         [IW_FOLLOW_SIGN] = IW_CAUSE_FEEDBACK_SIGN,
@@ -280,7 +276,7 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
         [IW_FOLLOW_BLOCKED] = IW_CAUSE_WHEEL_BLOCKED,
     };
     iw_follow_t *const follow = &self->follow[side];
-    const iw_ledger_item_t item = sign_item(side);
+    const iw_ledger_item_t item = (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
     const int32_t measured_mm_s = self->diverge.measured_mm_s[side];
     const iw_follow_verdict_t verdict = iw_follow_step(follow, self->now_us, applied_mm_s, measured_mm_s);
     // As at a positive command.
