@@ -67,8 +67,8 @@ def limits_and_twist(t):
     )
     reply = client.drive(100, -100, left_mA=500, right_mA=600)
     t.check(
-        reply["ok"] and (reply["left_mA"], reply["right_mA"], reply["limited"]) == (500, 600, False),
-        f"currents are kept: {reply}",
+        reply["ok"] and (reply["left_mA"], reply["right_mA"], reply["limited"]) == (600, 600, True),
+        f"both wheels get the larger limit: {reply}",
     )
     reply = client.request("twist", v_mm_s=300, yaw_mrad_s=500)
     t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"]) == (165, 435), f"twist to wheels: {reply}")
