@@ -241,7 +241,7 @@ class Driving(RigCase):
             for number in numbers:
                 with self.subTest(type(number)):
                     applied = wheels.drive(number, number, number, number)
-                    self.assertEqual((applied.left_mm_s, applied.right_mm_s, applied.left_mA), (100, 100, 100))
+                    self.assertEqual((applied.left_mm_s, applied.right_mm_s, applied.left_mA), (100, 100, 300))  # min_current_mA.
             self.assertEqual(wheels.twist(100.0, Index()).right_mm_s, 127)
             self.assertEqual(gateway.watch("bus", rate_hz=20.0)["rate_hz"], 20)
 
