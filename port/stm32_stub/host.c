@@ -70,7 +70,8 @@ static void end_client(iw_host_t *self, iw_host_client_t *client) {
     if (client->id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->place.gateway, self->now_us, client->id);
         iw_observe(self, iw_host_look(self));
-        iw_pending_forget(&self->pending, client->id);
+        const iw_client_t id = client->id;
+        iw_pending_forget(&self->pending, id);
         memset(client, 0, sizeof *client);
     }
 }

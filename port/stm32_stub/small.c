@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the C library and the compiler's own library have in faster and larger forms: the gateway image would not fit
 // into the 62 KiB of an STM32F103. Nothing here runs within a step of the core; texts and lines use it.
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -87,9 +88,21 @@ char *strchr(const char *text, int wanted) {
     return (char *)(uintptr_t)text;
 }
 
-/// For the run-time functions of a division of 64 bits; one bit after the other. A division by 0 gives 0, as Cortex-M's
-/// own.
-uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
+/// By 16 bits at a time, for which the processor has a division. Below 65536 only.
+static uint64_t divide_by_small(uint64_t number, uint32_t divisor, uint32_t *out_rest) {
+    uint64_t quotient = 0;
+    uint32_t rest = 0;
+    for (unsigned shift = 64; shift > 0U; shift -= 16U) {
+        const uint32_t part = rest << 16U | (uint32_t)(number >> (shift - 16U) & 0xFFFFU);
+        quotient = quotient << 16U | part / divisor;
+        rest = part % divisor;
+    }
+    *out_rest = rest;
+    return quotient;
+}
+
+/// By one bit at a time. By 0: 0.
+static uint64_t divide_by_large(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
     uint64_t quotient = 0;
     uint64_t rest = 0;
     for (unsigned bit = 64; bit > 0U && divisor != 0U; bit--) {
@@ -102,8 +115,19 @@ uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
             quotient |= 1U;
         }
     }
+    *out_rest = rest;
+    return quotient;
+}
+
+/// For the run-time functions of a division of 64 bits. Most of ours are by 1000, and the main loop waits for each.
+uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
+    uint64_t rest = 0;
+    uint32_t small = 0;
+    const bool is_small = divisor != 0U && divisor < 65536U;
+    const uint64_t quotient =
+        is_small ? divide_by_small(number, (uint32_t)divisor, &small) : divide_by_large(number, divisor, &rest);
     if (out_rest != NULL) {
-        *out_rest = rest;
+        *out_rest = is_small ? small : rest;
     }
     return quotient;
 }

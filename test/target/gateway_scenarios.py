@@ -298,7 +298,7 @@ def config_in_flash(rig):
     host = start(rig)
     first = host.ask(1, {"cmd": "config"})
     assert keys_of(first)["drive.lease_ms"] == "200" and keys_of(first)["wheels.setpoint_type"] == "1" and not first["staged"], first
-    for key, value, words in (("bus.interface", "can0", "a daemon's"), ("drive.lease", "200", "no key"), ("drive.lease_ms", "5000", "20 to 500"),
+    for key, value, words in (("bus.interface", "can0", "no key of a board"), ("drive.lease", "200", "no key"), ("drive.lease_ms", "5000", "20 to 500"),
                               ("wheels.gear_ratio", "1/x", "N or N/M"), ("left.invert", "maybe", "no or yes"), ("drive.lease_ms", "2e2", "20 to 500")):
         refused = host.ask(1, {"cmd": "config", "key": key, "value": value})
         assert refused["error"] == "bad_value" and words in refused["message"], refused

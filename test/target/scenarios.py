@@ -330,15 +330,15 @@ def wheel_missing(rig):
 
 
 def wheel_lost(rig):
-    """A wheel without power while armed: zeros for at most 10 s, then silence, and no arming when it comes back."""
+    """A wheel without power while armed: zeros for at most a minute, then silence, and no arming when it comes back."""
     arm(rig)
     lost_ns = rig.machine.now_ns
     rig.machine.bus.wheels[0].power(False, lost_ns)
-    rig.run(10_600 * MS)
-    assert_held_then_silent(rig, lost_ns, 9900 * MS)
+    rig.run(60_600 * MS)
+    assert_held_then_silent(rig, lost_ns, 59_900 * MS)
     rig.machine.bus.wheels[0].power(True, rig.machine.now_ns)
     rig.run(SECOND)
-    assert_held_then_silent(rig, lost_ns, 9900 * MS)
+    assert_held_then_silent(rig, lost_ns, 59_900 * MS)
 
 
 def no_acknowledgement(rig):

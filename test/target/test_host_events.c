@@ -213,6 +213,15 @@ static void test_host_setting_out_of_its_range_is_refused(void) {
     config.radius_mm = 0;
     settings = iw_settings_from(&config);
     TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.rest_rpm = 3;
+    settings = iw_settings_from(&config);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.min_current_mA = 2000;
+    config.max_current_mA = 1999;
+    settings = iw_settings_from(&config);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
 }
 
 static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error(void) {

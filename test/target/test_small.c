@@ -84,7 +84,9 @@ static void test_small_texts_are_those_of_the_library(void) {
 
 static void test_small_division_is_that_of_this_machine(void) {
     static const uint64_t corners[] = {
-        0, 1, 2, 3, 10, 999, 1000000000, UINT32_MAX, 1ULL << 32U, 1ULL << 63U, UINT64_MAX - 1U, UINT64_MAX};
+        0,         1,     2,          3,          10,          999,         1000,
+        65535,     65536, 1000000000, UINT32_MAX, 1ULL << 32U, 1ULL << 63U, UINT64_MAX - 1U,
+        UINT64_MAX};
     const size_t count = sizeof corners / sizeof corners[0];
     for (size_t i = 0; i < count * count; i++) {
         const uint64_t number = corners[i / count];

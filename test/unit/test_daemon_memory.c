@@ -417,6 +417,12 @@ static void test_status_that_does_not_fit_keeps_nothing(void) {
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }
 
+static void test_memory_watches_the_button_of_the_configured_line(void) {
+    const gateway_config_t *config = &daemon_rig.daemon->config;
+    TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->knowledge.button.line);
+    TEST_ASSERT_EQUAL(config->estop.active_high, daemon_rig.daemon->knowledge.button.active_high);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for);
@@ -439,5 +445,6 @@ int main(void) {
     RUN_TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept);
     RUN_TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time);
     RUN_TEST(test_status_that_does_not_fit_keeps_nothing);
+    RUN_TEST(test_memory_watches_the_button_of_the_configured_line);
     return UNITY_END();
 }
