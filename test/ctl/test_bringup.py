@@ -646,7 +646,7 @@ class Bringup(unittest.TestCase):
         for turns, commands, told in ((3, ("push both 2",), "rolled the same way"), (3, ("turn 0.5",), "Too few ticks"),
                                       (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
                                       (3, ("push right 4", "push left -1.5"), "wandered off"),
-                                      (20, ("turn 1",), "no track between 50 and 5000 mm")):
+                                      (20, ("turn 1",), "no track between 200")):
             self.turn_around(operator, *commands, turns=turns)
             operator.expect(told)
         operator.answer("How many full turns", "2.5")

@@ -252,7 +252,7 @@ def windows():
     """The parts of the recording in which something is decided, [(from, to)]: before arm until it drives, and about the stop."""
     armed_us = next(row["t_us"] for row in rows() if row["type"] == "arm")
     latched_us = next(row["t_us"] for row in rows() if row["type"] == "state" and row["state"] == "latched")
-    return (armed_us - 100_000, armed_us + 80_000), (latched_us - 40_000, latched_us + 10_000)
+    return (armed_us - 300_000, armed_us + 80_000), (latched_us - 40_000, latched_us + 10_000)
 
 
 def gateway():

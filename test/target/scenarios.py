@@ -187,7 +187,8 @@ def time_never_goes_back(rig):
             before_us, told_us = machine.now_ns / US, machine.call(now_us)
             assert told_us >= last_us, f"{told_us} us after {last_us} us"
             offset_us = offset_us or told_us - before_us
-            assert -2 <= told_us - before_us - offset_us <= 5, f"{told_us} us, {before_us + offset_us} us have passed"
+            # The first one is read right at a tick, behind its interrupt: up to 3 us later than the others.
+            assert -3 <= told_us - before_us - offset_us <= 5, f"{told_us} us, {before_us + offset_us} us have passed"
             last_us = told_us
 
 

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define memcpy       small_memcpy
 #define memmove      small_memmove
 #define memset       small_memset
 #define memcmp       small_memcmp
@@ -15,7 +14,6 @@
 #define strchr       small_strchr
 #define __udivmoddi4 small_divide
 #include "small.c"
-#undef memcpy
 #undef memmove
 #undef memset
 #undef memcmp
@@ -54,9 +52,6 @@ static void test_small_memory_is_that_of_the_library(void) {
                               sign(small_memcmp(mine + from, mine + to, size)));
         TEST_ASSERT_EQUAL_PTR(mine + to, small_memmove(mine + to, mine + from, size));
         memmove(theirs + to, theirs + from, size);
-        TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
-        TEST_ASSERT_EQUAL_PTR(mine + SIZE / 2U, small_memcpy(mine + SIZE / 2U, mine, size));
-        memcpy(theirs + SIZE / 2U, theirs, size);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(theirs, mine, SIZE);
         TEST_ASSERT_EQUAL_PTR(mine + from, small_memset(mine + from, (int)i, size));
         memset(theirs + from, (int)i, size);

@@ -176,15 +176,15 @@ static void tell_ailment(gw_status_t *self, const iw_snapshot_t *seen, const gw_
     }
 }
 
-static void observe_health(gw_status_t *self, const iw_snapshot_t *seen) {
+/// False, without a threshold: a frame costs nothing here then.
+static bool look_at_health(gw_status_t *self, const iw_snapshot_t *seen, gw_health_t *out_before) {
     gw_health_t *health = &self->wheels->health;
     if (health->limits.battery_low_dV == 0U && health->limits.temperature_high_degC == 0U) {
-        return; // Without a threshold a frame costs nothing here.
+        return false;
     }
-    const gw_health_t before = *health;
+    *out_before = *health;
     gw_health_look(health, seen);
-    tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
-    tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
+    return true;
 }
 
 static void observe_rolling(gw_status_t *self, bool rolling) {
@@ -215,6 +215,7 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &self->observed;
     const uint32_t present = faults_of(self, seen);
     const uint32_t changed = present ^ observed->present;
+    gw_health_t before;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; cause++) {
         if ((changed & (1U << cause)) != 0U) {
             tell_fault(self, iwn_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
@@ -239,7 +240,10 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
         }
         tell_fault(self, "setpoint_left", seen->left_behind);
     }
-    observe_health(self, seen);
+    if (look_at_health(self, seen, &before)) {
+        tell_ailment(self, seen, &before, GW_BATTERY_LOW, "battery_low");
+        tell_ailment(self, seen, &before, GW_TEMPERATURE_HIGH, "temperature_high");
+    }
 }
 
 static void observe_purge(gw_status_t *self) {
