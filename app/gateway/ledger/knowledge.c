@@ -84,6 +84,7 @@ static void observe_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_
 static void observe_button(gw_knowledge_t *self) {
     gw_wheels_t *wheels = self->wheels;
     const iw_estop_ops_t *kind = wheels->hal.estop_ops;
+    wheels->estop_tried_us = self->known.tried.wall_us;
     if (!kind->present || kind->simulated) {
         return;
     }
