@@ -265,11 +265,17 @@ def gateway():
             if not begin_us <= row.get("t_us", 0) <= end_us:
                 done_us = None
                 continue
-            told += b"".join(put(number, data, own) for _, number, data, own in new[-16:]) + do(row)
-            if row["type"] == "step":
-                units = (row["t_us"] - (done_us or row["t_us"])) // 100
-                done_us = (done_us or row["t_us"]) + units * 100
-                told += bytes([2, min(units, 255)])
+            if row["type"] != "step":
+                told += b"".join(put(number, data, own) for _, number, data, own in new[-16:]) + do(row)
+                continue
+            # What came while the gateway was held up: some frames, some time, and so on.
+            units = (row["t_us"] - (done_us or row["t_us"])) // 100
+            done_us = (done_us or row["t_us"]) + units * 100
+            parts_of = max(1, -(-units // 200), -(-len(new) // 16))
+            for part in range(parts_of):
+                some = new[len(new) * part // parts_of:len(new) * (part + 1) // parts_of]
+                told += b"".join(put(number, data, own) for _, number, data, own in some)
+                told += bytes([2, units * (part + 1) // parts_of - units * part // parts_of])
         parts.append(told)
         taken = 0
     return parts
