@@ -115,7 +115,7 @@ static void slow_down(const bringup_t *self, const gateway_config_t *config, boo
     out_trial->core.lease_ms = 200;
     out_trial->core.period_ms = 20;
     out_trial->core.zero_hold_ms = 1100;
-    out_trial->core.hold_max_s = 10; // The wheels are in the air: nothing rolls away while somebody waits.
+    out_trial->core.hold_max_s = 10;   // The wheels are in the air: nothing rolls away while somebody waits.
     out_trial->core.blocked_ms = 2000; // A wheel that does not turn is a result here, and no burst lasts that long.
     out_trial->core.pair_mm = 150;     // Nor does a pair in the air turn a machine: as wide as it can be.
     out_trial->core.pair_leak_ms = 500;
