@@ -40,8 +40,8 @@ typedef enum {
 typedef struct {
     bool used;
     ros_verb_t verb;
-    uint64_t source;  ///< The writer of the request.
-    int64_t until_us; ///< CLOCK_MONOTONIC; then it leaves all the same.
+    uint64_t source;   ///< The writer of the request.
+    uint64_t until_us; ///< By bridge_now_us; then it leaves all the same.
     ros_raw_t raw;
 } ros_reply_t;
 

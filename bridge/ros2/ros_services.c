@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
+#include "common/service.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 
@@ -8,7 +9,6 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
-#include <time.h>
 #include <unistd.h>
 
 /// The longest UDP datagram.
@@ -192,12 +192,6 @@ bool ros_take_request(ros_t *self, ros_request_t *out_request) {
 
 // ---- replies ------------------------------------------------------------------------------------------------------------
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /// By this rmw_cyclonedds says which reader and writer are of one client: "clientid=...;" in their user data. Empty: it says nothing.
 static void client_id(const dds_builtintopic_endpoint_t *endpoint, char id[CLIENT_ID_SIZE]) {
     void *data = NULL;
@@ -277,7 +271,7 @@ void ros_send_replies(ros_t *self) {
     size_t kept = 0;
     for (size_t i = 0; i < ROS_WAITING && self->waiting[i].used; i++) {
         ros_reply_t *reply = &self->waiting[i];
-        if (now_us() >= reply->until_us || can_read(self, reply)) {
+        if (bridge_now_us() >= reply->until_us || can_read(self, reply)) {
             write_reply(self, reply);
         } else if (kept++ < i) {
             self->waiting[kept - 1U] = *reply;
@@ -295,7 +289,7 @@ void ros_answer(ros_t *self, const ros_request_t *request, bool success, const c
         return;
     }
     ros_reply_t reply = {
-        .used = true, .verb = request->verb, .source = request->source, .until_us = now_us() + WAIT_US};
+        .used = true, .verb = request->verb, .source = request->source, .until_us = bridge_now_us() + WAIT_US};
     reply.raw.caller = request->caller;
     reply.raw.size = ros_service_write(&request->caller, success, text, reply.raw.bytes, sizeof reply.raw.bytes);
     if (can_read(self, &reply)) {

@@ -115,7 +115,7 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
 }
 
 /// The same for any part, and 1 for what is no part.
-static uint32_t share_of(uint32_t part, uint32_t whole) {
+static uint32_t portion_of(uint32_t part, uint32_t whole) {
     return (part < whole) ? fraction_of(part, whole) : FRACTION_ONE;
 }
 
@@ -138,7 +138,7 @@ static void plan(step_t *step, size_t i, int32_t value, int32_t target, const ui
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - value);
     const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(value);
-    const uint32_t fraction = share_of(allowed[braking ? 1U : 0U], way);
+    const uint32_t fraction = portion_of(allowed[braking ? 1U : 0U], way);
     step->aim[i] = aim;
     step->braking[i] = braking;
     step->share[0] = (fraction < step->share[0]) ? fraction : step->share[0];
@@ -177,9 +177,9 @@ static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
         return;
     }
     if (iw_magnitude(braked) <= bound) {
-        cut_step(step, false, share_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+        cut_step(step, false, portion_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
     } else {
-        cut_step(step, true, share_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        cut_step(step, true, portion_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
         step->share[0] = 0;
     }
 }

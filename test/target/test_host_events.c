@@ -195,33 +195,32 @@ static void test_host_state_after_a_stall_comes_in_no_burst(void) {
     TEST_ASSERT_EQUAL_UINT(0, count_of("\"event\":\"lost\""));
 }
 
-static void test_host_setting_out_of_its_range_is_refused(void) {
-    iw_settings_t settings = iw_settings_from(&rig.config);
-    iw_config_t config = rig.config;
+static bool is_accepted(const iw_config_t *config) {
+    const iw_settings_t settings = iw_settings_from(config);
     char text[256];
     iwn_text_t why = iwn_text_begin(text, sizeof text);
-    TEST_ASSERT_TRUE(iw_settings_check(&settings, &why));
+    return iw_settings_check(&settings, &why);
+}
+
+static void test_host_setting_out_of_its_range_is_refused(void) {
+    iw_config_t config = rig.config;
+    TEST_ASSERT_TRUE(is_accepted(&config));
     config.gear_turns = 1000;
     config.gear_per = 1;
-    settings = iw_settings_from(&config);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(is_accepted(&config));
     config = rig.config;
     config.lease_ms = 900;
-    settings = iw_settings_from(&config);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(is_accepted(&config));
     config = rig.config;
     config.radius_mm = 0;
-    settings = iw_settings_from(&config);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(is_accepted(&config));
     config = rig.config;
     config.rest_rpm = 3;
-    settings = iw_settings_from(&config);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(is_accepted(&config));
     config = rig.config;
     config.min_current_mA = 2000;
     config.max_current_mA = 1999;
-    settings = iw_settings_from(&config);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(is_accepted(&config));
 }
 
 static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error(void) {
