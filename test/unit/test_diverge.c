@@ -299,6 +299,15 @@ static void test_diverge_limit_is_exact(void) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
+static void test_diverge_four_fifths_of_the_expected_speed_are_exact(void) {
+    settle((speeds_t){10000, 10000});
+    pair.path_um = 60000;
+    iw_diverge_hear(&pair, IW_LEFT, 7993);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, iw_diverge_step(&pair, now_us));
+    iw_diverge_hear(&pair, IW_LEFT, 8000);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
+}
+
 static void test_diverge_largest_stays_when_the_deviation_leaks_away(void) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
@@ -385,6 +394,7 @@ int main(void) {
     RUN_TEST(test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand);
     RUN_TEST(test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm);
     RUN_TEST(test_diverge_limit_is_exact);
+    RUN_TEST(test_diverge_four_fifths_of_the_expected_speed_are_exact);
     RUN_TEST(test_diverge_largest_stays_when_the_deviation_leaks_away);
     RUN_TEST(test_diverge_names_the_wheel_that_differs_more);
     RUN_TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second);
