@@ -169,7 +169,7 @@ def main(arguments):
     compiled, parts = uses_of_parts(builds)
     daemon = [line for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line]
     print(f"files that name every telemetry message: {len(message)} (limit 8): {', '.join(message)}")
-    print(f"public headers of the core: {len(headers)} (limit 10): {', '.join(headers)}")
+    print(f"public headers of the core: {len(headers)} (limit 11): {', '.join(headers)}")
     print(f"include depth of the core: {levels['core'][0]} (limit 4), at {levels['core'][1]}; of any other library or program: {deep[0]} (limit 5), at {deep[1]}")
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
@@ -177,7 +177,7 @@ def main(arguments):
     findings = [*private, *parts, *fact_of_arrows("app/gateway", 40), *fact_of_arrows("app/ctl", 40), *fact_of_arrows(".", 40)]
     findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
-    findings += [f"{len(headers)} public headers"] if len(headers) > 10 else []
+    findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []
     findings += [f"{where} includes {count} levels deep" for component, (count, where) in levels.items() if count > (4 if component == "core" else 5)]
     findings += ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
     print(*findings, sep="\n")
