@@ -7,8 +7,8 @@
 #include <string.h>
 
 #define ROOM 512U
-#define HEAD 20U
-#define BEAT 32U
+#define HEAD ((size_t)20)
+#define BEAT ((size_t)32)
 
 static rtps_firsts_t firsts;
 static uint8_t message[ROOM];
@@ -196,10 +196,10 @@ static void test_firsts_several_heartbeats_of_a_message_each_have_their_own(void
     put_heartbeat(false, 2, 5, 6);
     message[length - 30U] = 0; // The last one reaches to the end.
     message[length - 29U] = 0;
-    TEST_ASSERT_EQUAL_size_t(length + 2U * BEAT, await_at(0));
-    TEST_ASSERT_EQUAL_MEMORY(message + HEAD, out + HEAD + BEAT, 2U * BEAT);
-    TEST_ASSERT_EQUAL_INT64(4, rtps_read_sequence(out + HEAD + 3U * BEAT + 20U, false));
-    TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 2U * BEAT, out + HEAD + 4U * BEAT, BEAT);
+    TEST_ASSERT_EQUAL_size_t(length + 2 * BEAT, await_at(0));
+    TEST_ASSERT_EQUAL_MEMORY(message + HEAD, out + HEAD + BEAT, 2 * BEAT);
+    TEST_ASSERT_EQUAL_INT64(4, rtps_read_sequence(out + HEAD + 3 * BEAT + 20U, false));
+    TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 2 * BEAT, out + HEAD + 4 * BEAT, BEAT);
     TEST_ASSERT_EQUAL_size_t_MESSAGE(length + BEAT, await_in(0, length, length + BEAT), "there is room for one");
 }
 
