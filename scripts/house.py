@@ -21,12 +21,12 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
-PRODUCTION = ("core", "northbound", "client", "port", "app")
+PRODUCTION = ("core", "lib", "northbound", "client", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
 COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "client/c": ("client/c/include", "client/c/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "app/begin": (), "app/settings": (), "app/blackbox": (), "app/candump": (), "app/inspect": ()}
-OUTSIDE = ("northbound", "client", "port", "app", "examples", "zephyr", "bridge")
+              "app/begin": (), "lib/config": (), "app/blackbox": (), "app/candump": (), "app/inspect": ()}
+OUTSIDE = ("lib", "northbound", "client", "port", "app", "examples", "zephyr", "bridge")
 
 
 def sources(*folders):
@@ -124,7 +124,7 @@ def arrows(program):
 def component(path):
     """The library or program that a file belongs to."""
     parts = path.relative_to(ROOT).parts
-    return "/".join(parts[:2] if parts[0] in ("app", "port", "bridge") else parts[:1])
+    return "/".join(parts[:2] if parts[0] in ("lib", "app", "port", "bridge") else parts[:1])
 
 
 def arrows_of_the_tree():
