@@ -25,7 +25,7 @@ PRODUCTION = ("core", "lib", "northbound", "client", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
 COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "client/c": ("client/c/include", "client/c/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "app/begin": (), "lib/config": (), "lib/recording": (), "app/inspect": ()}
+              "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": ()}
 OUTSIDE = ("lib", "northbound", "client", "port", "app", "examples", "zephyr", "bridge")
 
 
