@@ -21,12 +21,12 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
-PRODUCTION = ("core", "lib", "northbound", "port", "app")
+PRODUCTION = ("core", "lib", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
-COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "lib/client": ("lib/client/include", "lib/client/src"),
+COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
               "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": ()}
-OUTSIDE = ("lib", "northbound", "port", "app", "examples", "zephyr", "bridge")
+OUTSIDE = ("lib", "port", "app", "examples", "zephyr", "bridge")
 
 
 def sources(*folders):
