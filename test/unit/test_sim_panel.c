@@ -35,7 +35,7 @@ void setUp(void) {
     memset(&panel, 0xA5, sizeof panel);
     sim_world_init(&world, NULL, START_US, 1U);
     panel.world = &world;
-    panel.hooks = (sim_hooks_t){NULL, NULL, mark, quit, NULL};
+    panel.hooks = (sim_hooks_t){.mark = mark, .quit = quit};
     marked[0] = '\0';
     quits = 0U;
     run_until(NOW_US);
