@@ -143,7 +143,7 @@ static result_t set_contact(const sim_call_t *call) {
         return SIM_USAGE;
     }
     if (hooks->button != NULL && hooks->second == NULL) {
-        return "the button has one contact; start iwheel-sim with --estop2 PATH";
+        return "the button has one contact; give the simulator --estop2 PATH for another";
     }
     return (button != NULL) ? obey(&wish, button) : NULL;
 }
