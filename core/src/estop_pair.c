@@ -37,7 +37,10 @@ int iw_estop_pair_see(iw_estop_pair_t *self, iw_time_us_t now_us, int first, int
     }
     self->disagrees = self->disagrees || has_differed(self, now_us);
     follow(self, one, both);
-    return self->disagrees ? IW_ESTOP_DISAGREES : (int)one;
+    if (self->disagrees) {
+        return IW_ESTOP_DISAGREES;
+    }
+    return one ? 1 : 0;
 }
 
 iw_time_us_t iw_estop_pair_next_us(const iw_estop_pair_t *self) {
