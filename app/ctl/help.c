@@ -2,7 +2,7 @@
 #include "help.h"
 
 #include "config/gateway_config.h"
-#include "settings/similar.h"
+#include "config/similar.h"
 #include "talk/words.h"
 #include "text/duration.h"
 

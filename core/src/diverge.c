@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/private/diverge.h"
+#include "iwheel/diverge.h"
 
 #include "magnitude.h"
 

@@ -199,7 +199,8 @@ class Lacks(unittest.TestCase):
 
     def test_learn_whole_recording_tells_everything(self):
         found = self.differs({})
-        self.assertEqual(set(self.TOLD), set(found), "nothing else")
+        self.assertEqual(set(self.TOLD) | {("wheel_lag", side) for side in SIDES}, set(found), "nothing else")
+        self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow at once")
 
     def test_learn_telemetry_of_neither_wheel_leaves_what_a_wheel_does_open(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN,

@@ -6,6 +6,8 @@
 
 #include "unity.h"
 
+#include <stdlib.h>
+
 #define MS 1000
 
 static learn_t learn;
@@ -338,8 +340,102 @@ static void test_learn_of_more_drives_than_can_be_told_the_largest_counts(void) 
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[LEARN_DRIVES_MAX - 1U].deviation_mm);
 }
 
+// How far a wheel stays behind in time --------------------------------------------------------------------------------------
+
+/// A wheel that follows with that lag, loses that many per mille of its speed, and shows whole rpm.
+typedef struct {
+    double lag_ms;
+    double droop;
+    double speed_mm_s;
+    int32_t ramp_mm_s; ///< Its setpoint.
+} model_t;
+
+/// So long towards that setpoint, by 1000 mm/s2 and every 20 ms.
+static void follow(model_t *wheel, unsigned ms, int16_t target_mm_s) {
+    for (unsigned passed = 0; passed < ms; passed += 4U) {
+        if (passed % 20U == 0U) {
+            const int32_t way = target_mm_s - wheel->ramp_mm_s;
+            wheel->ramp_mm_s += (way > 20) ? 20 : (way < -20) ? -20 : way;
+            setpoint(IW_LEFT, (int16_t)wheel->ramp_mm_s, 500, CANDUMP_RECEIVED);
+        }
+        now_us += 4 * MS;
+        wheel->speed_mm_s +=
+            ((double)wheel->ramp_mm_s * (1.0 - wheel->droop) - wheel->speed_mm_s) * 4.0 / wheel->lag_ms;
+        speed(IW_LEFT, (int16_t)(wheel->speed_mm_s / 20.106 + (double)(passed % 40U) / 40.0));
+    }
+}
+
+static void assert_lag(double lag_ms, double droop) {
+    model_t wheel = {.lag_ms = lag_ms, .droop = droop};
+    learn_drives_init(&drives, &config);
+    follow(&wheel, 1500, 0);
+    follow(&wheel, 2500, 600);
+    follow(&wheel, 2500, 100);
+    follow(&wheel, 2500, -500);
+    TEST_ASSERT_EQUAL_UINT32(3, drives.lag[IW_LEFT].count);
+    TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].least_ms);
+    TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].most_ms);
+}
+
+static void test_learn_lag_is_that_of_the_wheel_whatever_its_droop(void) {
+    assert_lag(30.0, 0.0);
+    assert_lag(60.0, 0.04);
+    assert_lag(120.0, 0.1);
+}
+
+static const learn_finding_t *lag_found(unsigned side, const char *item) {
+    static learn_findings_t findings;
+    findings.count = 0;
+    learn_drives_weigh(&drives, &findings);
+    return learn_find(&findings, item, side);
+}
+
+static void test_learn_lag_speaks_against_what_the_gateway_assumes(void) {
+    assert_lag(60.0, 0.0);
+    TEST_ASSERT_EQUAL_CHAR('+', lag_found(IW_LEFT, "wheel_lag")->mark);
+    assert_lag(120.0, 0.0);
+    TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_LEFT, "wheel_lag")->mark);
+    TEST_ASSERT_EQUAL_CHAR('?', lag_found(IW_RIGHT, "wheel_lag")->mark);
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // Not of one wheel alone.
+    drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
+}
+
+static void test_learn_lag_of_changes_that_differ_is_no_value(void) {
+    assert_lag(60.0, 0.0);
+    drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
+    drives.lag[IW_RIGHT].most_ms = 100.0;
+    TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_RIGHT, "wheel_lag")->mark);
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms"));
+}
+
+/// Small changes, a wheel that does not follow, a gap in its speed frames, no second of rest before: none of them counts.
+static void test_learn_lag_needs_a_change_from_steady_to_steady(void) {
+    model_t wheel = {.lag_ms = 60.0};
+    follow(&wheel, 900, 0);
+    follow(&wheel, 2500, 600); // Of 0.9 s it had the speed for 0.4.
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    follow(&wheel, 2500, 400);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    follow(&wheel, 300, 0);
+    now_us += 150 * MS;
+    follow(&wheel, 2500, 0);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    wheel.droop = 0.6;
+    follow(&wheel, 2500, 600);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    wheel.droop = 0.0;
+    follow(&wheel, 2500, 0);
+    follow(&wheel, 2500, 600);
+    TEST_ASSERT_EQUAL_UINT32(1, drives.lag[IW_LEFT].count);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_learn_lag_is_that_of_the_wheel_whatever_its_droop);
+    RUN_TEST(test_learn_lag_speaks_against_what_the_gateway_assumes);
+    RUN_TEST(test_learn_lag_of_changes_that_differ_is_no_value);
+    RUN_TEST(test_learn_lag_needs_a_change_from_steady_to_steady);
     RUN_TEST(test_learn_drive_that_keeps_its_path_has_no_deviation);
     RUN_TEST(test_learn_deviation_is_the_one_by_which_the_gateway_judges);
     RUN_TEST(test_learn_each_drive_has_its_own_deviation);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Do both wheels together go where they are commanded? What counts, what is ordinary, when it is too much, and which wheel it is.
 #include "fixture.h"
-#include "iwheel/private/diverge.h"
+#include "iwheel/diverge.h"
 #include "unity.h"
 
 #include <stdlib.h>

@@ -15,6 +15,7 @@ void learn_drives_init(learn_drives_t *self, const iw_config_t *config) {
     iw_diverge_init(&self->pair, config);
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->heard_us[side] = self->told_us[side] = -1;
+        learn_lag_init(&self->lag[side]);
     }
 }
 
@@ -60,6 +61,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
 static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
     self->pair.applied_mm_s[side] = self->config->invert[side] ? -speed_mm_s : speed_mm_s;
     self->told_us[side] = now_us;
+    learn_lag_tell(&self->lag[side], now_us, speed_mm_s);
     if (speed_mm_s == 0) {
         return;
     }
@@ -76,6 +78,7 @@ static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t 
 
 static void hear(learn_drives_t *self, size_t side, int32_t rpm, int64_t now_us) {
     const int32_t speed_um_s = rpm * self->pair.um_s_per_rpm;
+    learn_lag_hear(&self->lag[side], now_us, speed_um_s / 1e3);
     iw_diverge_hear(&self->pair, side, (self->config->invert[side] ? -speed_um_s : speed_um_s) / 1000);
     self->heard_us[side] = now_us;
 }
@@ -119,4 +122,5 @@ void learn_drives_weigh(const learn_drives_t *self, learn_findings_t *out_findin
                         " (pair_mm): was a wheel blocked or slow? is one mounted mirrored (--config)?",
                         self->largest_mm, limit_mm);
     }
+    learn_lag_weigh(self->lag, self->config->wheel_lag_ms, out_findings);
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-/// How far each drive of a recording left its path: what the gateway's rule of the pair (iwheel/private/diverge.h) would
+/// How far each drive of a recording left its path: what the gateway's rule of the pair (iwheel/diverge.h) would
 /// have seen. So an integrator knows the margin to `pair_mm` on the real wheels before the gateway drives them.
 #ifndef LEARN_DRIVES_H
 #define LEARN_DRIVES_H
 
-#include "learn_findings.h"
+#include "learn_lag.h"
 
-#include "iwheel/private/diverge.h"
+#include "iwheel/diverge.h"
 
 /// Drives told one by one.
 #define LEARN_DRIVES_MAX 32U
@@ -32,6 +32,7 @@ typedef struct {
     learn_drive_t drive[LEARN_DRIVES_MAX + 1U]; ///< Of more drives the last place keeps the one that is going on.
     uint32_t largest_mm;                        ///< Of all.
     int64_t judged_us;                          ///< The same as in a drive, of all.
+    learn_lag_t lag[IW_SIDES];
 } learn_drives_t;
 
 /// `config` must outlive it: limits, time constants, `invert` and the gear.
@@ -42,7 +43,7 @@ void learn_drives_frame(learn_drives_t *self, const candump_t *frame);
 /// The drives that are told one by one.
 uint32_t learn_drives_told(const learn_drives_t *self);
 
-/// Adds a sentence.
+/// Adds its sentences.
 void learn_drives_weigh(const learn_drives_t *self, learn_findings_t *out_findings);
 
 #endif

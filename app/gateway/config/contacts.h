@@ -4,7 +4,7 @@
 #define CONFIG_CONTACTS_H
 
 #include "config/gateway_config.h"
-#include "settings/settings.h"
+#include "config/settings.h"
 
 /// The lines of the file on which `line2` and `estop_discrepancy_ms` stand; 0: not given. Two names of one line are found out when
 /// it is opened.

@@ -2,7 +2,8 @@
 #include "gateway_config.h"
 
 #include "contacts.h"
-#include "settings/settings.h"
+
+#include "config/settings.h"
 
 #include <string.h>
 
