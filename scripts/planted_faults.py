@@ -173,7 +173,7 @@ def put(folder, fault):
 
 def house(folder, fault):
     """The tree with one change. Of the programs only the one changed is compiled anew."""
-    for part in ("core", "port", "lib", "app", "bridge", "scripts"):
+    for part in ("core", "port", "lib", "app", "scripts"):
         if (ROOT / part).is_dir():
             shutil.copytree(ROOT / part, folder / part)
     put(folder, fault)
@@ -185,7 +185,7 @@ def house(folder, fault):
 
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
-    for part in ("core", "port", "lib", "app", "bridge", "python", "test/faults"):
+    for part in ("core", "port", "lib", "app", "python", "test/faults"):
         shutil.copytree(ROOT / part, folder / part)
     for part in ("target", "fuzz", "support"):
         (folder / "test" / part).symlink_to(ROOT / "test" / part)
