@@ -19,7 +19,7 @@
 /// Long enough for every message and every value.
 #define SETTINGS_MESSAGE_SIZE 512U
 /// A table has no more rows.
-#define SETTINGS_KEYS_MAX 56U
+#define SETTINGS_KEYS_MAX 64U
 /// The first of these errors are written, the others counted.
 #define SETTINGS_ERRORS_SHOWN 20U
 /// A path that fits a unix socket address, with its terminator.

@@ -67,7 +67,7 @@ static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client
     gw_clients_send_reply(client, &json);
 }
 
-/// An arm or a reset that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
+/// An arm, a reset or a release that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
 static bool refuse_waited(const gw_call_t *call) {
     static const iwn_refusal_t refusal = {
         IWN_STALE_COMMAND,
@@ -273,6 +273,22 @@ static void do_reset(const gw_call_t *call) {
     reply_state(call);
 }
 
+/// It permits motion as `arm` does: in time, and not behind a stop of somebody else.
+static void do_release(const gw_call_t *call) {
+    gw_wheels_t *wheels = call->answers->wheels;
+    if (refuse_waited(call)) {
+        return;
+    }
+    const iw_refusal_t refusal = iw_gateway_release(&wheels->core);
+    note(call, &(blackbox_entry_t){.kind = BLACKBOX_RELEASE, .b = (uint8_t)refusal});
+    if (refusal != IW_REFUSE_NONE) {
+        refuse(call, refusal);
+        return;
+    }
+    wheels->requested = true;
+    reply_state(call);
+}
+
 static void do_tare(const gw_call_t *call) {
     gw_knowledge_t *knowledge = call->answers->knowledge;
     const iw_snapshot_t seen = gw_wheels_look(call->answers->wheels);
@@ -350,6 +366,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         [IWN_CMD_DISARM] = do_stop,
         [IWN_CMD_ESTOP] = do_estop,
         [IWN_CMD_RESET] = do_reset,
+        [IWN_CMD_RELEASE] = do_release,
         [IWN_CMD_TARE] = do_tare,
         [IWN_CMD_WHY] = do_why,
         [IWN_CMD_CONFIRM] = do_confirm,
