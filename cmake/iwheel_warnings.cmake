@@ -9,3 +9,8 @@ option(IWHEEL_WERROR "Warnings are errors" ${PROJECT_IS_TOP_LEVEL})
 if(IWHEEL_WERROR)
     target_compile_options(iwheel_warnings INTERFACE -Werror)
 endif()
+
+# What is written for Linux, with the C library's extensions.
+add_library(iwheel_gnu INTERFACE)
+target_compile_definitions(iwheel_gnu INTERFACE _GNU_SOURCE)
+target_link_libraries(iwheel_gnu INTERFACE iwheel_warnings)

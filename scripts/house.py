@@ -21,12 +21,12 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
-PRODUCTION = ("core", "northbound", "client", "port", "app")
+PRODUCTION = ("core", "lib", "northbound", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
-COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "client/c": ("client/c/include", "client/c/src"),
+COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "lib/client": ("lib/client/include", "lib/client/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "app/begin": (), "app/settings": (), "app/blackbox": (), "app/candump": (), "app/inspect": ()}
-OUTSIDE = ("northbound", "client", "port", "app", "examples", "zephyr", "bridge")
+              "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": ()}
+OUTSIDE = ("lib", "northbound", "port", "app", "examples", "zephyr", "bridge")
 
 
 def sources(*folders):
@@ -124,7 +124,7 @@ def arrows(program):
 def component(path):
     """The library or program that a file belongs to."""
     parts = path.relative_to(ROOT).parts
-    return "/".join(parts[:2] if parts[0] in ("app", "port", "bridge") else parts[:1])
+    return "/".join(parts[:2] if parts[0] in ("lib", "app", "port", "bridge") else parts[:1])
 
 
 def arrows_of_the_tree():
@@ -169,7 +169,7 @@ def main(arguments):
     compiled, parts = uses_of_parts(builds)
     daemon = [line for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line]
     print(f"files that name every telemetry message: {len(message)} (limit 8): {', '.join(message)}")
-    print(f"public headers of the core: {len(headers)} (limit 10): {', '.join(headers)}")
+    print(f"public headers of the core: {len(headers)} (limit 11): {', '.join(headers)}")
     print(f"include depth of the core: {levels['core'][0]} (limit 4), at {levels['core'][1]}; of any other library or program: {deep[0]} (limit 5), at {deep[1]}")
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
@@ -177,7 +177,7 @@ def main(arguments):
     findings = [*private, *parts, *fact_of_arrows("app/gateway", 40), *fact_of_arrows("app/ctl", 40), *fact_of_arrows(".", 40)]
     findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
-    findings += [f"{len(headers)} public headers"] if len(headers) > 10 else []
+    findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []
     findings += [f"{where} includes {count} levels deep" for component, (count, where) in levels.items() if count > (4 if component == "core" else 5)]
     findings += ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
     print(*findings, sep="\n")

@@ -153,7 +153,7 @@ def mcdc(folder, calls):
 
 
 def style(folder, code):
-    for part in ("core/src", "core/include", "northbound/src", "northbound/include", "port", "app", "test"):
+    for part in ("core/src", "core/include", "northbound/src", "northbound/include", "port", "lib", "app", "test"):
         (folder / part).mkdir(parents=True)
     (folder / "core/src/planted.c").write_text(code)
     for part in ("core/src", "port"):
@@ -173,7 +173,7 @@ def put(folder, fault):
 
 def house(folder, fault):
     """The tree with one change. Of the programs only the one changed is compiled anew."""
-    for part in ("core", "northbound", "client", "port", "app", "bridge", "scripts"):
+    for part in ("core", "northbound", "port", "lib", "app", "bridge", "scripts"):
         if (ROOT / part).is_dir():
             shutil.copytree(ROOT / part, folder / part)
     put(folder, fault)
@@ -185,7 +185,7 @@ def house(folder, fault):
 
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
-    for part in ("core", "northbound", "client", "port", "app", "bridge", "python", "test/faults"):
+    for part in ("core", "northbound", "port", "lib", "app", "bridge", "python", "test/faults"):
         shutil.copytree(ROOT / part, folder / part)
     for part in ("target", "fuzz", "support"):
         (folder / "test" / part).symlink_to(ROOT / "test" / part)
@@ -197,7 +197,7 @@ def faults(folder, fault):
 
 def api(folder, fault):
     """The reference of small copies of the headers' folders, of which one is `fault`."""
-    for name in ("core", "northbound", "client/c", "port/linux"):
+    for name in ("core", "northbound", "lib/client", "port/linux"):
         (folder / name / "include").mkdir(parents=True)
     (folder / "docs").mkdir()
     shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")

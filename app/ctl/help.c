@@ -2,7 +2,7 @@
 #include "help.h"
 
 #include "config/gateway_config.h"
-#include "settings/similar.h"
+#include "config/similar.h"
 #include "talk/words.h"
 #include "text/duration.h"
 
@@ -175,16 +175,19 @@ static const verb_t verbs[] = {
           "wheel, "
           "message, values {what it carries, named as in the CSV}, note.\n"
           "Lines that cannot be understood are told with their number and left out; then the exit code is 65.\n")},
-    {VERB("learn", verb_learn, "FILE [--interface NAME]",
-          "what a recording of another controller tells about the wheels",
-          "Reads only; needs no gateway. Record while a controller that works drives both wheels: let it stand, go "
-          "forwards and backwards for seconds each; best from the moment the wheels are switched on, unloaded. Tells "
-          "setpoint types, ranges, lengths and periods, what speaks for (+) and against (-) the documented units and "
-          "signs, and what no recording can tell. What was not seen is not concluded: such a line begins with ? and "
-          "names what is missing.\n"
-          "--interface NAME  only the frames of this interface; needed if the recording has frames of several\n"
-          "With --json one object: the figures, every sentence (item, side, verdict, value, text), the suggestions.\n"
-          "Exit code 1: there is no setpoint in it.\n")},
+    {VERB(
+        "learn", verb_learn, "FILE [--interface NAME] [--config FILE]",
+        "what a recording of another controller tells about the wheels",
+        "Reads only; needs no gateway. Record while a controller that works drives both wheels: let it stand, go "
+        "forwards and backwards for seconds each; best from the moment the wheels are switched on, unloaded. Tells "
+        "setpoint types, ranges, lengths and periods, what speaks for (+) and against (-) the documented units and "
+        "signs, and what no recording can tell. What was not seen is not concluded: such a line begins with ? and "
+        "names what is missing. Of each drive it tells how far the machine left its path by what the wheels measured, "
+        "and where the gateway would stop it.\n"
+        "--interface NAME  only the frames of this interface; needed if the recording has frames of several\n"
+        "--config FILE     the gateway's configuration, for invert, gear, pair_mm and wheel_lag_ms; else its defaults\n"
+        "With --json one object: the figures, every sentence (item, side, verdict, value, text), the suggestions.\n"
+        "Exit code 1: there is no setpoint in it.\n")},
     {VERB("replay", verb_replay, "FILE [--config FILE] [--interface NAME]",
           "a recording through the gateway's core: what it decides",
           "Reads only; needs no bus, and no gateway unless a recording of it is not to be read here: then it is asked "

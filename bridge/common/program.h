@@ -3,7 +3,7 @@
 #ifndef IW_BRIDGE_PROGRAM_H
 #define IW_BRIDGE_PROGRAM_H
 
-#include "settings/settings.h"
+#include "config/settings.h"
 
 /// There is something to do; smaller results are exit codes of what has been done, or refused with a message.
 #define BRIDGE_GO 256

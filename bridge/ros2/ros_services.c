@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
 #include "common/service.h"
+#include "firsts.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 
@@ -54,24 +55,57 @@ static ssize_t send_as_it_is(int fd, const struct msghdr *message, int flags) {
     return (ssize_t)syscall(SYS_sendmsg, fd, message, flags);
 }
 
-/// In the place of libc's, for the whole process: a reply to a client of Fast DDS gets the identity of its request.
+/// What leaves in the place of `out.message`. False: nothing else.
+static bool change_message(size_t length, struct iovec *whole) {
+    const bool asked = rtps_ask_firsts(out.message, length);
+    const size_t marked =
+        out.used ? ros_service_mark(&out.marks, out.message, length, out.marked, sizeof out.marked) : 0U;
+    *whole = (struct iovec){.iov_base = (marked > 0U) ? out.marked : out.message,
+                            .iov_len = (marked > 0U) ? marked : length};
+    return asked || marked > 0U;
+}
+
+/// In the place of libc's, for the whole process: a reply to a client of Fast DDS gets the identity of its request, and Fast DDS is asked in
+/// its own way for what it wrote first.
 ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
-    (void)pthread_mutex_lock(&out.lock);
-    const size_t length = out.used ? join_parts(message) : 0U;
-    const size_t marked = ros_service_mark(&out.marks, out.message, length, out.marked, sizeof out.marked);
+    struct iovec whole;
     ssize_t sent = 0;
-    if (marked > 0U) {
-        struct iovec whole = {.iov_base = out.marked, .iov_len = marked};
+    (void)pthread_mutex_lock(&out.lock);
+    const size_t length = join_parts(message);
+    const bool changed = change_message(length, &whole);
+    if (changed) {
         struct msghdr copy = *message;
         copy.msg_iov = &whole;
         copy.msg_iovlen = 1;
         sent = send_as_it_is(fd, &copy, flags);
-        sent = (sent == (ssize_t)marked) ? (ssize_t)length : sent; // CycloneDDS compares it with what it gave.
+        sent = (sent == (ssize_t)whole.iov_len) ? (ssize_t)length : sent; // CycloneDDS compares it with what it gave.
     }
     const int error = errno;
     (void)pthread_mutex_unlock(&out.lock);
     errno = error;
-    return (marked > 0U) ? sent : send_as_it_is(fd, message, flags);
+    return changed ? sent : send_as_it_is(fd, message, flags);
+}
+
+// ---- the way in -------------------------------------------------------------------------------------------------------
+
+/// Of `recvmsg` below, also in each of its threads.
+static struct {
+    pthread_mutex_t lock;
+    rtps_firsts_t firsts;
+} in = {.lock = PTHREAD_MUTEX_INITIALIZER};
+
+/// In the place of libc's, for the whole process: CycloneDDS asks for what a new writer of Fast DDS wrote before it was known.
+ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
+    const ssize_t came = (ssize_t)syscall(SYS_recvmsg, fd, message, flags);
+    if (came <= 0 || message->msg_iovlen != 1 || (message->msg_flags & MSG_TRUNC) != 0) {
+        return came;
+    }
+    const struct iovec *room = &message->msg_iov[0];
+    (void)pthread_mutex_lock(&in.lock);
+    const size_t length =
+        rtps_await_firsts(&in.firsts, (int64_t)bridge_now_us(), room->iov_base, (size_t)came, room->iov_len);
+    (void)pthread_mutex_unlock(&in.lock);
+    return (ssize_t)length;
 }
 
 static void note_reply(ros_verb_t verb, const ros_caller_t *caller) {

@@ -3,7 +3,7 @@
 #ifndef ROS2_ROS_SETTINGS_H
 #define ROS2_ROS_SETTINGS_H
 
-#include "settings/settings.h"
+#include "config/settings.h"
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
 #define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"

@@ -3,18 +3,12 @@
 
 #include <string.h>
 
-#define RTPS_HEADER      20U
-#define RTPS_PREFIX_AT   8U
-#define SUBMESSAGE       4U
 #define DATA_HEADER      24U ///< With the submessage's.
 #define DATA_TO_QOS_AT   6U  ///< octetsToInlineQos, and from where it counts.
 #define DATA_COUNTS_FROM 8U
 #define DATA_WRITER_AT   12U
 #define DATA_NUMBER_AT   16U
 #define DATA             0x15U
-#define PAD              0x01U
-#define INFO_TS          0x09U
-#define LITTLE           0x01U
 #define HAS_QOS          0x02U
 #define PID_SENTINEL     0x0001U
 /// Of RTPS 2.4, and the one that Fast DDS used before; it reads both.
@@ -26,36 +20,10 @@
 #define REQUEST_SIZE       1U ///< structure_needs_at_least_one_member
 #define ALIGNED            4U
 
-// ---- numbers of either order ----------------------------------------------------------------------------------------
-
-static uint32_t read_number(const uint8_t *bytes, size_t count, bool little) {
-    uint32_t value = 0;
-    for (size_t i = 0; i < count; i++) {
-        value |= (uint32_t)bytes[i] << (8U * (little ? i : count - 1U - i));
-    }
-    return value;
-}
-
-static void write_number(uint32_t value, size_t count, bool little, uint8_t *out) {
-    for (size_t i = 0; i < count; i++) {
-        out[i] = (uint8_t)(value >> (8U * (little ? i : count - 1U - i)));
-    }
-}
-
-/// Two words, the high one first, as RTPS has a sequence number.
-static int64_t read_sequence(const uint8_t *bytes, bool little) {
-    return (int64_t)((uint64_t)read_number(bytes, 4, little) << 32 | read_number(bytes + 4, 4, little));
-}
-
-static void write_sequence(int64_t number, bool little, uint8_t *out) {
-    write_number((uint32_t)((uint64_t)number >> 32), 4, little, out);
-    write_number((uint32_t)number, 4, little, out + 4);
-}
-
 /// As CDR has a number of 64 bits.
 static int64_t read_long(const uint8_t *bytes, bool little) {
-    const uint64_t first = read_number(bytes, 4, little);
-    const uint64_t second = read_number(bytes + 4, 4, little);
+    const uint64_t first = rtps_read(bytes, 4, little);
+    const uint64_t second = rtps_read(bytes + 4, 4, little);
     return (int64_t)(little ? second << 32 | first : first << 32 | second);
 }
 
@@ -88,8 +56,8 @@ size_t ros_service_write(const ros_caller_t *caller, bool success, const char *t
     if (caller->form == ROS_FORM_HEADER) {
         memcpy(out + used, caller->guid, HEADER_GUID);
         used += HEADER_GUID;
-        write_number((uint32_t)caller->number, 4, true, out + used);
-        write_number((uint32_t)((uint64_t)caller->number >> 32), 4, true, out + used + 4U);
+        rtps_write((uint32_t)caller->number, 4, true, out + used);
+        rtps_write((uint32_t)((uint64_t)caller->number >> 32), 4, true, out + used + 4U);
         used += sizeof caller->number;
     }
     memset(out + used, 0, ALIGNED);
@@ -97,7 +65,7 @@ size_t ros_service_write(const ros_caller_t *caller, bool success, const char *t
     used += ALIGNED;
     const size_t room = size - used - sizeof(uint32_t) - ALIGNED;
     const size_t length = strnlen(text, room - 1U);
-    write_number((uint32_t)length + 1U, sizeof(uint32_t), true, out + used);
+    rtps_write((uint32_t)length + 1U, sizeof(uint32_t), true, out + used);
     used += sizeof(uint32_t);
     memset(out + used, 0, length + ALIGNED);
     memcpy(out + used, text, length);
@@ -116,31 +84,22 @@ typedef struct {
 
 /// The submessage at `at`; false: the message ends before its end, or it is none of DATA (`out->size` is its size; 0: none at all).
 static bool data_at(const uint8_t *message, size_t length, size_t at, data_t *out) {
-    *out = (data_t){.bytes = message + at};
-    if (at + SUBMESSAGE > length) {
+    rtps_part_t part;
+    const bool is_whole = rtps_part_at(message, length, at, &part);
+    *out = (data_t){.bytes = part.bytes, .size = part.size, .little = part.little};
+    if (!is_whole || part.bytes[0] != DATA || part.size < DATA_HEADER) {
         return false;
     }
-    out->little = (out->bytes[1] & LITTLE) != 0U;
-    const size_t rest = read_number(out->bytes + 2, 2, out->little);
-    const bool is_last = rest == 0U && out->bytes[0] != PAD && out->bytes[0] != INFO_TS; // It may have no length.
-    out->size = is_last ? length - at : SUBMESSAGE + rest;
-    if (out->size > length - at) {
-        out->size = 0;
-        return false;
-    }
-    if (out->bytes[0] != DATA || out->size < DATA_HEADER) {
-        return false;
-    }
-    out->qos = DATA_COUNTS_FROM + read_number(out->bytes + DATA_TO_QOS_AT, 2, out->little);
+    out->qos = DATA_COUNTS_FROM + rtps_read(part.bytes + DATA_TO_QOS_AT, 2, part.little);
     return out->qos >= DATA_HEADER && out->qos <= out->size;
 }
 
 static void read_related(const data_t *data, ros_caller_t *caller) {
     size_t at = data->qos;
-    while (at + SUBMESSAGE <= data->size) {
-        const uint32_t kind = read_number(data->bytes + at, 2, data->little);
-        const size_t size = read_number(data->bytes + at + 2U, 2, data->little);
-        at += SUBMESSAGE;
+    while (at + RTPS_SUBMESSAGE <= data->size) {
+        const uint32_t kind = rtps_read(data->bytes + at, 2, data->little);
+        const size_t size = rtps_read(data->bytes + at + 2U, 2, data->little);
+        at += RTPS_SUBMESSAGE;
         if (kind == PID_SENTINEL || size > data->size - at) {
             return;
         }
@@ -158,7 +117,7 @@ bool ros_service_identify(const uint8_t *message, size_t size, size_t at, ros_ca
     if (at < RTPS_HEADER || !data_at(message, size, at, &data)) {
         return false;
     }
-    out_caller->number = read_sequence(data.bytes + DATA_NUMBER_AT, data.little);
+    out_caller->number = rtps_read_sequence(data.bytes + DATA_NUMBER_AT, data.little);
     if ((data.bytes[1] & HAS_QOS) != 0U) {
         read_related(&data, out_caller);
     }
@@ -176,7 +135,7 @@ void ros_service_note(ros_marks_t *marks, unsigned which, const ros_caller_t *ca
 
 /// Whose reply it is; NULL: nobody's that has to be named.
 static const ros_caller_t *caller_of(const ros_marks_t *marks, const data_t *data) {
-    const int64_t number = read_sequence(data->bytes + DATA_NUMBER_AT, data->little);
+    const int64_t number = rtps_read_sequence(data->bytes + DATA_NUMBER_AT, data->little);
     for (unsigned i = 0; i < ROS_MARK_WRITERS; i++) {
         const int64_t newest = marks->writers[i].number;
         if (memcmp(marks->writers[i].id, data->bytes + DATA_WRITER_AT, sizeof marks->writers[i].id) == 0 &&
@@ -189,11 +148,11 @@ static const ros_caller_t *caller_of(const ros_marks_t *marks, const data_t *dat
 }
 
 static size_t write_related(uint32_t kind, const ros_caller_t *caller, bool little, uint8_t *out) {
-    write_number(kind, 2, little, out);
-    write_number(IDENTITY_SIZE, 2, little, out + 2);
-    memcpy(out + SUBMESSAGE, caller->guid, ROS_GUID_SIZE);
-    write_sequence(caller->number, little, out + SUBMESSAGE + ROS_GUID_SIZE);
-    return SUBMESSAGE + IDENTITY_SIZE;
+    rtps_write(kind, 2, little, out);
+    rtps_write(IDENTITY_SIZE, 2, little, out + 2);
+    memcpy(out + RTPS_SUBMESSAGE, caller->guid, ROS_GUID_SIZE);
+    rtps_write_sequence(caller->number, little, out + RTPS_SUBMESSAGE + ROS_GUID_SIZE);
+    return RTPS_SUBMESSAGE + IDENTITY_SIZE;
 }
 
 /// Writes the submessage with the caller in its inline QoS. Returns its size.
@@ -204,14 +163,14 @@ static size_t write_marked(const data_t *data, const ros_caller_t *caller, uint8
     used += write_related(PID_RELATED, caller, data->little, out + used);
     used += write_related(PID_RELATED_CUSTOM, caller, data->little, out + used);
     if (!has_qos) {
-        write_number(PID_SENTINEL, 2, data->little, out + used);
-        write_number(0, 2, data->little, out + used + 2U);
-        used += SUBMESSAGE;
+        rtps_write(PID_SENTINEL, 2, data->little, out + used);
+        rtps_write(0, 2, data->little, out + used + 2U);
+        used += RTPS_SUBMESSAGE;
     }
     memcpy(out + used, data->bytes + data->qos, data->size - data->qos);
     used += data->size - data->qos;
     out[1] |= HAS_QOS;
-    write_number((uint32_t)(used - SUBMESSAGE), 2, data->little, out + 2);
+    rtps_write((uint32_t)(used - RTPS_SUBMESSAGE), 2, data->little, out + 2);
     return used;
 }
 

@@ -8,12 +8,13 @@
 #ifndef ROS2_SERVICES_H
 #define ROS2_SERVICES_H
 
+#include "rtps.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#define ROS_GUID_SIZE   16U
-#define ROS_PREFIX_SIZE 12U
+#define ROS_GUID_SIZE 16U
 /// Bytes that `ros_service_mark` adds to a message, at most.
 #define ROS_MARK_SIZE 60U
 /// Replies of one writer that a late reader may still ask for: those that DDS keeps.

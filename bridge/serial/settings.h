@@ -3,7 +3,7 @@
 #ifndef IW_SERIAL_SETTINGS_H
 #define IW_SERIAL_SETTINGS_H
 
-#include "settings/settings.h"
+#include "config/settings.h"
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
 #define SERIAL_SETTINGS_PATH "/etc/iwheel/serial.conf"

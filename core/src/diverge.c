@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/private/diverge.h"
+#include "iwheel/diverge.h"
 
 #include "magnitude.h"
 
@@ -38,32 +38,35 @@ static int32_t clamp(int32_t value, int32_t bound) {
     return (value < -bound) ? -bound : value;
 }
 
-static IW_APART int32_t measured_um_s(const iw_diverge_t *self, size_t side) {
-    return clamp(self->measured_mm_s[side], SPEED_MAX_MM_S) * 1000;
+void iw_diverge_hear(iw_diverge_t *self, size_t side, int32_t measured_mm_s) {
+    self->measured_mm_s[side] = clamp(measured_mm_s, SPEED_MAX_MM_S);
 }
 
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us) {
     self->at_us = now_us;
     self->path_um = 0;
-    self->expected_um_s[IW_LEFT] = measured_um_s(self, IW_LEFT);
-    self->expected_um_s[IW_RIGHT] = measured_um_s(self, IW_RIGHT);
+    self->expected_um_s[IW_LEFT] = self->measured_mm_s[IW_LEFT] * 1000;
+    self->expected_um_s[IW_RIGHT] = self->measured_mm_s[IW_RIGHT] * 1000;
 }
 
-/// value x elapsed / span, but not more than value.
-static IW_APART int32_t share_of(int32_t value, uint32_t elapsed_us, uint32_t span_us) {
-    const uint32_t share = (elapsed_us < span_us) ? (elapsed_us * SHARE_ONE + span_us / 2U) / span_us : SHARE_ONE;
-    return (int32_t)((int64_t)value * (int64_t)share / (int64_t)SHARE_ONE);
+/// elapsed / span, at most one.
+static IW_APART uint32_t share_of(uint32_t elapsed_us, uint32_t span_us) {
+    return (elapsed_us < span_us) ? (elapsed_us * SHARE_ONE + span_us / 2U) / span_us : SHARE_ONE;
 }
 
 /// By the middle of the time that has passed, so that long steps and short ones lead to the same.
-static IW_APART int32_t lagging(int32_t value, uint32_t elapsed_us, uint32_t constant_ms) {
-    return share_of(value, elapsed_us, constant_ms * IW_US_PER_MS + elapsed_us / 2U);
+static uint32_t lag_share(uint32_t elapsed_us, uint32_t constant_ms) {
+    return share_of(elapsed_us, constant_ms * IW_US_PER_MS + elapsed_us / 2U);
+}
+
+static IW_APART int32_t part_of(int32_t value, uint32_t share) {
+    return (int32_t)((int64_t)value * (int64_t)share / (int64_t)SHARE_ONE);
 }
 
 /// Turning backwards is no progress.
 static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t percent) {
     const int32_t expected = self->expected_um_s[side];
-    const int32_t measured = measured_um_s(self, side);
+    const int32_t measured = self->measured_mm_s[side] * 1000;
     const int32_t progress = ((expected < 0) == (measured < 0)) ? iw_magnitude(measured) : 0;
     return progress / percent < iw_magnitude(expected) / 100;
 }
@@ -71,7 +74,7 @@ static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t per
 /// How much faster (slower: negative) a wheel is than it should be by now, beyond what is ordinary.
 static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     const int32_t expected = self->expected_um_s[side];
-    const int32_t difference = measured_um_s(self, side) - expected;
+    const int32_t difference = self->measured_mm_s[side] * 1000 - expected;
     const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->um_s_per_rpm * 7 / 8;
     if (iw_magnitude(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
         return 2 * difference;
@@ -81,15 +84,16 @@ static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
 
 static void integrate(iw_diverge_t *self, uint32_t elapsed_us) {
     const iw_config_t *const config = self->config;
+    const uint32_t lag = lag_share(elapsed_us, config->wheel_lag_ms);
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t short_of = self->applied_mm_s[side] * 1000 - self->expected_um_s[side];
-        const int32_t next = self->expected_um_s[side] + lagging(short_of, elapsed_us, config->wheel_lag_ms);
+        const int32_t next = self->expected_um_s[side] + part_of(short_of, lag);
         self->expected_um_s[side] = clamp(next, SPEED_MAX_MM_S * 1000);
     }
     const int32_t left = beyond_um_s(self, IW_LEFT);
     const int32_t right = beyond_um_s(self, IW_RIGHT);
-    const int32_t leaked = lagging(self->path_um, elapsed_us, config->pair_leak_ms);
-    const int32_t moved = share_of(right - left, elapsed_us, IW_US_PER_MS * 1000U);
+    const int32_t leaked = part_of(self->path_um, lag_share(elapsed_us, config->pair_leak_ms));
+    const int32_t moved = part_of(right - left, share_of(elapsed_us, IW_US_PER_MS * 1000U));
     self->path_um = clamp(self->path_um - leaked + moved, PATH_MAX_UM);
     self->side = (iw_magnitude(left) > iw_magnitude(right)) ? IW_LEFT : IW_RIGHT;
 }

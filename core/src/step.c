@@ -158,7 +158,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     } else if (kind == IW_CODEC_POSE) {
         self->pose_us = self->now_us;
     } else if (kind == IW_CODEC_SPEED) {
-        self->diverge.measured_mm_s[side] = iw_watch_own_mm_s(self, side);
+        iw_diverge_hear(&self->diverge, side, iw_watch_own_mm_s(self, side));
     }
 }
 

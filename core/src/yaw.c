@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/yaw.h"
 
-#include "iwheel/private/diverge.h"
+#include "iwheel/diverge.h"
 #include "magnitude.h"
 
 /// Each wheel's part is cut off to whole um/s, so both together may be beyond by less than this.

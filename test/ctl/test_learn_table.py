@@ -182,7 +182,7 @@ class Lacks(unittest.TestCase):
             ("speed_scale", "left"): (FOR, None), ("speed_scale", "right"): (FOR, None),
             ("ticks_per_turn", "left"): (FOR, None), ("ticks_per_turn", "right"): (FOR, None),
             ("force_unit", "left"): (FOR, "cN"), ("force_unit", "right"): (FOR, "dN"),
-            ("pose_byte_order", None): (FOR, "yes"), ("mounting", None): OPEN}
+            ("pose_byte_order", None): (FOR, "yes"), ("mounting", None): OPEN, ("pair", None): (FOR, None)}
 
     def differs(self, changes, **story):
         """All is told as of the whole recording, but for the changes: keys as "item" or "item side"."""
@@ -199,19 +199,20 @@ class Lacks(unittest.TestCase):
 
     def test_learn_whole_recording_tells_everything(self):
         found = self.differs({})
-        self.assertEqual(set(self.TOLD), set(found), "nothing else")
+        self.assertEqual(set(self.TOLD) | {("wheel_lag", side) for side in SIDES}, set(found), "nothing else")
+        self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow at once")
 
     def test_learn_telemetry_of_neither_wheel_leaves_what_a_wheel_does_open(self):
-        self.differs({"setpoint_type": OPEN, "current_role": OPEN,
+        self.differs({"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN,
                       **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")}, speeds=(False, False))
 
     def test_learn_telemetry_of_one_wheel_leaves_what_both_do_open(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, "feedback_sign right": OPEN, "speed_scale right": OPEN,
-                      "ticks_per_turn right": OPEN, "force_unit right": OPEN}, speeds=(True, False))
+                      "ticks_per_turn right": OPEN, "force_unit right": OPEN, "pair": OPEN}, speeds=(True, False))
 
     def test_learn_wheel_that_does_not_turn_speaks_against_the_type(self):
         self.differs({"setpoint_type": (AGAINST, None), "current_role": OPEN, "feedback_sign left": OPEN,
-                      "speed_scale left": OPEN, "ticks_per_turn left": OPEN}, turns=(False, True))
+                      "speed_scale left": OPEN, "ticks_per_turn left": OPEN, "pair": (AGAINST, None)}, turns=(False, True))
 
     def test_learn_wheel_that_stutters_shows_nothing_of_type_and_scale(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, **self.both("speed_scale", "ticks_per_turn")}, stutters=True)
@@ -265,7 +266,7 @@ class Lacks(unittest.TestCase):
             self.assertIn(f"+ left: a {word} setpoint is measured as a {word} speed (the other direction: not seen)", out)
 
     def test_learn_signs_that_are_swapped_or_mixed_speak_against_it(self):
-        self.differs({"feedback_sign right": (AGAINST, "no")}, signs=(1, -1))
+        self.differs({"feedback_sign right": (AGAINST, "no"), "pair": (AGAINST, None)}, signs=(1, -1))
         self.differs(self.both("feedback_sign", verdict=(AGAINST, None)), flips=True)
 
     def test_learn_gear_is_told_by_ratio_and_by_ticks(self):
@@ -328,6 +329,7 @@ class AsJson(unittest.TestCase):
         self.assertEqual((0, 0), (wheel["told_forward"]["against_ms"], wheel["told_forward"]["still_ms"]))
         self.assertAlmostEqual(3000, wheel["stood_at_zero_ms"], delta=50)
         self.assertEqual([20, 20], wheel["offset_dN"])
+        self.assertEqual(([{"begin_us": 4000000, "end_us": 11980000, "deviation_mm": 0}], 0), (told["drives"], told["more_drives"]))
         self.assertEqual([256, 288, 257, 289, 290, 512, 544, 513, 545], [each["id"] for each in told["telemetry"]])
         self.assertEqual(None, json.loads(learn(Story(told=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
 

@@ -11,7 +11,7 @@ from can_bus import CanBus
 from fake_slcan import FakeSlcan
 from gpio_sim import RISING, Edges, GpioChip
 from harness import Rig, now_us
-from judge_log import PAIR_US, Event, percentile
+from judge_log import PAIR_REAL_US, PAIR_US, Event, percentile
 from scenario import Test
 from verdict import read_stalls
 
@@ -20,8 +20,6 @@ EDGE_S = 1.0
 MARKERS = "/run/iwheel"
 TICK_US = 10_000
 BEFORE_TICK_US, BEFORE_TICK_REAL_US, SPIN_US = 200, 700, 3_000  # in real time it takes a while to move two lines
-# In real time this kernel, whose clock of processes ticks every 10 ms, may let another process between left and right for a tick.
-PAIR_REAL_US = PAIR_US + TICK_US
 RAW_ESTOP_US = 1_000_000  # the judge's own limit; what counts is the time from the edge
 ESTOP_US = 5_000  # invariant 2, 99th percentile
 MOVE_US = 2_000  # if moving the contact took longer, nobody knows when the level changed

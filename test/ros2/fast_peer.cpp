@@ -3,6 +3,8 @@
 //
 //     fast_peer DOMAIN SPEED_M_S          asks to arm, drives for 1.5 s, ends
 //     fast_peer DOMAIN SERVICE CALLS      calls a service so often, each time as a new client, as rmw_fastrtps does; 0: 100 clients that call nothing
+//     fast_peer DOMAIN SERVICE late       calls it before the other side knows the writer: what announces it leaves LATE later
+//     fast_peer DOMAIN SERVICE kept       the same by a writer that keeps its samples, and has written two before anybody was there
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -24,11 +26,17 @@
 #define FAST_DDS 3
 #endif
 
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -45,6 +53,76 @@ namespace rtps = eprosima::fastdds::rtps;
 static const auto CDR = eprosima::fastcdr::CdrVersion::DDS_CDR;
 static const auto OK = RETCODE_OK;
 #endif
+
+// ---- what leaves late -------------------------------------------------------------------------------------------------
+
+struct Datagram {
+    int fd;
+    std::vector<uint8_t> bytes, to;
+};
+
+static const auto LATE = std::chrono::milliseconds(50);
+static std::mutex lock;
+static bool holding = false;
+static std::vector<Datagram> held;
+
+// Whether it has a DATA of the writer that announces writers.
+static bool announces(const std::vector<uint8_t> &bytes) {
+    static const uint8_t announcer[4] = {0, 0, 3, 0xC2};
+    for (size_t at = 20; at + 16 <= bytes.size();) {
+        const size_t rest = (bytes[at + 1] & 1) ? bytes[at + 2] | bytes[at + 3] << 8 : bytes[at + 2] << 8 | bytes[at + 3];
+        if (bytes[at] == 0x15 && std::memcmp(&bytes[at + 12], announcer, sizeof announcer) == 0) {
+            return true;
+        }
+        at = (rest == 0) ? bytes.size() : at + 4 + rest;
+    }
+    return false;
+}
+
+static bool keep_back(int fd, const std::vector<uint8_t> &bytes, const void *to, size_t to_size) {
+    const auto *begin = static_cast<const uint8_t *>(to);
+    std::lock_guard<std::mutex> guard(lock);
+    if (holding && announces(bytes)) {
+        held.push_back({fd, bytes, {begin, begin + to_size}});
+        return true;
+    }
+    return false;
+}
+
+// In the place of libc's: Fast DDS sends by one or the other.
+extern "C" ssize_t sendto(int fd, const void *data, size_t size, int flags, const struct sockaddr *to, socklen_t to_size) {
+    const auto *begin = static_cast<const uint8_t *>(data);
+    if (keep_back(fd, {begin, begin + size}, to, to_size)) {
+        return static_cast<ssize_t>(size);
+    }
+    return syscall(SYS_sendto, fd, data, size, flags, to, to_size);
+}
+
+extern "C" ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
+    std::vector<uint8_t> bytes;
+    for (size_t i = 0; i < message->msg_iovlen; i++) {
+        const auto *begin = static_cast<const uint8_t *>(message->msg_iov[i].iov_base);
+        bytes.insert(bytes.end(), begin, begin + message->msg_iov[i].iov_len);
+    }
+    if (keep_back(fd, bytes, message->msg_name, message->msg_namelen)) {
+        return static_cast<ssize_t>(bytes.size());
+    }
+    return syscall(SYS_sendmsg, fd, message, flags);
+}
+
+static void hold(bool wanted) {
+    std::lock_guard<std::mutex> guard(lock);
+    holding = wanted;
+    for (const Datagram &datagram : held) {
+        (void)syscall(SYS_sendto, datagram.fd, datagram.bytes.data(), datagram.bytes.size(), 0, datagram.to.data(), datagram.to.size());
+    }
+    if (!wanted) {
+        std::printf("%zu announcements left late\n", held.size());
+    }
+    held.clear();
+}
+
+// ---- types ------------------------------------------------------------------------------------------------------------
 
 // What all three need: numbers and texts in the order in which they stand in the message.
 struct Values {
@@ -160,8 +238,9 @@ struct Node {
         type.register_type(participant);
         return participant->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
     }
-    DataWriter *writer(Topic *topic) {
-        DataWriterQos qos = DATAWRITER_QOS_DEFAULT; // Reliable, volatile, keep last: as rmw_fastrtps by default.
+    DataWriter *writer(Topic *topic, bool kept = false) {
+        DataWriterQos qos = DATAWRITER_QOS_DEFAULT; // Reliable, keep last: as rmw_fastrtps by default.
+        qos.durability().kind = kept ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
         qos.history().depth = 10;
         return publisher->create_datawriter(topic, qos);
     }
@@ -190,50 +269,84 @@ static DomainParticipant *join(uint32_t domain) {
     return DomainParticipantFactory::get_instance()->create_participant(domain, qos);
 }
 
+struct Client {
+    DataReader *replies;
+    DataWriter *requests;
+};
+
+static void await_service(const Client &client) {
+    PublicationMatchedStatus served = {};
+    for (int wait = 0; wait < 1000 && served.current_count == 0; wait++) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        client.requests->get_publication_matched_status(served);
+    }
+    SubscriptionMatchedStatus answers = {};
+    for (int wait = 0; wait < 200 && answers.current_count == 0; wait++) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        client.replies->get_subscription_matched_status(answers);
+    }
+}
+
+static rtps::SampleIdentity request(const Client &client) {
+    Values values;
+    rtps::WriteParams parameters;
+    parameters.related_sample_identity().writer_guid(client.replies->guid());
+    client.requests->write(&values, parameters);
+    return parameters.sample_identity();
+}
+
+static void call(const Client &client, bool late) {
+    Values values;
+    SampleInfo info;
+    const auto begin = std::chrono::steady_clock::now();
+    const rtps::SampleIdentity mine = request(client);
+    std::printf("called at %lld us\n", static_cast<long long>(std::chrono::duration_cast<std::chrono::microseconds>(begin.time_since_epoch()).count()));
+    if (late) {
+        std::this_thread::sleep_for(LATE);
+        hold(false);
+    }
+    bool answered = false;
+    while (!answered && std::chrono::steady_clock::now() - begin < std::chrono::seconds(2)) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        while (!answered && client.replies->take_next_sample(&values, &info) == OK) {
+            answered = info.valid_data && info.related_sample_identity.writer_guid() == client.replies->guid() &&
+                       info.related_sample_identity.sequence_number() == mine.sequence_number();
+        }
+    }
+    const auto took = std::chrono::steady_clock::now() - begin;
+    std::printf("%s %d after %d ms: %s\n", answered ? "reply" : "no reply", answered ? static_cast<int>(values.numbers[0]) : -1,
+                static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()), answered ? values.texts[0].c_str() : "");
+    std::fflush(stdout);
+}
+
 // The clients of rmw_fastrtps: the request names the reader of its replies, and the reply that request's identity.
-static int call_service(Node &node, const std::string &name, int calls) {
+static void call_service(Node &node, const std::string &name, const std::string &how) {
+    const bool kept = how == "kept";
+    const bool late = kept || how == "late";
+    const int calls = late ? 1 : std::atoi(how.c_str());
     Topic *request_topic = node.topic(Kind::Request, ("rq/" + name + "Request").c_str(), "std_srvs::srv::dds_::Trigger_Request_");
     Topic *reply_topic = node.topic(Kind::Reply, ("rr/" + name + "Reply").c_str(), "std_srvs::srv::dds_::Trigger_Response_");
     const int clients = (calls > 0) ? calls : 100;
     for (int i = 0; i < clients; i++) {
-        DataReader *replies = node.reader(reply_topic);
-        DataWriter *requests = node.writer(request_topic);
-        PublicationMatchedStatus served = {};
-        for (int wait = 0; wait < 200 && served.current_count == 0; wait++) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-            requests->get_publication_matched_status(served);
+        if (late) {
+            hold(true);
         }
-        SubscriptionMatchedStatus answers = {};
-        for (int wait = 0; wait < 200 && answers.current_count == 0; wait++) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-            replies->get_subscription_matched_status(answers);
+        const Client client = {node.reader(reply_topic), node.writer(request_topic, kept)};
+        for (int old = 0; kept && old < 2; old++) {
+            (void)request(client);
         }
-        if (calls > 0) {
-            Values values;
-            SampleInfo info;
-            rtps::WriteParams parameters;
-            parameters.related_sample_identity().writer_guid(replies->guid());
-            const auto begin = std::chrono::steady_clock::now();
-            requests->write(&values, parameters);
-            const rtps::SampleIdentity mine = parameters.sample_identity();
-            bool answered = false;
-            while (!answered && std::chrono::steady_clock::now() - begin < std::chrono::seconds(2)) {
-                std::this_thread::sleep_for(std::chrono::milliseconds(1));
-                while (!answered && replies->take_next_sample(&values, &info) == OK) {
-                    answered = info.valid_data && info.related_sample_identity.writer_guid() == replies->guid() &&
-                               info.related_sample_identity.sequence_number() == mine.sequence_number();
-                }
-            }
-            const auto took = std::chrono::steady_clock::now() - begin;
-            std::printf("%s %d after %d ms: %s\n", answered ? "reply" : "no reply", answered ? static_cast<int>(values.numbers[0]) : -1,
-                        static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()), answered ? values.texts[0].c_str() : "");
+        if (kept) {
+            std::printf("two are kept\n");
             std::fflush(stdout);
         }
-        node.publisher->delete_datawriter(requests);
-        node.subscriber->delete_datareader(replies);
+        await_service(client);
+        if (calls > 0) {
+            call(client, late);
+        }
+        node.publisher->delete_datawriter(client.requests);
+        node.subscriber->delete_datareader(client.replies);
     }
     std::printf("%d clients\n", clients);
-    return 0;
 }
 
 int main(int argc, char **argv) {
@@ -246,7 +359,7 @@ int main(int argc, char **argv) {
     node.publisher = node.participant->create_publisher(PUBLISHER_QOS_DEFAULT);
     node.subscriber = node.participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
     if (argc == 4) {
-        (void)call_service(node, argv[2], std::atoi(argv[3]));
+        call_service(node, argv[2], argv[3]);
         std::fflush(stdout);
         std::_Exit(0);
     }

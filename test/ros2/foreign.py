@@ -76,6 +76,62 @@ def fast_services(t):
     t.judge(ride.rig)
 
 
+def called_late(ride, program, service, how="late"):
+    """What the program said, and when it called (us)."""
+    said = run_fast(ride, program, service, how)
+    called = re.search(r"called at (\d+) us", said)
+    ride.t.check(called and re.search(r"[1-9]\d* announcements left late", said), f"{service}: the request is there before its writer is known: {said}")
+    return said, int(called[1]) if called else 0
+
+
+@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm is answered", 40)
+def fast_calls_first(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    said, _ = called_late(ride, program, "iwheel/arm")
+    t.check("reply 1" in said and "armed: send cmd_vel" in said, f"arm: {said}")
+    ride.silence()
+    for service, after in (("iwheel/stop", lambda speed: abs(speed) < 290), ("iwheel/estop", lambda speed: speed == 0)):
+        stream = ride.driving()
+        said, called_us = called_late(ride, program, service)
+        t.check("reply 1" in said, f"{service}: {said}")
+        time.sleep(0.2)
+        ms = t.first_after(ride.rig, called_us, after, f"the effect of {service}", 200)
+        if ms is not None:
+            t.figure(f"{service}: {ms:.0f} ms, of which 50 it was unknown")
+        stream.stop()
+        if service == "iwheel/stop":
+            ride.silence()
+            time.sleep(0.6)
+    t.check(ride.client.request("status")["state"] == "latched", "latched")
+    t.judge(ride.rig)
+
+
+@scenario("Fast DDS keeps two stops of before the bridge was there, and calls before it is known: one stop within 200 ms", 40)
+def fast_keeps(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    ride.driving().stop()
+    ride.bridge.end()
+    ride.state.take()
+    ride.silence()
+    command = [program, str(ride.domain), "iwheel/stop", "kept"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ride.rig.folder) as child:
+        t.check("two are kept" in child.stdout.readline(), "two requests wait for nobody")
+        before = len([event for event in ride.rig.timeline if event.kind == "stop"])
+        ride.start_bridge()
+        said = child.communicate(timeout=30)[0]
+    t.check(re.search(r"[1-9]\d* announcements left late", said) and "reply 1" in said, said)
+    called = re.search(r"called at (\d+) us", said)
+    time.sleep(0.5)
+    stops = [event.t_us for event in ride.rig.timeline if event.kind == "stop"][before:]
+    if t.check(len(stops) == 1 and called, f"one stop is of now, not those before: {stops}, {said}"):
+        ms = (stops[0] - int(called[1])) / 1000
+        t.check(0 < ms < 200, f"{ms} ms after the call")
+        t.figure(f"{ms:.0f} ms after the call, of which 50 it was unknown")
+    t.judge(ride.rig)
+
+
 @scenario("100 service clients of each vendor come and go while driving: no stop", 60)
 def clients_come_and_go(t):
     program = fast_peer(t)

@@ -18,7 +18,7 @@ sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__f
 from bus import Bus, now_us
 from client import Client, Closed
 from judge import Judge
-from judge_log import Config, Event, percentile
+from judge_log import PAIR_REAL_US, Config, Event, percentile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PR_SET_PDEATHSIG = 1
@@ -408,7 +408,7 @@ class Rig:
         finished_us = now_us() - 20_000
         self.bus.close()
         frames = [frame for frame in self.bus.frames if frame.t_us <= finished_us]
-        judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **options)
+        judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **{"pair_limit_us": PAIR_REAL_US, **options})
         judge.judge()
         return judge
 

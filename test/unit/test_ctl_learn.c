@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT
 // What `learn` counts in a recording, frame by frame: of the right wheel, at the right time, in the right direction.
-#include "learn/learn.h"
+#include "learn/learn_drives.h"
 
 #include "message.h"
 
 #include "unity.h"
 
+#include <stdlib.h>
+
 #define MS 1000
 
 static learn_t learn;
+static learn_drives_t drives;
+static iw_config_t config;
 static int64_t now_us;
 
 static void hear(const message_t *message) {
@@ -16,6 +20,7 @@ static void hear(const message_t *message) {
     TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(message, &frame));
     const candump_t recorded = candump_from_core(&frame, now_us, "can0");
     learn_frame(&learn, &recorded);
+    learn_drives_frame(&drives, &recorded);
 }
 
 static void setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA, candump_mark_t mark) {
@@ -27,6 +32,7 @@ static void setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA, can
     candump_t recorded = candump_from_core(&frame, now_us, "can0");
     recorded.mark = mark;
     learn_frame(&learn, &recorded);
+    learn_drives_frame(&drives, &recorded);
 }
 
 static void speed(iw_side_t side, int16_t rpm) {
@@ -48,6 +54,8 @@ static void pose(int16_t x_mm) {
 void setUp(void) {
     now_us = 1700000000000000;
     learn_init(&learn);
+    iw_config_default(&config);
+    learn_drives_init(&drives, &config);
 }
 
 void tearDown(void) {}
@@ -232,8 +240,209 @@ static void test_learn_pose_may_wrap(void) {
     TEST_ASSERT_GREATER_THAN_UINT64(100, learn.pose.way_little);
 }
 
+// How far a drive left its path -------------------------------------------------------------------------------------------
+
+/// Both wheels are told that and show that, every 4 ms.
+static void drive_both(unsigned ms, const int16_t told_mm_s[IW_SIDES], const int16_t rpm[IW_SIDES]) {
+    for (unsigned passed = 0; passed < ms; passed += 4U) {
+        setpoint(IW_LEFT, told_mm_s[IW_LEFT], 500, CANDUMP_RECEIVED);
+        setpoint(IW_RIGHT, told_mm_s[IW_RIGHT], 500, CANDUMP_RECEIVED);
+        now_us += 4 * MS;
+        speed(IW_LEFT, rpm[IW_LEFT]);
+        speed(IW_RIGHT, rpm[IW_RIGHT]);
+    }
+}
+
+static const int16_t still[IW_SIDES] = {0, 0};
+static const int16_t straight[IW_SIDES] = {1005, 1005}; // 50 rpm.
+static const int16_t level[IW_SIDES] = {50, 50};
+
+static void test_learn_drive_that_keeps_its_path_has_no_deviation(void) {
+    drive_both(100, still, still);
+    const int64_t begin_us = now_us;
+    drive_both(2000, straight, level);
+    drive_both(1500, still, still);
+    TEST_ASSERT_EQUAL_UINT32(1, drives.count);
+    TEST_ASSERT_EQUAL_INT64(begin_us, drives.drive[0].begin_us);
+    TEST_ASSERT_EQUAL_INT64(begin_us + 1996 * MS, drives.drive[0].end_us);
+    TEST_ASSERT_INT64_WITHIN(8 * MS, 3000 * MS, drives.drive[0].judged_us);
+    TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[0].deviation_mm);
+}
+
+/// A fifth of the speed less, 4 % of it ordinary and 7/8 of an rpm: 142 mm/s too slow, for 0.3 s; of it some leaks.
+static void test_learn_deviation_is_the_one_by_which_the_gateway_judges(void) {
+    drive_both(1000, straight, level);
+    drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
+    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm);
+    drive_both(3000, straight, level);
+    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm); // The largest stays.
+    TEST_ASSERT_EQUAL_UINT32(drives.drive[0].deviation_mm, drives.largest_mm);
+}
+
+static void test_learn_each_drive_has_its_own_deviation(void) {
+    drive_both(1000, straight, level);
+    drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
+    drive_both(300, straight, level);
+    drive_both(1100, still, still);
+    drive_both(1000, straight, level);
+    TEST_ASSERT_EQUAL_UINT32(2, drives.count);
+    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm);
+    TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[1].deviation_mm);
+}
+
+static void test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does(void) {
+    drive_both(500, straight, level);
+    drive_both(500, still, still);
+    drive_both(500, straight, level);
+    TEST_ASSERT_EQUAL_UINT32(1, drives.count);
+    now_us += 1100 * MS; // The wheels have stopped by themselves.
+    drive_both(500, straight, level);
+    TEST_ASSERT_EQUAL_UINT32(2, drives.count);
+}
+
+static void test_learn_nothing_is_compared_while_a_wheel_is_not_heard(void) {
+    drive_both(1000, straight, level);
+    for (unsigned i = 0; i < 100U; i++) { // The left wheel stands, unheard.
+        setpoint(IW_LEFT, 1005, 500, CANDUMP_RECEIVED);
+        setpoint(IW_RIGHT, 1005, 500, CANDUMP_RECEIVED);
+        now_us += 4 * MS;
+        speed(IW_RIGHT, 50);
+    }
+    drive_both(4, straight, (const int16_t[IW_SIDES]){0, 50});
+    TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[0].deviation_mm);
+    TEST_ASSERT_INT64_WITHIN(60 * MS, 1000 * MS, drives.drive[0].judged_us);
+}
+
+/// Both wheels 10 % slow: straight ahead that cancels out, unless one counts the other way.
+static void test_learn_mirrored_wheel_is_compared_as_it_is_mounted(void) {
+    const int16_t told[IW_SIDES] = {1005, -1005};
+    const int16_t slow[IW_SIDES] = {45, -45};
+    config.invert[IW_RIGHT] = true;
+    learn_drives_init(&drives, &config);
+    drive_both(2000, told, slow);
+    TEST_ASSERT_LESS_THAN_UINT32(2, drives.largest_mm);
+    config.invert[IW_RIGHT] = false;
+    learn_drives_init(&drives, &config);
+    drive_both(2000, told, slow);
+    TEST_ASSERT_GREATER_THAN_UINT32(40, drives.largest_mm);
+}
+
+static void test_learn_of_more_drives_than_can_be_told_the_largest_counts(void) {
+    for (unsigned i = 0; i < LEARN_DRIVES_MAX + 2U; i++) {
+        drive_both(40, straight, level);
+        now_us += 1100 * MS;
+    }
+    drive_both(1000, straight, level);
+    drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
+    TEST_ASSERT_EQUAL_UINT32(LEARN_DRIVES_MAX + 3U, drives.count);
+    TEST_ASSERT_EQUAL_UINT32(LEARN_DRIVES_MAX, learn_drives_told(&drives));
+    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.largest_mm);
+    TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[LEARN_DRIVES_MAX - 1U].deviation_mm);
+}
+
+// How far a wheel stays behind in time --------------------------------------------------------------------------------------
+
+/// A wheel that follows with that lag, loses that many per mille of its speed, and shows whole rpm.
+typedef struct {
+    double lag_ms;
+    double droop;
+    double speed_mm_s;
+    int32_t ramp_mm_s; ///< Its setpoint.
+} model_t;
+
+/// So long towards that setpoint, by 1000 mm/s2 and every 20 ms.
+static void follow(model_t *wheel, unsigned ms, int16_t target_mm_s) {
+    for (unsigned passed = 0; passed < ms; passed += 4U) {
+        if (passed % 20U == 0U) {
+            const int32_t way = target_mm_s - wheel->ramp_mm_s;
+            wheel->ramp_mm_s += (way > 20) ? 20 : (way < -20) ? -20 : way;
+            setpoint(IW_LEFT, (int16_t)wheel->ramp_mm_s, 500, CANDUMP_RECEIVED);
+        }
+        now_us += 4 * MS;
+        wheel->speed_mm_s +=
+            ((double)wheel->ramp_mm_s * (1.0 - wheel->droop) - wheel->speed_mm_s) * 4.0 / wheel->lag_ms;
+        speed(IW_LEFT, (int16_t)(wheel->speed_mm_s / 20.106 + (double)(passed % 40U) / 40.0));
+    }
+}
+
+static void assert_lag(double lag_ms, double droop) {
+    model_t wheel = {.lag_ms = lag_ms, .droop = droop};
+    learn_drives_init(&drives, &config);
+    follow(&wheel, 1500, 0);
+    follow(&wheel, 2500, 600);
+    follow(&wheel, 2500, 100);
+    follow(&wheel, 2500, -500);
+    TEST_ASSERT_EQUAL_UINT32(3, drives.lag[IW_LEFT].count);
+    TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].least_ms);
+    TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].most_ms);
+}
+
+static void test_learn_lag_is_that_of_the_wheel_whatever_its_droop(void) {
+    assert_lag(30.0, 0.0);
+    assert_lag(60.0, 0.04);
+    assert_lag(120.0, 0.1);
+}
+
+static const learn_finding_t *lag_found(unsigned side, const char *item) {
+    static learn_findings_t findings;
+    findings.count = 0;
+    learn_drives_weigh(&drives, &findings);
+    return learn_find(&findings, item, side);
+}
+
+static void test_learn_lag_speaks_against_what_the_gateway_assumes(void) {
+    assert_lag(60.0, 0.0);
+    TEST_ASSERT_EQUAL_CHAR('+', lag_found(IW_LEFT, "wheel_lag")->mark);
+    assert_lag(120.0, 0.0);
+    TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_LEFT, "wheel_lag")->mark);
+    TEST_ASSERT_EQUAL_CHAR('?', lag_found(IW_RIGHT, "wheel_lag")->mark);
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // Not of one wheel alone.
+    drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
+}
+
+static void test_learn_lag_of_changes_that_differ_is_no_value(void) {
+    assert_lag(60.0, 0.0);
+    drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
+    drives.lag[IW_RIGHT].most_ms = 100.0;
+    TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_RIGHT, "wheel_lag")->mark);
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms"));
+}
+
+/// Small changes, a wheel that does not follow, a gap in its speed frames, no second of rest before: none of them counts.
+static void test_learn_lag_needs_a_change_from_steady_to_steady(void) {
+    model_t wheel = {.lag_ms = 60.0};
+    follow(&wheel, 900, 0);
+    follow(&wheel, 2500, 600); // Of 0.9 s it had the speed for 0.4.
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    follow(&wheel, 2500, 400);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    follow(&wheel, 300, 0);
+    now_us += 150 * MS;
+    follow(&wheel, 2500, 0);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    wheel.droop = 0.6;
+    follow(&wheel, 2500, 600);
+    TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
+    wheel.droop = 0.0;
+    follow(&wheel, 2500, 0);
+    follow(&wheel, 2500, 600);
+    TEST_ASSERT_EQUAL_UINT32(1, drives.lag[IW_LEFT].count);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_learn_lag_is_that_of_the_wheel_whatever_its_droop);
+    RUN_TEST(test_learn_lag_speaks_against_what_the_gateway_assumes);
+    RUN_TEST(test_learn_lag_of_changes_that_differ_is_no_value);
+    RUN_TEST(test_learn_lag_needs_a_change_from_steady_to_steady);
+    RUN_TEST(test_learn_drive_that_keeps_its_path_has_no_deviation);
+    RUN_TEST(test_learn_deviation_is_the_one_by_which_the_gateway_judges);
+    RUN_TEST(test_learn_each_drive_has_its_own_deviation);
+    RUN_TEST(test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does);
+    RUN_TEST(test_learn_nothing_is_compared_while_a_wheel_is_not_heard);
+    RUN_TEST(test_learn_mirrored_wheel_is_compared_as_it_is_mounted);
+    RUN_TEST(test_learn_of_more_drives_than_can_be_told_the_largest_counts);
     RUN_TEST(test_learn_counts_each_wheel_for_itself);
     RUN_TEST(test_learn_keeps_currents_apart_by_the_direction_they_come_with);
     RUN_TEST(test_learn_counts_as_sent_only_what_is_marked_so);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What every verb understands: durations, and words that are nearly right.
-#include "settings/similar.h"
+#include "config/similar.h"
 #include "text/duration.h"
 
 #include "unity.h"

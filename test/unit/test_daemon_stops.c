@@ -217,7 +217,7 @@ static void test_stop_place_for_anything_else_is_refused(void) {
     static const char *const others[] = {"{\"cmd\":\"status\"}\n",
                                          "{\"cmd\":\"hello\"}\n",
                                          "{\"cmd\":\"arm\"}\n",
-                                         "{\"cmd\":\"reset\"}\n{\"cmd\":\"stop\"}\n",
+                                         "{\"cmd\":\"reset\"}\n{\"cmd\":\"status\"}\n",
                                          "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n",
                                          "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n",
                                          "stop\n",
@@ -236,18 +236,55 @@ static void test_stop_place_for_anything_else_is_refused(void) {
             (void)close(fd);
         }
     }
-    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]); // Not even the stop behind another line.
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
-static void test_stop_place_has_one_line(void) {
+static void test_stop_behind_another_line_is_carried_out(void) {
+    take_all_places();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        begin_driving();
+        const int fd = knock(door);
+        say(fd,
+            "{\"cmd\":\"reset\"}\n\n{\"cmd\":\"hello\"}\n{\"cmd\":\"status\"}\nstop\n{\"id\":7,\"cmd\":\"estop\"}\n");
+        assert_slower("a place");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"error\":\"too_many_clients\""), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"id\":7,\"ok\":true"), text);
+        TEST_ASSERT_TRUE(has_ended(fd));
+        (void)close(fd);
+        come_to_rest();
+    }
+}
+
+/// It asks for more than it reads, and its stop comes with the request whose answer finds no room any more.
+static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
+    take_all_places();
+    begin_driving();
+    const gw_client_t *greedy = &daemon_rig.daemon->clients.client[1];
+    for (unsigned i = 0; i < 5000U && greedy->out_end - greedy->out_start < sizeof greedy->out / 2U; i++) {
+        say(crowd[0], "{\"cmd\":\"status\"}\n");
+        daemon_rig_drive(client, 300, 300, 1);
+    }
+    TEST_ASSERT_GREATER_THAN_size_t(sizeof greedy->out / 2U, greedy->out_end - greedy->out_start);
+    for (unsigned i = 0; i < 100U; i++) {
+        (void)snprintf(&text[i * 17U], sizeof text - i * 17U, "{\"cmd\":\"status\"}\n");
+    }
+    (void)strcat(text, "{\"cmd\":\"stop\"}\n");
+    say(crowd[0], text);
+    assert_slower("given up");
+    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
+}
+
+static void test_stop_place_answers_one_line_and_all_stops(void) {
     take_all_places();
     const int fd = knock(GW_DRIVE);
     say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"status\"}\n");
     daemon_rig_run(20);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"id\":1,\"ok\":true"), text);
-    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"id\":2"), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"id\":2,\"ok\":true"), text);
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"id\":3"), text);
     TEST_ASSERT_TRUE(has_ended(fd));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     (void)close(fd);
 }
 
@@ -336,7 +373,9 @@ int main(void) {
     RUN_TEST(test_stop_never_refused_without_descriptors);
     RUN_TEST(test_stop_never_refused_beside_1000_connections_a_second);
     RUN_TEST(test_stop_place_for_anything_else_is_refused);
-    RUN_TEST(test_stop_place_has_one_line);
+    RUN_TEST(test_stop_behind_another_line_is_carried_out);
+    RUN_TEST(test_stop_place_answers_one_line_and_all_stops);
+    RUN_TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out);
     RUN_TEST(test_stop_place_of_the_silent_is_free_after_200_ms);
     RUN_TEST(test_stop_places_of_one_user_are_half_of_them);
     RUN_TEST(test_stop_in_a_place_names_who_asked_for_it);

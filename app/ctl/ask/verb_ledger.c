@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What is assumed about the wheels, what is known, and the operator's word on it.
-#include "settings/similar.h"
+#include "config/similar.h"
 #include "talk/ctl.h"
 #include "talk/words.h"
 #include "text/text.h"

@@ -35,6 +35,11 @@ const learn_finding_t *learn_find(const learn_findings_t *self, const char *item
 bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding, const char **out_section,
                     const char **out_key) {
     static const char *const keys[] = {"setpoint_type", "current_role", "setpoint_dlc", "force_unit"};
+    if (strcmp(finding->item, "wheel_lag_ms") == 0) {
+        *out_section = "limits";
+        *out_key = finding->item;
+        return true;
+    }
     const learn_finding_t *type = learn_find(self, "setpoint_type", LEARN_BOTH);
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         if (finding->value[0] != '\0' && strcmp(finding->item, keys[i]) == 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "learn_findings.h"
+#include "learn_drives.h"
 #include "recordings/recording.h"
 #include "talk/ctl.h"
 #include "text/text.h"
@@ -107,6 +107,25 @@ static void print_telemetry(const learn_t *self) {
     }
 }
 
+static void print_drives(const learn_drives_t *self, int64_t first_us) {
+    if (self->count > 0U) {
+        (void)puts("\nDrives    begins at    lasts  leaves its path by up to");
+    }
+    for (uint32_t i = 0; i < learn_drives_told(self); i++) {
+        const learn_drive_t *each = &self->drive[i];
+        (void)printf("  %4" PRIu32 "  %9.1f s  %5.1f s  ", i + 1U, (double)(each->begin_us - first_us) / 1e6,
+                     (double)(each->end_us - each->begin_us) / 1e6);
+        if (each->judged_us > 0) {
+            (void)printf("%" PRIu32 " mm\n", each->deviation_mm);
+        } else {
+            (void)puts("--");
+        }
+    }
+    if (self->count > LEARN_DRIVES_MAX) {
+        (void)printf("  and %" PRIu32 " more\n", self->count - LEARN_DRIVES_MAX);
+    }
+}
+
 static void suggest(const learn_findings_t *findings) {
     const char *last = "";
     for (unsigned i = 0; i < findings->count; i++) {
@@ -126,13 +145,24 @@ static void suggest(const learn_findings_t *findings) {
     }
 }
 
+/// What was read, and what it tells.
+typedef struct {
+    learn_t learn;
+    learn_drives_t drives;
+    learn_findings_t findings;
+    iw_config_t config;
+} study_t;
+
 /// Prints all of it.
-static void report(const learn_t *self, const learn_findings_t *findings, const char *name) {
+static void report(const study_t *study, const char *name) {
+    const learn_t *self = &study->learn;
+    const learn_findings_t *findings = &study->findings;
     const int64_t ms = (self->last_us - self->first_us) / 1000;
     text_line(stdout, "%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s", name, self->frames, ms / 1000,
               ((ms < 0) ? -ms : ms) % 1000 / 100);
     print_setpoints(self);
     print_telemetry(self);
+    print_drives(&study->drives, self->first_us);
     (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");
     for (unsigned i = 0; i < findings->count; i++) {
         (void)printf("  %c %s\n", findings->at[i].mark, findings->at[i].text);
@@ -141,7 +171,6 @@ static void report(const learn_t *self, const learn_findings_t *findings, const 
 }
 
 // The same as the report, for programs: what was counted (evidence), what it tells, what it suggests.
-#include "learn_findings.h"
 #include "text/text.h"
 
 #include <inttypes.h>
@@ -244,17 +273,30 @@ static json_t *ids(const learn_id_t *from, unsigned count) {
     return list;
 }
 
+static json_t *drives_of(const learn_drives_t *self) {
+    json_t *list = json_array();
+    for (uint32_t i = 0; i < learn_drives_told(self); i++) {
+        const learn_drive_t *each = &self->drive[i];
+        (void)json_array_append_new(list, json_pack("{s:I,s:I,s:o}", "begin_us", (json_int_t)each->begin_us, "end_us",
+                                                    (json_int_t)each->end_us, "deviation_mm",
+                                                    (each->judged_us > 0) ? number(each->deviation_mm) : json_null()));
+    }
+    return list;
+}
+
 /// The same for programs, as one JSON object in one line: what was counted (evidence), what it tells, what it suggests. False if
 /// there is no memory for it.
-static bool report_json(const learn_t *self, const learn_findings_t *findings, const char *name) {
+static bool report_json(const study_t *study, const char *name) {
+    const learn_t *self = &study->learn;
     json_t *suggested = json_object();
-    json_t *root = json_pack("{s:s,s:o,s:I,s:{s:o,s:o},s:{s:o,s:o},s:o,s:o,s:o,s:o,s:o}", "file", name, "frames",
-                             number(self->frames), "duration_us", (json_int_t)(self->last_us - self->first_us),
-                             "setpoints", "left", setpoints(self, IW_LEFT), "right", setpoints(self, IW_RIGHT),
-                             "wheels", "left", wheel(&self->wheel[IW_LEFT]), "right", wheel(&self->wheel[IW_RIGHT]),
-                             "telemetry", ids(&self->known[IW_SIDES], LEARN_IDS - IW_SIDES), "other_ids",
-                             ids(self->other, self->others), "more_others", number(self->more_others), "findings",
-                             findings_of(findings, suggested), "suggested", suggested);
+    json_t *root = json_pack(
+        "{s:s,s:o,s:I,s:{s:o,s:o},s:{s:o,s:o},s:o,s:o,s:o,s:o,s:I,s:o,s:o}", "file", name, "frames",
+        number(self->frames), "duration_us", (json_int_t)(self->last_us - self->first_us), "setpoints", "left",
+        setpoints(self, IW_LEFT), "right", setpoints(self, IW_RIGHT), "wheels", "left", wheel(&self->wheel[IW_LEFT]),
+        "right", wheel(&self->wheel[IW_RIGHT]), "telemetry", ids(&self->known[IW_SIDES], LEARN_IDS - IW_SIDES),
+        "other_ids", ids(self->other, self->others), "more_others", number(self->more_others), "drives",
+        drives_of(&study->drives), "more_drives", (json_int_t)(study->drives.count - learn_drives_told(&study->drives)),
+        "findings", findings_of(&study->findings, suggested), "suggested", suggested);
     if (root == NULL) {
         return false;
     }
@@ -264,38 +306,49 @@ static bool report_json(const learn_t *self, const learn_findings_t *findings, c
     return true;
 }
 
-int verb_learn(ctl_t *self, int count, char **words) {
-    static learn_t learn;
-    static learn_findings_t findings;
-    static recording_t recording;
+static int read_all(study_t *study, recording_t *recording) {
     candump_t frame;
+    learn_init(&study->learn);
+    learn_drives_init(&study->drives, &study->config);
+    while (recording_next(recording, &frame)) {
+        learn_frame(&study->learn, &frame);
+        learn_drives_frame(&study->drives, &frame);
+    }
+    if (recording->refused) {
+        return recording_close(recording);
+    }
+    learn_weigh(&study->learn, &study->findings);
+    learn_drives_weigh(&study->drives, &study->findings);
+    return CTL_OK;
+}
+
+int verb_learn(ctl_t *self, int count, char **words) {
+    static study_t study;
+    static recording_t recording;
+    const learn_t *learn = &study.learn;
     const char *path = NULL;
-    const option_t options[] = {{OPTION("--interface", option_text, &recording.only)}, {.name = NULL}};
+    const option_t options[] = {{OPTION("--interface", option_text, &recording.only)},
+                                {OPTION("--config", config_option_load, &study.config)},
+                                {.name = NULL}};
     const words_syntax_t syntax = {"learn", options, words_is_file, &path};
+    iw_config_default(&study.config);
     int code = words_read(&syntax, count, words);
     if (code == CTL_OK && path == NULL) {
         code = ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
     }
     recording.even = true;
     code = (code == CTL_OK) ? recording_open(&recording, NULL, path) : code;
-    if (code != CTL_OK) {
+    code = (code == CTL_OK) ? read_all(&study, &recording) : code;
+    if (code != CTL_OK || recording.refused) {
         return code;
     }
-    learn_init(&learn);
-    while (recording_next(&recording, &frame)) {
-        learn_frame(&learn, &frame);
-    }
-    if (recording.refused) {
-        return recording_close(&recording);
-    }
-    learn_weigh(&learn, &findings);
-    const bool told = learn.setpoint[IW_LEFT].count + learn.setpoint[IW_RIGHT].count > 0U;
-    if (self->json && !report_json(&learn, &findings, recording.name)) {
+    const bool told = learn->setpoint[IW_LEFT].count + learn->setpoint[IW_RIGHT].count > 0U;
+    if (self->json && !report_json(&study, recording.name)) {
         (void)recording_close(&recording);
         return ctl_fail(CTL_INTERNAL, "out of memory");
     }
-    if (!self->json && learn.frames > 0U) {
-        report(&learn, &findings, recording.name);
+    if (!self->json && learn->frames > 0U) {
+        report(&study, recording.name);
     }
     code = recording_close(&recording);
     return (code != CTL_OK || told) ? code : CTL_NO;

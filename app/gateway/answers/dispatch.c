@@ -379,7 +379,11 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
     iwn_refusal_t refusal;
     const gw_call_t call = {self, client, &request};
     const bool is_right = iwn_request_read(line, length, &self->work, &request, &refusal);
-    if (client->right == GW_STOP && !(is_right && iwn_cmd_stops(request.cmd))) {
+    const bool stops = is_right && iwn_cmd_stops(request.cmd);
+    if (client->closing && !stops) {
+        return;
+    }
+    if (client->right == GW_STOP && !stops) {
         gw_service_refuse_crowd(self->clients, client, &refusal);
         send_refusal(&call, &refusal);
         return;

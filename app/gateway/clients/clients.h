@@ -17,7 +17,8 @@ struct gw_log;
 _Static_assert(GW_DRIVERS_MAX == 64U && GW_WATCHERS_MAX == 64U, "a word has a bit for each slot of one right");
 
 /// Behind them the places of those who come when all others of their socket are taken: a stop is never refused, and nobody is
-/// evicted for it. Each has one line, `stop`, `disarm` or `estop`, and GW_STOP_US for it. One user but root holds at most half of a
+/// evicted for it. Each is closed after its first line, and has GW_STOP_US for it; of what had come with it, each `stop`, `disarm` and
+/// `estop` is carried out. One user but root holds at most half of a
 /// socket's places; where they are all taken, one that has been silent for GW_STOP_LEAST_US makes room for the next, so that a
 /// thousand silent connections a second leave room for one that says stop a moment after it has come.
 #define GW_STOP_PLACES   8U ///< Of each socket.
@@ -31,6 +32,7 @@ _Static_assert(GW_DRIVERS_MAX == 64U && GW_WATCHERS_MAX == 64U, "a word has a bi
 /// What is done for a client beside reading and sending. Each is called with `context`.
 typedef struct gw_servant {
     void (*welcome)(void *context, gw_client_t *client);
+    /// Of a connection that is being closed only what stops.
     void (*carry_out)(void *context, gw_client_t *client, const char *line, size_t length);
     void (*leave)(void *context, gw_client_t *client); ///< It can hold no lease any more.
     void *context;

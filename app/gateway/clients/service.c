@@ -16,11 +16,22 @@ const gw_part_t gw_parts[GW_PARTS] = {
     [GW_STOP] = {GW_DRIVERS_MAX + GW_WATCHERS_MAX, GW_RIGHTS *GW_STOP_SLOTS},
 };
 
+/// What it had said already and nobody has looked at: of that the stops are carried out still.
+static void hear_out(gw_clients_t *self, gw_client_t *client) {
+    const char *line;
+    size_t length;
+    while ((line = gw_client_line(client, &length)) != NULL) {
+        self->servant.carry_out(self->servant.context, client, line, length);
+        gw_client_drop_line(client, length);
+    }
+}
+
 void gw_service_finish(gw_clients_t *self, gw_client_t *client) {
     const iw_time_us_t until_us = client->close_us;
-    self->servant.leave(self->servant.context, client);
     gw_client_finish(client, self->now_us);
     client->close_us = (client->right == GW_STOP) ? until_us : client->close_us;
+    hear_out(self, client);
+    self->servant.leave(self->servant.context, client);
 }
 
 void gw_service_release(gw_clients_t *self, gw_client_t *client) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "gateway_config.h"
 
-#include "settings/settings.h"
+#include "config/settings.h"
 
 #include <string.h>
 

@@ -17,9 +17,9 @@
 
 #include "iwheel/codec.h"
 #include "iwheel/config.h"
+#include "iwheel/diverge.h"
 #include "iwheel/force_offset.h"
 #include "iwheel/hal.h"
-#include "iwheel/private/diverge.h"
 #include "iwheel/private/follow.h"
 #include "iwheel/private/ledger.h"
 #include "iwheel/private/permit.h"

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+#include "learn_lag.h"
+#include "text/text.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+/// After this long at one setpoint a wheel has reached it; its speed is taken from then on, for as long again.
+#define SETTLE_US 500000
+/// Smaller changes are few steps of telemetry.
+#define CHANGE_MIN_MM_S 300.0
+/// Longer without a speed frame is a gap.
+#define GAP_US 100000
+/// Of one wheel, for a value; and how far they may lie apart.
+#define COUNT_MIN 2U
+#define SPREAD_MS 30.0
+/// What the configuration takes.
+#define LAG_MIN_MS 10
+#define LAG_MAX_MS 300
+/// Margins of the rule of the pair were computed for this much around its value (docs/pair.md).
+#define RANGE_PERCENT 30
+
+void learn_lag_init(learn_lag_t *self) {
+    memset(self, 0, sizeof *self);
+    self->told_us = self->measured_us = -1;
+}
+
+/// Nothing is known of the wheel's state.
+static void forget(learn_lag_t *self) {
+    self->changing = false;
+    self->settled_us = 0;
+    self->settled_mm = 0;
+}
+
+static void take(learn_lag_t *self, double lag_ms) {
+    self->least_ms = (self->count == 0U || lag_ms < self->least_ms) ? lag_ms : self->least_ms;
+    self->most_ms = (self->count == 0U || lag_ms > self->most_ms) ? lag_ms : self->most_ms;
+    self->sum_ms += lag_ms;
+    self->count++;
+}
+
+/// The wheel has a steady speed again.
+static void end_change(learn_lag_t *self) {
+    const double told = self->told_mm_s - self->before_told;
+    const double measured = self->settled_mm / ((double)self->settled_us / 1e6) - self->before;
+    self->changing = false;
+    if (fabs(told) >= CHANGE_MIN_MM_S && measured / told > 0.5 && measured / told < 2.0) {
+        take(self, (self->way_told_mm / told - self->way_mm / measured) * 1000.0);
+    }
+}
+
+/// Up to now, with what was told and measured until then.
+static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measured_mm_s) {
+    const double span_s = (double)(to_us - from_us) / 1e6;
+    const double way_mm = (self->measured_mm_s + measured_mm_s) / 2.0 * span_s;
+    if (self->changing) {
+        self->way_told_mm += (self->told_mm_s - self->before_told) * span_s;
+        self->way_mm += way_mm - self->before * span_s;
+    }
+    if (from_us - self->constant_us >= SETTLE_US) {
+        self->settled_mm += way_mm;
+        self->settled_us += to_us - from_us;
+    }
+    if (self->changing && self->settled_us >= SETTLE_US) {
+        end_change(self);
+    }
+}
+
+void learn_lag_hear(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
+    const int64_t gap_us = at_us - self->measured_us;
+    const bool told = self->told_us >= 0 && at_us - self->told_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
+    if (self->measured_us < 0 || gap_us < 0 || gap_us > GAP_US || !told) {
+        forget(self);
+    } else {
+        pass(self, self->measured_us, at_us, speed_mm_s);
+    }
+    self->measured_mm_s = speed_mm_s;
+    self->measured_us = at_us;
+}
+
+void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
+    const bool first = self->told_us < 0 || at_us < self->told_us;
+    self->told_us = at_us;
+    if (!first && speed_mm_s == self->told_mm_s) {
+        return;
+    }
+    if (self->measured_us >= 0 && at_us > self->measured_us && at_us - self->measured_us <= GAP_US) {
+        pass(self, self->measured_us, at_us, self->measured_mm_s); // What comes after it belongs to the new one.
+        self->measured_us = at_us;
+    }
+    if (!self->changing && self->settled_us >= SETTLE_US) {
+        self->changing = true;
+        self->before_told = self->told_mm_s;
+        self->before = self->settled_mm / ((double)self->settled_us / 1e6);
+        self->way_told_mm = self->way_mm = 0;
+    }
+    self->settled_us = 0;
+    self->settled_mm = 0;
+    self->told_mm_s = speed_mm_s;
+    self->constant_us = at_us;
+}
+
+/// Rounded.
+static int32_t mean_ms(const learn_lag_t *self) {
+    return (int32_t)lround(self->sum_ms / self->count);
+}
+
+static bool is_sure(const learn_lag_t *self) {
+    return self->count >= COUNT_MIN && self->most_ms - self->least_ms <= SPREAD_MS && mean_ms(self) >= LAG_MIN_MS &&
+           mean_ms(self) <= LAG_MAX_MS;
+}
+
+static void weigh_one(const learn_lag_t *self, unsigned side, uint32_t lag_ms, learn_findings_t *out) {
+    if (self->count < COUNT_MIN) {
+        (void)learn_say(out, '?', "wheel_lag", side,
+                        "%s wheel's lag: two changes by 300 mm/s or more, from a steady second to another, are not in "
+                        "it",
+                        text_side(side));
+        return;
+    }
+    const double off_ms = fabs(self->sum_ms / self->count - (double)lag_ms);
+    const bool fits = is_sure(self) && off_ms * 100.0 <= (double)lag_ms * RANGE_PERCENT;
+    (void)learn_say(out, fits ? '+' : '-', "wheel_lag", side,
+                    "%s wheel is %" PRId32 " ms behind its setpoints (%" PRIu32
+                    " changes of speed: %.0f to %.0f); the gateway assumes %" PRIu32 " (wheel_lag_ms)",
+                    text_side(side), mean_ms(self), self->count, self->least_ms, self->most_ms, lag_ms);
+}
+
+void learn_lag_weigh(const learn_lag_t wheel[IW_SIDES], uint32_t lag_ms, learn_findings_t *out_findings) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        weigh_one(&wheel[side], side, lag_ms, out_findings);
+    }
+    if (is_sure(&wheel[IW_LEFT]) && is_sure(&wheel[IW_RIGHT])) {
+        const int32_t both_ms = (mean_ms(&wheel[IW_LEFT]) + mean_ms(&wheel[IW_RIGHT])) / 2;
+        learn_finding_t *told = learn_say(out_findings, '+', "wheel_lag_ms", LEARN_BOTH,
+                                          "both wheels are %" PRId32 " ms behind their setpoints", both_ms);
+        (void)snprintf(told->value, sizeof told->value, "%" PRId32, both_ms);
+    }
+}
