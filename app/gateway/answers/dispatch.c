@@ -258,35 +258,29 @@ static void do_estop(const gw_call_t *call) {
     reply_state(call);
 }
 
-static void do_reset(const gw_call_t *call) {
-    gw_wheels_t *wheels = call->answers->wheels;
-    if (refuse_waited(call)) {
-        return;
-    }
-    const iw_refusal_t refusal = iw_gateway_reset(&wheels->core, wheels->now_us);
-    note(call, &(blackbox_entry_t){.kind = BLACKBOX_RESET, .b = (uint8_t)refusal});
+/// What the core has made of a request of that kind, and the state after it.
+static void reply_judged(const gw_call_t *call, blackbox_kind_t kind, iw_refusal_t refusal) {
+    note(call, &(blackbox_entry_t){.kind = (uint8_t)kind, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
     }
-    wheels->requested = true;
+    call->answers->wheels->requested = true;
     reply_state(call);
+}
+
+static void do_reset(const gw_call_t *call) {
+    gw_wheels_t *wheels = call->answers->wheels;
+    if (!refuse_waited(call)) {
+        reply_judged(call, BLACKBOX_RESET, iw_gateway_reset(&wheels->core, wheels->now_us));
+    }
 }
 
 /// It permits motion as `arm` does: in time, and not behind a stop of somebody else.
 static void do_release(const gw_call_t *call) {
-    gw_wheels_t *wheels = call->answers->wheels;
-    if (refuse_waited(call)) {
-        return;
+    if (!refuse_waited(call)) {
+        reply_judged(call, BLACKBOX_RELEASE, iw_gateway_release(&call->answers->wheels->core));
     }
-    const iw_refusal_t refusal = iw_gateway_release(&wheels->core);
-    note(call, &(blackbox_entry_t){.kind = BLACKBOX_RELEASE, .b = (uint8_t)refusal});
-    if (refusal != IW_REFUSE_NONE) {
-        refuse(call, refusal);
-        return;
-    }
-    wheels->requested = true;
-    reply_state(call);
 }
 
 static void do_tare(const gw_call_t *call) {
