@@ -30,7 +30,7 @@ bool oracle_holds(const oracle_t *self) {
 }
 
 void oracle_judge_hold_state(oracle_t *self, iw_time_us_t now_us, iw_state_t state) {
-    if (state != IW_STATE_LISTENING || self->state != IW_STATE_STOPPING || !oracle_holds(self)) {
+    if (state != IW_STATE_LISTENING || !oracle_holds(self)) {
         return;
     }
     if (self->restarting) {
