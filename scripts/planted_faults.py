@@ -460,7 +460,7 @@ CASES = [
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
     (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),
     (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "status/observe.h"', '#include "observe.h"'), True),
-    (house, "gcc", "two arrows more", ("app/gateway/words/assumption.c", '#include "assumption.h"', '#include "assumption.h"\n#include "lock/runtime.h"\n#include "disk/keeper.h"'), True),
+    (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/keeper.h"\n#include "box/box.h"'), True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
     (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
     (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
