@@ -25,7 +25,7 @@ PRODUCTION = ("core", "lib", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
 COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": (), "lib/sockets": ()}
+              "lib/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": (), "lib/sockets": ()}
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
 
 
@@ -121,26 +121,6 @@ def arrows(program):
     return used, sorted({str(path.parent) for path in files}), bare
 
 
-def component(path):
-    """The library or program that a file belongs to."""
-    parts = path.relative_to(ROOT).parts
-    depth = 3 if parts[:2] in (("app", "bridge"), ("lib", "northbound")) else 2 if parts[0] in ("lib", "app", "port") else 1
-    return "/".join(parts[:depth])
-
-
-def arrows_of_the_tree():
-    """The same between libraries and programs: a header is of the one whose folder it is found in, beside the file first."""
-    files = sources(*PRODUCTION)
-    used = set()
-    for path in files:
-        for included in INCLUDE.findall(path.read_text()):
-            ends = [other for other in files if other.as_posix().endswith("/" + included)]
-            there = {component(other) for other in ends}
-            if there and component(path) not in there:
-                used |= {(component(path), other) for other in there}
-    return used, sorted({component(path) for path in files})
-
-
 def needing_each_other(used):
     """Folders that can be reached from themselves."""
     ways = set(used)
@@ -150,13 +130,12 @@ def needing_each_other(used):
 
 
 def fact_of_arrows(program, limit):
-    """Prints how many of the possible arrows a program has, or the whole tree ("."); what is wrong with them."""
-    used, folders, bare = arrows(ROOT / program) if program != "." else (*arrows_of_the_tree(), [])
+    """Prints how many of the possible arrows a program has; what is wrong with them."""
+    used, folders, bare = arrows(ROOT / program)
     possible = len(folders) * (len(folders) - 1) // 2
     circle = needing_each_other(used)
     percent = 100 * len(used) / possible
-    what = f"the folders of {program}, its own among them" if program != "." else "libraries and programs"
-    print(f"arrows between {what}: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
+    print(f"arrows between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
     return [*bare, *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
             *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else [])]
 
@@ -175,7 +154,7 @@ def main(arguments):
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
     print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
-    findings = [*private, *parts, *fact_of_arrows("app/gateway", 45), *fact_of_arrows("app/ctl", 40), *fact_of_arrows(".", 40)]
+    findings = [*private, *parts, *fact_of_arrows("app/gateway", 45), *fact_of_arrows("app/ctl", 40)]
     findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
     findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []

@@ -183,6 +183,14 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
+def arch(folder, fault):
+    """The tree with one change, which is compared with the table of who may include whom."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    put(folder, fault)
+    return run(SCRIPTS / "arch_check", folder)
+
+
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
     for part in ("core", "port", "lib", "app", "python", "test/faults"):
@@ -461,6 +469,11 @@ CASES = [
     (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),
     (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "status/observe.h"', '#include "observe.h"'), True),
     (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/keeper.h"\n#include "box/box.h"'), True),
+    (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
+    (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "ledger/memory.h"'), True),
+    (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
+    (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
+    (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
     (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
     (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
