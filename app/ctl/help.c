@@ -97,6 +97,9 @@ static const verb_t verbs[] = {
           "REASON appears in `why`. This is no substitute for the button that cuts power.\n")},
     {VERB("reset", verb_reset, "", "leave the latched state, if its cause is gone",
           "Moves nothing: motion needs a new drive command.\n")},
+    {VERB(
+        "release", verb_release, "", "end the zeros of after_stop = hold; then the wheels may roll",
+        "Set the parking brake first: in silence the machine rolls on a slope. Without a hold it changes nothing.\n")},
     {VERB("tare", verb_tare, "[left|right]", "make the present force the zero; both wheels if none is named",
           "Moves nothing. Refused while a wheel turns or its force is not quiet.\n"),
      .choice = side_choice},

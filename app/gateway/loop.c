@@ -79,6 +79,11 @@ void gw_loop_close(gw_daemon_t *daemon) {
 }
 
 static void shut_down(gw_daemon_t *daemon) {
+    if (gw_wheels_look(&daemon->wheels).holding) {
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
+               "parking brake");
+    }
     daemon->wheels.shutting_down = true;
     gw_notify_stopping(&daemon->notify);
     gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);

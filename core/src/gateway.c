@@ -170,6 +170,10 @@ iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us) {
     return iw_permit_reset(&self->permit, now_us);
 }
 
+iw_refusal_t iw_gateway_release(iw_gateway_t *self) {
+    return iw_permit_release(&self->permit);
+}
+
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client) {
     iw_permit_disconnect(&self->permit, now_us, client);
 }

@@ -53,6 +53,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
+        self->kept = config->hold;
         self->stop.cause = IW_CAUSE_RESTART;
         self->stop.at_once = true;
         self->stop.at_us = now_us;
@@ -229,11 +230,33 @@ static bool is_ramping(const iw_permit_t *self) {
     return self->phase == IW_PHASE_CUT && !self->at_once && !self->view.output_zero;
 }
 
-/// The longest time that zeros are held. A second master who moves the wheels is not fought for longer than needed.
-static uint32_t longest_us(const iw_permit_t *self) {
+/// A second master who moves the wheels is not fought for longer than needed.
+static IW_APART bool is_contested(const iw_permit_t *self) {
     const iw_time_us_t other_us = self->seen_us[IW_CAUSE_SECOND_MASTER];
-    const bool contested = other_us != IW_NEVER && other_us >= self->hold_us;
-    return contested ? IW_PERMIT_CONTESTED_US : self->config->hold_max_s * US_PER_S;
+    return other_us != IW_NEVER && other_us >= self->hold_us;
+}
+
+/// The longest time that zeros are held.
+static uint32_t longest_us(const iw_permit_t *self) {
+    return is_contested(self) ? IW_PERMIT_CONTESTED_US : self->config->hold_max_s * US_PER_S;
+}
+
+/// Zeros are held.
+static bool is_holding(iw_phase_t phase) {
+    return phase >= IW_PHASE_HOLDING && phase <= IW_PHASE_CUT;
+}
+
+/// R19: a machine on a slope does not roll because time has passed.
+bool iw_permit_holding(const iw_permit_t *self) {
+    return self->kept && (self->phase == IW_PHASE_HOLDING || self->phase == IW_PHASE_CUT) && !is_contested(self);
+}
+
+/// What follows when zeros are no longer held.
+static iw_phase_t after_hold(const iw_permit_t *self) {
+    if (self->phase == IW_PHASE_CUT) {
+        return IW_PHASE_LATCHED;
+    }
+    return (self->phase == IW_PHASE_RESTARTING && self->kept) ? IW_PHASE_HOLDING : IW_PHASE_LISTENING;
 }
 
 /// Zeros for `zero_hold_ms` and until the wheels stand, but at most `hold_max_s`: a wheel that is pushed or has a fault
@@ -242,22 +265,22 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
     if (is_ramping(self)) {
         self->hold_us = now_us;
     }
+    if (iw_permit_holding(self)) {
+        return;
+    }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
     // Silence with a moving wheel is an event that the operator must hear of.
     const bool gives_up = held_us >= longest_us(self) && !self->view.settled;
     self->still_moving += gives_up ? 1U : 0U;
     if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
-        self->phase = (self->phase == IW_PHASE_CUT) ? IW_PHASE_LATCHED : IW_PHASE_LISTENING;
+        self->phase = after_hold(self);
+        // What the dead process had left in its controller is no second master to the hold that follows.
+        self->hold_us = now_us;
     }
 }
 
-/// Zeros are held, and time ends it.
-static bool is_holding(iw_phase_t phase) {
-    return phase >= IW_PHASE_HOLDING && phase <= IW_PHASE_CUT;
-}
-
 bool iw_permit_ending(const iw_permit_t *self, iw_time_us_t now_us) {
-    return is_holding(self->phase) && !time_is_enough(self) &&
+    return is_holding(self->phase) && !iw_permit_holding(self) && !time_is_enough(self) &&
            iw_age_us(self->hold_us, now_us) >= longest_us(self) - IW_PERMIT_ENDING_US;
 }
 
@@ -291,6 +314,7 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
     self->phase = (self->phase == IW_PHASE_LISTENING) ? IW_PHASE_ARMING : IW_PHASE_REARMING;
     self->arming_us = now_us;
     self->arm_refusal = IW_REFUSE_NONE;
+    self->kept = self->config->hold;
 }
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
@@ -337,6 +361,7 @@ void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, 
         self->stop.client = client;
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
+    self->kept = self->kept && cause != IW_CAUSE_SHUTDOWN;
 }
 
 void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
@@ -355,9 +380,17 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
     }
     const iw_refusal_t refusal = iw_refuse_reset(self, now_us);
     if (refusal == IW_REFUSE_NONE) {
-        self->phase = IW_PHASE_LISTENING;
+        self->phase = iw_permit_holding(self) ? IW_PHASE_HOLDING : IW_PHASE_LISTENING;
     }
     return refusal;
+}
+
+iw_refusal_t iw_permit_release(iw_permit_t *self) {
+    if (!is_holding(self->phase) && iw_permit_demand(self) != IW_DEMAND_SILENCE) {
+        return IW_REFUSE_NOT_AT_REST;
+    }
+    self->kept = false;
+    return IW_REFUSE_NONE;
 }
 
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
@@ -369,7 +402,7 @@ iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
     if (self->phase == IW_PHASE_ARMED) {
         return self->lease_until_us;
     }
-    if (is_holding(self->phase)) {
+    if (is_holding(self->phase) && !iw_permit_holding(self)) {
         return self->hold_us + (time_is_enough(self) ? config->zero_hold_ms * IW_US_PER_MS : longest_us(self));
     }
     return IW_NEVER;

@@ -77,6 +77,7 @@ static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_sn
     // `quiet` spares the loop over all causes in a step in which nothing is wrong.
     out_snapshot->present = permit->quiet ? 0U : iw_permit_present(permit, now_us);
     out_snapshot->still_moving = permit->still_moving;
+    out_snapshot->holding = iw_permit_holding(permit);
     out_snapshot->zeros_ending = iw_permit_ending(permit, now_us);
     out_snapshot->state = iw_permit_state(permit);
     out_snapshot->arm_refusal = permit->arm_refusal;

@@ -26,6 +26,7 @@ typedef enum {
     BLACKBOX_STOP,      ///< number: client; a: iw_cause_t.
     BLACKBOX_ESTOPPED,  ///< Software e-stop. number: client.
     BLACKBOX_RESET,     ///< b: iw_refusal_t.
+    BLACKBOX_RELEASE,   ///< b: iw_refusal_t.
     BLACKBOX_GONE,      ///< A client's connection ended. number: client.
     BLACKBOX_TARE,      ///< a: iw_side_t; b: iw_tare_t.
     BLACKBOX_LEDGER, ///< Told of an assumption. a: item; b: iw_ledger_state_t; number: iw_evidence_t; as.value: figure.

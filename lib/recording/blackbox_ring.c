@@ -215,6 +215,7 @@ static const char *const names[BLACKBOX_KINDS] = {
     [BLACKBOX_STOP] = "stop",
     [BLACKBOX_ESTOPPED] = "estop",
     [BLACKBOX_RESET] = "reset",
+    [BLACKBOX_RELEASE] = "release",
     [BLACKBOX_GONE] = "gone",
     [BLACKBOX_TARE] = "tare",
     [BLACKBOX_LEDGER] = "ledger",

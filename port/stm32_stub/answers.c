@@ -241,8 +241,8 @@ static void do_estop(iw_host_t *self, iw_host_client_t *client) {
     reply_state(self, client);
 }
 
-static void do_reset(iw_host_t *self, iw_host_client_t *client) {
-    const iw_refusal_t refusal = iw_gateway_reset(self->place.gateway, self->now_us);
+/// Of a request that only the core judges: reset or release.
+static void reply_judged(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal) {
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
         return;
@@ -298,6 +298,30 @@ static bool may_watch(iwn_cmd_t cmd) {
     return allowed[cmd];
 }
 
+/// What is asked for seldom.
+static void carry_out_seldom(iw_host_t *self, iw_host_client_t *client) {
+    switch (self->request.cmd) {
+    case IWN_CMD_RESET:
+        reply_judged(self, client, iw_gateway_reset(self->place.gateway, self->now_us));
+        break;
+    case IWN_CMD_RELEASE:
+        reply_judged(self, client, iw_gateway_release(self->place.gateway));
+        break;
+    case IWN_CMD_TARE:
+        do_tare(self, client);
+        break;
+    case IWN_CMD_CONFIRM:
+        iw_answer_confirm(self, client);
+        break;
+    case IWN_CMD_CONFIG:
+        iw_answer_config(self, client);
+        break;
+    default:
+        REFUSE(self, client, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        break;
+    }
+}
+
 /// No table of functions: the worst stack is found by following the calls.
 static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
     switch (self->request.cmd) {
@@ -326,23 +350,11 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
     case IWN_CMD_ESTOP:
         do_estop(self, client);
         break;
-    case IWN_CMD_RESET:
-        do_reset(self, client);
-        break;
-    case IWN_CMD_TARE:
-        do_tare(self, client);
-        break;
-    case IWN_CMD_CONFIRM:
-        iw_answer_confirm(self, client);
-        break;
-    case IWN_CMD_CONFIG:
-        iw_answer_config(self, client);
-        break;
     case IWN_CMD_WHY:
         do_why(self, client);
         break;
     default:
-        REFUSE(self, client, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        carry_out_seldom(self, client);
         break;
     }
 }

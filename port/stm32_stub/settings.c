@@ -13,7 +13,7 @@ IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * si
                  the_core_s_numbers_are_side_by_side);
 
 /// Bits of SWITCHES, in the order of version 0.2, which kept a number for each of the first five.
-enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC };
+enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC, HOLD };
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
@@ -22,50 +22,66 @@ enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC 
 /// How a value is written.
 typedef enum { NUMBER, BYTE, GEAR, WORDS, SWITCH } kind_t;
 
+typedef enum { S_WHEELS, S_LEFT, S_RIGHT, S_DRIVE, S_LIMITS } section_t;
+static const char *const sections[] = {"wheels", "left", "right", "drive", "limits"};
+
+/// Of SWITCH: the words for 0 and 1; of WORDS, the role: for 1 and 2.
+typedef enum { W_NONE, W_ROLE, W_TURNS, W_YES, W_UNIT, W_HOLD } words_t;
+static const char *const words[][2] = {
+    [W_NONE] = {NULL, NULL}, [W_ROLE] = {"limit", "setpoint"}, [W_TURNS] = {"wheel", "rotor"},
+    [W_YES] = {"no", "yes"}, [W_UNIT] = {"cN", "dN"},          [W_HOLD] = {"release", "hold"},
+};
+
+/// As small as it can be: the flash of an F103 is full.
 typedef struct {
-    const char *section;
     const char *key;
+    uint8_t section; ///< A section_t.
     uint8_t at;
-    uint8_t kind;
-    const char *word[2]; ///< Of SWITCH: for 0 and 1; of WORDS, the role: for 1 and 2.
+    uint8_t kind;  ///< A kind_t.
+    uint8_t words; ///< A words_t.
 } row_t;
 
 static const row_t rows[] = {
-    {"wheels", "setpoint_type", TYPE, BYTE, {NULL, NULL}},
-    {"wheels", "current_role", ROLE, WORDS, {"limit", "setpoint"}},
-    {"wheels", "rpm_of", RPM_OF, SWITCH, {"wheel", "rotor"}},
-    {"wheels", "radius_mm", INDEX(RADIUS), NUMBER, {NULL, NULL}},
-    {"wheels", "gear_ratio", INDEX(GEAR_TURNS), GEAR, {NULL, NULL}},
-    {"wheels", "track_mm", INDEX(TRACK), NUMBER, {NULL, NULL}},
-    {"wheels", "setpoint_dlc", INDEX(SETPOINT_DLC), NUMBER, {NULL, NULL}},
-    {"left", "invert", INVERT_LEFT, SWITCH, {"no", "yes"}},
-    {"left", "force_unit", UNIT_LEFT, SWITCH, {"cN", "dN"}},
-    {"right", "invert", INVERT_RIGHT, SWITCH, {"no", "yes"}},
-    {"right", "force_unit", UNIT_RIGHT, SWITCH, {"cN", "dN"}},
-    {"drive", "period_ms", INDEX(PERIOD), NUMBER, {NULL, NULL}},
-    {"drive", "lease_ms", INDEX(LEASE), NUMBER, {NULL, NULL}},
-    {"drive", "accel_mm_s2", INDEX(ACCEL), NUMBER, {NULL, NULL}},
-    {"drive", "decel_mm_s2", INDEX(DECEL), NUMBER, {NULL, NULL}},
-    {"drive", "max_speed_mm_s", INDEX(MAX_SPEED), NUMBER, {NULL, NULL}},
-    {"drive", "max_yaw_mrad_s", INDEX(MAX_YAW), NUMBER, {NULL, NULL}},
-    {"drive", "yaw_accel_mrad_s2", INDEX(YAW_ACCEL), NUMBER, {NULL, NULL}},
-    {"drive", "max_current_mA", INDEX(MAX_CURRENT), NUMBER, {NULL, NULL}},
-    {"drive", "min_current_mA", INDEX(MIN_CURRENT), NUMBER, {NULL, NULL}},
-    {"drive", "asymmetric_current", ASYMMETRIC, SWITCH, {"no", "yes"}},
-    {"drive", "zero_hold_ms", INDEX(ZERO_HOLD), NUMBER, {NULL, NULL}},
-    {"drive", "hold_max_s", INDEX(HOLD_MAX), NUMBER, {NULL, NULL}},
-    {"limits", "wheel_silent_ms", INDEX(WHEEL_SILENT), NUMBER, {NULL, NULL}},
-    {"limits", "echo_ms", INDEX(ECHO), NUMBER, {NULL, NULL}},
-    {"limits", "rest_rpm", INDEX(REST_RPM), NUMBER, {NULL, NULL}},
-    {"limits", "rest_ms", INDEX(REST), NUMBER, {NULL, NULL}},
-    {"limits", "follow_mm_s", INDEX(FOLLOW_SPEED), NUMBER, {NULL, NULL}},
-    {"limits", "follow_ms", INDEX(FOLLOW), NUMBER, {NULL, NULL}},
-    {"limits", "blocked_ms", INDEX(BLOCKED), NUMBER, {NULL, NULL}},
-    {"limits", "pair_mm", INDEX(PAIR), NUMBER, {NULL, NULL}},
-    {"limits", "pair_leak_ms", INDEX(PAIR_LEAK), NUMBER, {NULL, NULL}},
-    {"limits", "wheel_lag_ms", INDEX(WHEEL_LAG), NUMBER, {NULL, NULL}},
+    {"setpoint_type", S_WHEELS, TYPE, BYTE, W_NONE},
+    {"current_role", S_WHEELS, ROLE, WORDS, W_ROLE},
+    {"rpm_of", S_WHEELS, RPM_OF, SWITCH, W_TURNS},
+    {"radius_mm", S_WHEELS, INDEX(RADIUS), NUMBER, W_NONE},
+    {"gear_ratio", S_WHEELS, INDEX(GEAR_TURNS), GEAR, W_NONE},
+    {"track_mm", S_WHEELS, INDEX(TRACK), NUMBER, W_NONE},
+    {"setpoint_dlc", S_WHEELS, INDEX(SETPOINT_DLC), NUMBER, W_NONE},
+    {"invert", S_LEFT, INVERT_LEFT, SWITCH, W_YES},
+    {"force_unit", S_LEFT, UNIT_LEFT, SWITCH, W_UNIT},
+    {"invert", S_RIGHT, INVERT_RIGHT, SWITCH, W_YES},
+    {"force_unit", S_RIGHT, UNIT_RIGHT, SWITCH, W_UNIT},
+    {"period_ms", S_DRIVE, INDEX(PERIOD), NUMBER, W_NONE},
+    {"lease_ms", S_DRIVE, INDEX(LEASE), NUMBER, W_NONE},
+    {"accel_mm_s2", S_DRIVE, INDEX(ACCEL), NUMBER, W_NONE},
+    {"decel_mm_s2", S_DRIVE, INDEX(DECEL), NUMBER, W_NONE},
+    {"max_speed_mm_s", S_DRIVE, INDEX(MAX_SPEED), NUMBER, W_NONE},
+    {"max_yaw_mrad_s", S_DRIVE, INDEX(MAX_YAW), NUMBER, W_NONE},
+    {"yaw_accel_mrad_s2", S_DRIVE, INDEX(YAW_ACCEL), NUMBER, W_NONE},
+    {"max_current_mA", S_DRIVE, INDEX(MAX_CURRENT), NUMBER, W_NONE},
+    {"min_current_mA", S_DRIVE, INDEX(MIN_CURRENT), NUMBER, W_NONE},
+    {"asymmetric_current", S_DRIVE, ASYMMETRIC, SWITCH, W_YES},
+    {"zero_hold_ms", S_DRIVE, INDEX(ZERO_HOLD), NUMBER, W_NONE},
+    {"hold_max_s", S_DRIVE, INDEX(HOLD_MAX), NUMBER, W_NONE},
+    {"after_stop", S_DRIVE, HOLD, SWITCH, W_HOLD},
+    {"wheel_silent_ms", S_LIMITS, INDEX(WHEEL_SILENT), NUMBER, W_NONE},
+    {"echo_ms", S_LIMITS, INDEX(ECHO), NUMBER, W_NONE},
+    {"rest_rpm", S_LIMITS, INDEX(REST_RPM), NUMBER, W_NONE},
+    {"rest_ms", S_LIMITS, INDEX(REST), NUMBER, W_NONE},
+    {"follow_mm_s", S_LIMITS, INDEX(FOLLOW_SPEED), NUMBER, W_NONE},
+    {"follow_ms", S_LIMITS, INDEX(FOLLOW), NUMBER, W_NONE},
+    {"blocked_ms", S_LIMITS, INDEX(BLOCKED), NUMBER, W_NONE},
+    {"pair_mm", S_LIMITS, INDEX(PAIR), NUMBER, W_NONE},
+    {"pair_leak_ms", S_LIMITS, INDEX(PAIR_LEAK), NUMBER, W_NONE},
+    {"wheel_lag_ms", S_LIMITS, INDEX(WHEEL_LAG), NUMBER, W_NONE},
 };
 #define ROWS (sizeof rows / sizeof rows[0])
+
+static const char *section_of(const row_t *row) {
+    return sections[row->section];
+}
 
 static void turn(iw_settings_t *self, unsigned bit, bool on) {
     const uint16_t mask = (uint16_t)(1U << bit);
@@ -84,6 +100,7 @@ iw_settings_t iw_settings_from(const iw_config_t *config) {
     self.value[SWITCHES] = 0;
     turn(&self, RPM_OF, config->rpm_of_rotor);
     turn(&self, ASYMMETRIC, config->asymmetric_current);
+    turn(&self, HOLD, config->hold);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         turn(&self, INVERT_LEFT + side, config->invert[side]);
         turn(&self, UNIT_LEFT + side, config->force_unit[side] != IW_FORCE_CN);
@@ -117,6 +134,7 @@ void iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
     config->current_role = (iw_current_role_t)self->value[ROLE];
     config->rpm_of_rotor = is_on(self, RPM_OF);
     config->asymmetric_current = is_on(self, ASYMMETRIC);
+    config->hold = is_on(self, HOLD);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         config->invert[side] = is_on(self, INVERT_LEFT + side);
         config->force_unit[side] = is_on(self, UNIT_LEFT + side) ? IW_FORCE_DN : IW_FORCE_CN;
@@ -125,8 +143,8 @@ void iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
 
 static const row_t *find(const char *key) {
     for (size_t i = 0; i < ROWS; i++) {
-        const size_t length = strlen(rows[i].section);
-        if (strncmp(key, rows[i].section, length) == 0 && key[length] == '.' &&
+        const size_t length = strlen(section_of(&rows[i]));
+        if (strncmp(key, section_of(&rows[i]), length) == 0 && key[length] == '.' &&
             strcmp(&key[length + 1U], rows[i].key) == 0) {
             return &rows[i];
         }
@@ -161,7 +179,8 @@ static bool within(uint32_t number, iw_config_range_t range) {
 
 static bool refuse_number(const row_t *row, iwn_text_t *why) {
     const iw_config_range_t range = range_of(row);
-    IWN_TEXT_JOIN(why, row->section, ".", row->key, (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
+    IWN_TEXT_JOIN(why, section_of(row), ".", row->key,
+                  (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
     iwn_text_int(why, range.min);
     IWN_TEXT_JOIN(why, " to ");
     iwn_text_int(why, range.max);
@@ -203,12 +222,12 @@ bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iw
         return set_number(self, row, value, why);
     }
     for (unsigned i = 0; i < 2U; i++) {
-        if (strcmp(value, row->word[i]) == 0) {
+        if (strcmp(value, words[row->words][i]) == 0) {
             set_word(self, row, i);
             return true;
         }
     }
-    IWN_TEXT_JOIN(why, key, " must be ", row->word[0], " or ", row->word[1]);
+    IWN_TEXT_JOIN(why, key, " must be ", words[row->words][0], " or ", words[row->words][1]);
     return false;
 }
 
@@ -244,13 +263,13 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
 static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[IW_SETTINGS_TEXT]) {
     iwn_text_t text = iwn_text_begin(out_text, IW_SETTINGS_TEXT);
     if (row->kind == SWITCH) {
-        IWN_TEXT_JOIN(&text, row->word[is_on(self, row->at) ? 1 : 0]);
+        IWN_TEXT_JOIN(&text, words[row->words][is_on(self, row->at) ? 1 : 0]);
         return true;
     }
     const uint16_t value = self->value[row->at];
     if (row->kind == WORDS) {
         const unsigned word = (unsigned)value - IW_ROLE_LIMIT;
-        IWN_TEXT_JOIN(&text, (word < 2U) ? row->word[word] : "");
+        IWN_TEXT_JOIN(&text, (word < 2U) ? words[row->words][word] : "");
         return word < 2U;
     }
     iwn_text_int(&text, value);
@@ -272,7 +291,7 @@ void iw_settings_write(const iw_settings_t *self, iwn_out_t *json) {
     iwn_out_open(json, "keys", '[');
     for (size_t i = 0; i < ROWS; i++) {
         iwn_text_t key = iwn_text_begin(name, sizeof name);
-        IWN_TEXT_JOIN(&key, rows[i].section, ".", rows[i].key);
+        IWN_TEXT_JOIN(&key, section_of(&rows[i]), ".", rows[i].key);
         iwn_out_open(json, NULL, '{');
         iwn_out_text(json, "key", name);
         iwn_out_text(json, "value", value_of(self, &rows[i], value) ? value : NULL);

@@ -270,6 +270,7 @@ class Story(unittest.TestCase):
         self.ask(me, "recording", name=f"{name}.conf")
         self.ask(me, "recording", name=f"{name}.conf", offset=-1, refused="out_of_range")
         self.wait_granted(me, "reset")
+        self.wait_granted(me, "release")
         self.wait_granted(me, "arm")
         self.rig.sim.ask("mute left")
         self.wait(me, lambda s: not s["left"]["heard"])

@@ -343,6 +343,12 @@ class Showing(WithGateway):
         self.assertIn("iwheelctl reset", out)
         self.assertIn("left wheel not heard for 53 ms", out)
 
+    def test_held_zeros_are_told_and_what_ends_them(self):
+        out = self.show(snapshot("stopping", cause="client_stop", holding=True))
+        self.assertIn("stopping (client_stop), holding", out)
+        self.assertIn("iwheelctl release", out)
+        self.assertNotIn("iwheelctl release", self.show(snapshot("stopping", cause="client_stop")))
+
     def test_listening_names_what_keeps_it_from_arming(self):
         unset = {"setpoint_type": {"state": "assumed", "evidence": "none"}, "wheel_radius": {"state": "contradicted"}}
         out = self.show(snapshot(ledger=unset, present=["bus_down"]))
@@ -498,7 +504,7 @@ class Asking(WithGateway):
         self.assertEqual("iwheelctl: refused (estop_pressed): the e-stop is pressed; release the button\n", err)
 
     def test_wrong_words_are_usage_and_reach_nobody(self):
-        for words in ([], ["fly"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["why", "me"],
+        for words in ([], ["fly"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["release", "1"], ["why", "me"],
                       ["tare", "middle"], ["tare", "left", "right"], ["confirm"], ["confirm", "dlc", "yes", "x"], ["ledger", "x"], ["watch", "speed"], ["watch", "--rate"],
                       ["watch", "--rate", "0"], ["watch", "--rate", "101"], ["watch", "--rate", "1x"], ["drive"],
                       ["drive", "1"], ["drive", "1", "2", "3"], ["drive", "1.5", "2"], ["drive", "a", "b"],
@@ -516,12 +522,12 @@ class Asking(WithGateway):
 
     def test_unknown_verb_lists_the_known(self):
         err = self.ctl("fly")[2]
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why", "ledger",
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger",
                      "confirm", "doctor", "bringup", "top"):
             self.assertIn(verb, err)
 
     def test_help_of_every_verb_needs_no_gateway(self):
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why", "ledger",
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger",
                      "confirm", "doctor", "bringup", "top"):
             code, out, _, _ = run(verb, "--help")
             self.assertEqual(0, code)

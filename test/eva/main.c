@@ -138,6 +138,7 @@ static void any_config(iw_config_t *out_config) {
     out_config->setpoint_type_set = any_bool();
     out_config->rpm_of_rotor = any_bool();
     out_config->listen_only = any_bool();
+    out_config->hold = any_bool();
     out_config->current_role = (iw_current_role_t)Frama_C_interval(IW_ROLE_UNSET, IW_ROLE_SETPOINT);
     for (size_t side = 0; side < IW_SIDES; side++) {
         out_config->invert[side] = any_bool();
@@ -164,7 +165,7 @@ static void drive(bool has_current) {
 
 static void request(void) {
     iw_side_t refused;
-    switch (Frama_C_interval(0, 8)) {
+    switch (Frama_C_interval(0, 9)) {
     case 0:
         (void)iw_gateway_arm(&gateway, now_us, any_u32(), any_bool());
         break;
@@ -188,6 +189,9 @@ static void request(void) {
         break;
     case 7:
         iw_gateway_suspended(&gateway, any_time());
+        break;
+    case 8:
+        (void)iw_gateway_release(&gateway);
         break;
     default: {
         const iw_bus_facts_t facts = {any_bool(), any_bool()};

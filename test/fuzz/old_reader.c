@@ -54,12 +54,12 @@ typedef struct {
     const char *name;
     size_t offset;    ///< Of the value in iwn_request_t.
     size_t max;       ///< Of a text, in bytes.
-    uint16_t allowed; ///< Bit per iwn_cmd_t.
+    uint32_t allowed; ///< Bit per iwn_cmd_t.
     bool required;
     field_kind_t kind;
 } field_t;
 
-#define BIT(cmd)   ((uint16_t)(1U << (cmd)))
+#define BIT(cmd)   (1U << (cmd))
 #define IN(member) offsetof(iwn_request_t, member)
 
 static const field_t fields[] = {
@@ -73,7 +73,8 @@ static const field_t fields[] = {
     {"rate_hz", IN(rate_hz), 0, BIT(IWN_CMD_WATCH), false, FIELD_RATE},
     {"name", IN(name), IWN_NAME_MAX, BIT(IWN_CMD_ARM), false, FIELD_TEXT},
     {"takeover", IN(takeover), 0, BIT(IWN_CMD_ARM), false, FIELD_FLAG},
-    {"t_us", IN(t_us), 0, BIT(IWN_CMD_ARM) | BIT(IWN_CMD_RESET) | BIT(IWN_CMD_CONFIRM), false, FIELD_INTEGER},
+    {"t_us", IN(t_us), 0, BIT(IWN_CMD_ARM) | BIT(IWN_CMD_RESET) | BIT(IWN_CMD_RELEASE) | BIT(IWN_CMD_CONFIRM), false,
+     FIELD_INTEGER},
     {"stop", IN(stop), 0, BIT(IWN_CMD_RESET), false, FIELD_INTEGER},
     {"key", IN(lease_key), IWN_LEASE_KEY_MAX, BIT(IWN_CMD_DRIVE) | BIT(IWN_CMD_TWIST), false, FIELD_TEXT},
     {"reason", IN(reason), IWN_REASON_MAX, BIT(IWN_CMD_ESTOP), false, FIELD_TEXT},
@@ -88,9 +89,9 @@ static const field_t fields[] = {
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-static const char *const cmd_names[IWN_CMDS] = {"hello",   "status",     "watch",     "arm",   "drive", "twist",
-                                                "stop",    "disarm",     "estop",     "reset", "tare",  "why",
-                                                "confirm", "recordings", "recording", "config"};
+static const char *const cmd_names[IWN_CMDS] = {"hello", "status",  "watch",      "arm",       "drive",   "twist",
+                                                "stop",  "disarm",  "estop",      "reset",     "release", "tare",
+                                                "why",   "confirm", "recordings", "recording", "config"};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
                                                          const char *format, ...) {

@@ -40,7 +40,8 @@ static void usage(FILE *out) {
           "       test_orders --sequence rest|driving once|stream|blind SPACING LETTER,LETTER,...\n"
           "Plays every sequence of press, release, reset, arm, command, kill, restart and bus (down or up), with "
           "several\n"
-          "spacings, from standing and from driving wheels, with drives that come at once or have waited, and judges\n"
+          "spacings, from standing and from driving wheels, with after_stop = hold and without, with drives that come "
+          "at once or have waited, and judges\n"
           "each by the rules of motion permission.\n"
           "--length: of the sequences, 6 if not told; --part 0/2 and 1/2 are the halves; --full: more spacings.\n"
           "--sequence plays one and tells what happens; SPACING is the number that a failure told. A failing sequence "
@@ -69,7 +70,7 @@ static uint32_t spacing_us(const combination_t *combination, const uint8_t *lett
 
 /// Standing wheels that are known to stand; or driving ones, driven by a client that goes on as its mode says.
 static void begin(world_t *world, const combination_t *combination, world_stats_t *stats) {
-    world_init(world, combination->mode, stats);
+    world_init(world, combination->mode, combination->spacing % 2U == 1U, stats);
     world_run(world, 350U * MS);
     if (combination->start == START_DRIVING) {
         world->mode = (combination->mode == MODE_ONCE) ? MODE_STREAM : combination->mode;

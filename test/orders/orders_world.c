@@ -135,6 +135,7 @@ static void start_gateway(world_t *self, bool restarted) {
     config.wheel_silent_ms = SILENT_MS;
     config.lease_ms = LEASE_MS;
     config.invert[IW_RIGHT] = true;
+    config.hold = self->hold;
     if (iw_gateway_init(&self->gateway, &config, &hal, self->now_us, restarted) != IW_CONFIG_OK) {
         abort();
     }
@@ -145,8 +146,9 @@ static void start_gateway(world_t *self, bool restarted) {
     wake(self);
 }
 
-void world_init(world_t *self, world_mode_t mode, world_stats_t *stats) {
+void world_init(world_t *self, world_mode_t mode, bool hold, world_stats_t *stats) {
     memset(self, 0, sizeof *self);
+    self->hold = hold;
     self->stats = stats;
     self->mode = mode;
     self->now_us = START_US;
@@ -236,6 +238,14 @@ static void reset(world_t *self) {
     wake(self);
 }
 
+/// Of a button that is released already it is the request: the end of a hold.
+static void release_hold(world_t *self) {
+    const iw_refusal_t result = iw_gateway_release(&self->gateway);
+    tell(self, "release of the hold", (int)result);
+    oracle_release(&self->oracle, self->now_us, result);
+    wake(self);
+}
+
 static void cut(world_t *self) {
     self->cut = true;
     self->arm_after_cut = false;
@@ -292,8 +302,14 @@ void world_do(world_t *self, world_step_t step) {
     }
     switch (step) {
     case STEP_PRESS:
+        press(self, true);
+        break;
     case STEP_RELEASE:
-        press(self, step == STEP_PRESS);
+        if (self->pressed) {
+            press(self, false);
+        } else {
+            release_hold(self);
+        }
         break;
     case STEP_RESET:
         reset(self);

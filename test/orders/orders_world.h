@@ -13,7 +13,7 @@
 /// The alphabet.
 typedef enum {
     STEP_PRESS = 0,
-    STEP_RELEASE,
+    STEP_RELEASE, ///< Of the button; if it is not pressed, of the hold.
     STEP_RESET,
     STEP_ARM,
     STEP_COMMAND,
@@ -63,14 +63,15 @@ typedef struct {
     iw_client_t client;
     world_mode_t mode;
     bool pressed, edge, down, lost, traces;
+    bool hold;               ///< after_stop = hold.
     bool late;               ///< Drives have waited somewhere on their way, each for another time.
     bool cut, arm_after_cut; ///< The simpler rule's memory, and since when the latter.
     iw_time_us_t arm_us;
     iw_state_t state;
 } world_t;
 
-/// The gateway starts in front of standing wheels. There is one world at a time: it must not be moved.
-void world_init(world_t *self, world_mode_t mode, world_stats_t *stats);
+/// The gateway starts in front of standing wheels, with after_stop = hold or without. There is one world at a time: it must not be moved.
+void world_init(world_t *self, world_mode_t mode, bool hold, world_stats_t *stats);
 
 /// Does what the letter says, now.
 void world_do(world_t *self, world_step_t step);

@@ -120,6 +120,15 @@ static void request_reset(rig_t *rig, const request_t *request, const iw_gateway
     oracle_reset(&rig->oracle, rig->now_us, iw_permit_state(&before->permit), &before->permit.stop);
 }
 
+static void request_release(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
+    const iw_refusal_t result = iw_gateway_release(&rig->gateway);
+    tell(rig, request, result);
+    if (result != IW_REFUSE_NONE) {
+        judge_refused(rig, before);
+    }
+    oracle_release(&rig->oracle, rig->now_us, result);
+}
+
 static void run_request(rig_t *rig, const request_t *request) {
     iw_side_t refused;
     const iw_gateway_t before = rig->gateway;
@@ -133,8 +142,14 @@ static void run_request(rig_t *rig, const request_t *request) {
     case EV_ONE_RESET:
         request_reset(rig, request, &before);
         break;
+    case EV_ONE_RELEASE:
+        request_release(rig, request, &before);
+        break;
     case EV_ONE_STOP:
         tell(rig, request, IW_REFUSE_NONE);
+        if (request->b != 0) {
+            oracle_shutdown(&rig->oracle, rig->now_us);
+        }
         iw_gateway_stop(&rig->gateway, rig->now_us, request->id,
                         (request->b != 0) ? IW_CAUSE_SHUTDOWN : IW_CAUSE_CLIENT_STOP);
         oracle_stop(&rig->oracle, rig->now_us, true);

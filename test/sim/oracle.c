@@ -45,6 +45,7 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     self->gateway = gateway;
     self->config = &gateway->config;
     self->restarting = restarted;
+    self->kept = restarted && gateway->config.hold;
     self->hard = true;
     self->state = iw_gateway_state(gateway);
     self->stopped_us = now_us;
@@ -206,6 +207,7 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
         self->foreign_us = now_us;
         self->foreign++;
         self->foreign_now = true;
+        oracle_hold_foreign(self);
         oracle_hard_stop(self);
     } else if ((frame->id == 256U || frame->id == 288U) && frame->dlc >= 4U && frame->dlc <= 8U) {
         hear_speed(self, now_us, wheel, word(frame->data));
@@ -332,7 +334,8 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
         (self->latched_silent ||
-         oracle_elapsed(now_us, self->held_us, oracle_hold_max_us(self, self->held_us) + oracle_us(100)))) {
+         (!self->kept &&
+          oracle_elapsed(now_us, self->held_us, oracle_hold_max_us(self, self->held_us) + oracle_us(100))))) {
         oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -513,8 +516,10 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     if (state == IW_STATE_LATCHED && self->state != IW_STATE_LATCHED) {
         begin_latch(self, now_us);
     }
+    oracle_judge_hold_state(self, now_us, state);
     if (state == IW_STATE_STOPPING && self->state != IW_STATE_STOPPING) {
-        self->stopped_us = now_us;
+        // A reset that does not end the hold leaves its time as it is.
+        self->stopped_us = (self->state == IW_STATE_LATCHED) ? self->held_us : now_us;
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_ARMED) {
         oracle_break(self, now_us, 505, "from ARMED to LISTENING without STOPPING");
@@ -528,7 +533,7 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
         }
     }
     // A request before the first step after a stall finds the state of before it.
-    if (state == IW_STATE_STOPPING &&
+    if (state == IW_STATE_STOPPING && !self->kept && now_us - self->released_us > oracle_us(1000) &&
         oracle_elapsed(now_us, self->stopped_us, oracle_hold_max_us(self, self->stopped_us) + oracle_us(1300)) &&
         now_us - self->late_us > oracle_us(1000) && now_us - self->step_us < GAP_US) {
         oracle_break(self, now_us, 507, "STOPPING without end");

@@ -55,7 +55,10 @@ typedef struct {
     bool hard;  ///< Nothing but zero until armed anew.
     bool broken_pair;
     bool restarting;
-    bool proven; ///< Echoes prove something in this run.
+    bool kept; ///< With after_stop = hold: nothing has ended it since arm or the restart.
+    iw_time_us_t released_us;
+    bool kept_unsure; ///< Frames of the dead process, or of another master: nobody can tell.
+    bool proven;      ///< Echoes prove something in this run.
     bool purges;
     iw_client_t holder;
     iw_client_t pending_arm;
@@ -140,6 +143,9 @@ void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t 
 void oracle_stop(oracle_t *self, iw_time_us_t now_us, bool matters);
 void oracle_soft_estop(oracle_t *self, iw_time_us_t now_us);
 void oracle_reset(oracle_t *self, iw_time_us_t now_us, iw_state_t before, const iw_stop_t *stop);
+void oracle_release(oracle_t *self, iw_time_us_t now_us, iw_refusal_t result);
+/// The process is told to end.
+void oracle_shutdown(oracle_t *self, iw_time_us_t now_us);
 
 /// A rule of the rig's own.
 void oracle_fail(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *text);

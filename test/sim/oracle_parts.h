@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// What the parts of the oracle share: what it sees and what follows (oracle.c), requests (oracle_requests.c),
-/// limits of current (oracle_currents.c), wheels that roll (oracle_rolling.c).
+/// limits of current (oracle_currents.c), wheels that roll (oracle_rolling.c), the hold (oracle_hold.c).
 #ifndef SIM_TEST_ORACLE_PARTS_H
 #define SIM_TEST_ORACLE_PARTS_H
 
@@ -57,6 +57,16 @@ bool oracle_turns_too_fast(const oracle_t *self, int32_t left_mm_s, int32_t righ
 
 /// Right after the step: what was sent turns the machine no faster, and not faster too soon.
 void oracle_judge_turn(oracle_t *self, iw_time_us_t now_us);
+
+/// The hold of after_stop: arm asks for it; release and shutdown end it; another master may.
+void oracle_hold_asked(oracle_t *self);
+void oracle_hold_ended(oracle_t *self);
+void oracle_hold_foreign(oracle_t *self);
+/// Zeros must go on, whatever the time.
+bool oracle_holds(const oracle_t *self);
+/// Before `state` is taken over, and at the end of a step.
+void oracle_judge_hold_state(oracle_t *self, iw_time_us_t now_us, iw_state_t state);
+void oracle_judge_hold(oracle_t *self, iw_time_us_t now_us);
 
 /// The public state changed, or may have.
 void oracle_observe(oracle_t *self, iw_time_us_t now_us);

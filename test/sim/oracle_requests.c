@@ -58,6 +58,7 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
         } else {
             self->pending_arm = client;
             self->arm_us = now_us;
+            oracle_hold_asked(self);
         }
     }
     oracle_observe(self, now_us);
@@ -134,6 +135,11 @@ void oracle_stop(oracle_t *self, iw_time_us_t now_us, bool matters) {
         oracle_soft_stop(self, now_us);
     }
     oracle_observe(self, now_us);
+}
+
+void oracle_shutdown(oracle_t *self, iw_time_us_t now_us) {
+    self->released_us = now_us;
+    oracle_hold_ended(self);
 }
 
 void oracle_soft_estop(oracle_t *self, iw_time_us_t now_us) {

@@ -170,8 +170,8 @@ static void note_hold(oracle_t *self, iw_time_us_t now_us) {
 /// While the process runs and the bus takes frames, setpoints come without a gap.
 static void judge_gaps(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
-    const bool holding = state == IW_STATE_LATCHED && !self->latched_silent &&
-                         now_us - self->latched_us < oracle_us(self->config->zero_hold_ms);
+    const bool holding = oracle_holds(self) || (state == IW_STATE_LATCHED && !self->latched_silent &&
+                                                now_us - self->latched_us < oracle_us(self->config->zero_hold_ms));
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (self->wheel[side].pending > 0U && now_us - self->wheel[side].waiting[0] >= SLOW_ECHO_US) {
             self->refused_us = now_us;
@@ -224,7 +224,7 @@ static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
     const bool ended = (held && oracle_rested(self, now_us, SETTLED_US)) ||
                        (now_us > zeros_us &&
                         oracle_elapsed(now_us, zeros_us, oracle_hold_max_us(self, self->held_us) + oracle_us(100)));
-    if (listening || (state == IW_STATE_LATCHED && (self->latched_silent || ended || silent))) {
+    if (listening || (state == IW_STATE_LATCHED && (self->latched_silent || (!self->kept && (ended || silent))))) {
         self->silent_us = (self->silent_us == IW_NEVER) ? now_us : self->silent_us;
     } else {
         self->silent_us = IW_NEVER;
@@ -251,6 +251,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     oracle_judge_turn(self, now_us);
     judge_estop_zero(self, now_us, before);
     oracle_judge_rolling(self, now_us);
+    oracle_judge_hold(self, now_us);
     self->step_us = now_us;
     self->timing_bad = self->gateway->facts.timing_contradicted;
 }

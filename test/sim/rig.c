@@ -13,6 +13,8 @@
 #define USABLE_US     (20U * S)
 #define DRIVEN_US     (1U * S)
 #define SETTLE_US     (14U * S)
+#define HELD_US       (30U * S)
+#define RULE_HELD     818U ///< As the oracle's own.
 #define ODD_IDS       11U
 
 bool rig_traces(const rig_t *rig) {
@@ -403,6 +405,18 @@ static bool comes_to_rest(rig_t *rig, iw_time_us_t limit_us) {
     return false;
 }
 
+/// The zeros of a hold end by nothing else.
+static void release_at_rest(rig_t *rig) {
+    const event_t release = {.kind = EV_ONE_RELEASE};
+    if (rig->scenario->config.hold) {
+        run_until(rig, rig->now_us + HELD_US);
+        if (iw_gateway_state(&rig->gateway) == IW_STATE_LISTENING) {
+            oracle_fail(&rig->oracle, rig->now_us, RULE_HELD, "nobody has released it, and nothing is sent");
+        }
+        clients_start(rig, &release);
+    }
+}
+
 /// A well-behaved client must get its way now, and when it has gone the wheels stand and the bus is silent.
 static void prove_usable(rig_t *rig) {
     const event_t drives = {.span_us = 60U * S, .a = 200, .b = 180, .kind = EV_GOOD_CLIENT, .style = 3U};
@@ -411,6 +425,7 @@ static void prove_usable(rig_t *rig) {
         oracle_fail(&rig->oracle, rig->now_us, RULE_UNUSABLE, "all faults are gone, but it cannot be driven");
     }
     clients_all_gone(rig);
+    release_at_rest(rig);
     if (!comes_to_rest(rig, rig->now_us + SETTLE_US)) {
         oracle_fail(&rig->oracle, rig->now_us, RULE_RESTLESS, "nobody drives, but it does not come to rest");
     }

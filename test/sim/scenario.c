@@ -62,6 +62,7 @@ static const draw_t draws[EV_KINDS] = {
     [EV_ONE_ESTOP] = {"software e-stop", 0, 0, 0, 0, SCENARIO_CLIENTS},
     [EV_DISCONNECT] = {"client disconnects", 0, 0, 0, 0, SCENARIO_CLIENTS},
     [EV_TARE] = {"tare", 0, 0, 0, 0, 2},
+    [EV_ONE_RELEASE] = {"one release", 0, 0, 0, 0, SCENARIO_CLIENTS},
 };
 
 const char *scenario_kind_name(unsigned kind) {
@@ -121,6 +122,7 @@ static void draw_config(scenario_t *self, sim_random_t *random) {
     }
     config->hold_max_s = (uint16_t)(10U + self->seed % 3U * 8U);
     config->asymmetric_current = self->seed % 7U == 3U;
+    config->hold = self->seed % 5U == 2U;
     config->max_yaw_mrad_s = yaws[self->seed / 4U % 4U].max_mrad_s;
     config->yaw_accel_mrad_s2 = yaws[self->seed / 4U % 4U].accel_mrad_s2;
     config->track_mm = yaws[self->seed / 4U % 4U].track_mm;

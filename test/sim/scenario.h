@@ -60,6 +60,7 @@ typedef enum {
     EV_ONE_ESTOP, ///< Software e-stop.
     EV_DISCONNECT,
     EV_TARE,
+    EV_ONE_RELEASE, ///< The end of a hold.
     EV_KINDS,
 } event_kind_t;
 

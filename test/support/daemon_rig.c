@@ -277,6 +277,7 @@ void daemon_rig_start(void) {
     rig->daemon = daemon;
     gateway_config_default(&daemon->config);
     fixture_config(&daemon->config.core);
+    daemon->config.core.hold = rig->hold;
     (void)snprintf(daemon->config.bus.interface, sizeof daemon->config.bus.interface, "unix:%.60s/bus", rig->folder);
     gw_log_open(&daemon->log, GW_LOG_ERROR);
     gw_daemon_compose(daemon);

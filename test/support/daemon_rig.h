@@ -41,6 +41,7 @@ typedef struct {
     iw_time_us_t unlooked_us;    ///< For how long nobody had looked before the last setpoint's own look.
     int16_t most_mm_s;           ///< The fastest setpoint handed over since this was zero.
     bool ended;                  ///< The loop has come to its end by itself.
+    bool hold;                   ///< The next start is with after_stop = hold.
     bool full;                   ///< The bus takes no frame.
     uint32_t unmarked;           ///< Nonzero setpoints handed over while there was no crash marker.
     uint32_t sent[IW_SIDES];     ///< Setpoints handed over.

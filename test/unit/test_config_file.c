@@ -108,7 +108,7 @@ static void test_parse_every_key_reaches_its_field(void) {
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
         "max_yaw_mrad_s=900\nyaw_accel_mrad_s2=1900\nmax_current_mA=1500\nmin_current_mA=400\nasymmetric_current=yes\n"
-        "zero_hold_ms=1200\nhold_max_s=61\n[limits]\nwheel_silent_ms="
+        "zero_hold_ms=1200\nhold_max_s=61\nafter_stop=hold\n[limits]\nwheel_silent_ms="
         "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\nline2=gpiochip0:"
@@ -144,6 +144,7 @@ static void test_parse_every_key_reaches_its_field(void) {
                                310, 510, 1100, 61,   1001, 62,   900,  1900, 400, 61};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_TRUE(core->asymmetric_current);
+    TEST_ASSERT_TRUE(core->hold);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
     TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", config.estop.chip);
     TEST_ASSERT_EQUAL_STRING("GPIO4", config.estop.chip_line);

@@ -35,6 +35,7 @@ static const right_t rights[IWN_CMDS] = {
     [IWN_CMD_DISARM] = {"{\"cmd\":\"disarm\"}", true},
     [IWN_CMD_ESTOP] = {"{\"cmd\":\"estop\"}", true},
     [IWN_CMD_RESET] = {"{\"cmd\":\"reset\"}", false},
+    [IWN_CMD_RELEASE] = {"{\"cmd\":\"release\"}", false},
     [IWN_CMD_TARE] = {"{\"cmd\":\"tare\"}", false},
     [IWN_CMD_WHY] = {"{\"cmd\":\"why\"}", true},
     [IWN_CMD_RECORDINGS] = {"{\"cmd\":\"recordings\"}", true},

@@ -241,6 +241,16 @@ static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
     facts.machine.now.machine = IWC_STOPPING;
     expect(ROS_TELLS_GATEWAY, ROS_WARN, "stopping: the left wheel was lost");
+    facts.machine.holding = true;
+    expect(ROS_TELLS_GATEWAY, ROS_WARN,
+           "holding: zeros until iwheelctl release or arm; use the parking brake; the stop: "
+           "the left wheel was lost");
+    facts.machine.holding = false;
+    facts.machine.now.machine = IWC_LISTENING;
+    facts.machine.rolling = true;
+    expect(ROS_TELLS_GATEWAY, ROS_WARN,
+           "a wheel turns although nothing is sent to it: hold the machine, or use its parking brake");
+    facts.machine.rolling = false;
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "pressed");
     expect(ROS_TELLS_ESTOP, ROS_ERROR, "release the button");
     (void)snprintf(facts.machine.pressed_at, sizeof facts.machine.pressed_at, "both");

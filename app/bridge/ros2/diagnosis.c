@@ -35,6 +35,8 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
     const ros_machine_t *machine = &facts->machine;
     add(status, "lease_ms", true, machine->lease_ms);
     add(status, "odometry_restarts", true, facts->odometry_restarts);
+    add(status, "holding", true, machine->holding ? 1 : 0);
+    add(status, "rolling", true, machine->rolling ? 1 : 0);
     if (facts->link == ROS_LINK_GONE) {
         say(status, ROS_ERROR, "gateway gone: %s; wheels that it drove stop by themselves, afterwards arm again",
             facts->trouble);
@@ -43,10 +45,16 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
     } else if (machine->now.machine == IWC_LATCHED) {
         say(status, ROS_ERROR, "stopped and latched: %s; remove the cause, reset (iwheelctl reset), then arm again",
             machine->stop);
+    } else if (machine->now.machine == IWC_STOPPING && machine->holding) {
+        say(status, ROS_WARN, "holding: zeros until iwheelctl release or arm; use the parking brake; the stop: %s",
+            machine->stop);
     } else if (machine->now.machine == IWC_STOPPING) {
         say(status, ROS_WARN, "stopping: %s", machine->stop);
     } else if (machine->now.machine == IWC_ARMED) {
         say(status, ROS_OK, "armed by %s", machine->now.ours ? "this bridge" : machine->holder);
+    } else if (machine->rolling) {
+        say(status, ROS_WARN,
+            "a wheel turns although nothing is sent to it: hold the machine, or use its parking brake");
     } else if (machine->stop[0] != '\0') {
         say(status, ROS_OK, "listening, call iwheel/arm to drive; the last stop: %s", machine->stop);
     } else {

@@ -20,7 +20,7 @@ typedef enum {
     ROS_TELLS
 } ros_tells_t;
 
-#define ROS_VALUES_MAX 9U
+#define ROS_VALUES_MAX 11U
 
 typedef struct {
     const char *key; ///< With its unit.

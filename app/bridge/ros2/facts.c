@@ -18,6 +18,8 @@ bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_mach
     (void)iwc_text(message, "estop.pressed_at", out_machine->pressed_at, sizeof out_machine->pressed_at);
     out_machine->estop_tried = iwc_integer(message, "estop.tried_wall_us").known;
     out_machine->estop_simulated = iwc_truth(message, "estop.simulated").value != 0;
+    out_machine->holding = iwc_truth(message, "holding").value != 0;
+    out_machine->rolling = iwc_truth(message, "rolling").value != 0;
     (void)iwc_text(message, "bus.state", out_machine->bus, sizeof out_machine->bus);
     (void)iwc_text(message, "bus.timing", out_machine->timing, sizeof out_machine->timing);
     (void)iwc_text(message, "lease.name", out_machine->holder, sizeof out_machine->holder);

@@ -39,6 +39,8 @@ typedef struct {
     char pressed_at[16];  ///< Of two contacts: neither, line, line2, both; empty: it has one.
     bool estop_tried;     ///< Its button was seen to work on this wiring.
     bool estop_simulated; ///< It is the button of a simulator.
+    bool holding;         ///< Zeros are held until release or arm.
+    bool rolling;         ///< A wheel turns although nothing is sent to it.
     char bus[16];
     char timing[16];
     char holder[65]; ///< Name of who has the lease.

@@ -25,7 +25,8 @@ static void tell_state(const ctl_t *self, const json_t *reply) {
     } meanings[] = {
         {"listening", "listening: nothing is sent; in silence the wheels may roll"},
         {"armed", "armed: somebody drives"},
-        {"stopping", "stopping: ramp to zero, zeros until both wheels are at rest, then silence"},
+        {"stopping",
+         "stopping: ramp to zero, zeros until both wheels are at rest, then silence, or zeros with after_stop = hold"},
         {"latched", "latched: zero; only a reset leaves this state (see: iwheelctl status)"},
     };
     if (!self->json) {
@@ -80,6 +81,13 @@ int verb_reset(ctl_t *self, int count, char **words) {
         return CTL_USAGE;
     }
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
+}
+
+int verb_release(ctl_t *self, int count, char **words) {
+    if (!words_at_most("release", count, 0, words)) {
+        return CTL_USAGE;
+    }
+    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "release"));
 }
 
 /// "left: zero is 12.318 N now (40 samples, 0.110 N noise); it was 12.300 N (wheel)".

@@ -133,6 +133,7 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
         out->a = flag(line, "takeover");
         return take_refusal(line, &out->b);
     case BLACKBOX_RESET:
+    case BLACKBOX_RELEASE:
         return take_refusal(line, &out->b);
     case BLACKBOX_STOP:
         return take_word(line, "cause", cause_name, IW_CAUSES, &out->a);

@@ -255,6 +255,9 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
     case BLACKBOX_RESET:
         request(self, entry, iw_gateway_reset(gateway, entry->at_us));
         break;
+    case BLACKBOX_RELEASE:
+        request(self, entry, iw_gateway_release(gateway));
+        break;
     case BLACKBOX_STOP:
         replay_tell_request(self, entry, IW_REFUSE_NONE);
         iw_gateway_stop(gateway, entry->at_us, entry->number, (iw_cause_t)entry->a);

@@ -178,6 +178,9 @@ void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refus
     case BLACKBOX_RESET:
         tell(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
         break;
+    case BLACKBOX_RELEASE:
+        tell(self, entry->at_us, "release", "client %u: %s", (unsigned)entry->number, result);
+        break;
     case BLACKBOX_STOP:
         tell(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
         break;

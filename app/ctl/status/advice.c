@@ -137,6 +137,8 @@ void advice_collect(const json_t *status, advice_t *out_advice) {
         advise_listening(status, out_advice);
     } else if (strcmp(state, "armed") == 0) {
         add(out_advice, "the wheels obey the holder of the lease; iwheelctl stop ends that");
+    } else if (strcmp(state, "stopping") == 0 && json_is_true(json_object_get(status, "holding"))) {
+        add(out_advice, "zeros hold the wheels; end that: iwheelctl release, and the machine may roll; or arm again");
     } else if (strcmp(state, "stopping") == 0) {
         add(out_advice, "%s", known ? cure : "wait until both wheels are at rest, then arm again");
     } else if (strcmp(state, "latched") == 0) {

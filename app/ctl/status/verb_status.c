@@ -35,6 +35,9 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     if (json_is_string(get(status, "cause"))) {
         paper_say(paper, state_tone(state), " (%.32s)", text_word(status, "cause"));
     }
+    if (json_is_true(get(status, "holding"))) {
+        paper_say(paper, TONE_CARE, ", holding");
+    }
     paper_end(paper);
     for (unsigned i = 0; i < advice.lines; i++) {
         paper_wrap(paper, (i == 0) ? "next" : "", TONE_TITLE, advice.line[i]);

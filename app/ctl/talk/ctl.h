@@ -36,6 +36,7 @@ int verb_drive(ctl_t *self, int count, char **words);
 int verb_stop(ctl_t *self, int count, char **words);
 int verb_estop(ctl_t *self, int count, char **words);
 int verb_reset(ctl_t *self, int count, char **words);
+int verb_release(ctl_t *self, int count, char **words);
 int verb_tare(ctl_t *self, int count, char **words);
 int verb_why(ctl_t *self, int count, char **words);
 int verb_ledger(ctl_t *self, int count, char **words);

@@ -67,7 +67,7 @@ static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client
     gw_clients_send_reply(client, &json);
 }
 
-/// An arm or a reset that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
+/// An arm, a reset or a release that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
 static bool refuse_waited(const gw_call_t *call) {
     static const iwn_refusal_t refusal = {
         IWN_STALE_COMMAND,
@@ -258,19 +258,29 @@ static void do_estop(const gw_call_t *call) {
     reply_state(call);
 }
 
-static void do_reset(const gw_call_t *call) {
-    gw_wheels_t *wheels = call->answers->wheels;
-    if (refuse_waited(call)) {
-        return;
-    }
-    const iw_refusal_t refusal = iw_gateway_reset(&wheels->core, wheels->now_us);
-    note(call, &(blackbox_entry_t){.kind = BLACKBOX_RESET, .b = (uint8_t)refusal});
+/// What the core has made of a request of that kind, and the state after it.
+static void reply_judged(const gw_call_t *call, blackbox_kind_t kind, iw_refusal_t refusal) {
+    note(call, &(blackbox_entry_t){.kind = (uint8_t)kind, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
     }
-    wheels->requested = true;
+    call->answers->wheels->requested = true;
     reply_state(call);
+}
+
+static void do_reset(const gw_call_t *call) {
+    gw_wheels_t *wheels = call->answers->wheels;
+    if (!refuse_waited(call)) {
+        reply_judged(call, BLACKBOX_RESET, iw_gateway_reset(&wheels->core, wheels->now_us));
+    }
+}
+
+/// It permits motion as `arm` does: in time, and not behind a stop of somebody else.
+static void do_release(const gw_call_t *call) {
+    if (!refuse_waited(call)) {
+        reply_judged(call, BLACKBOX_RELEASE, iw_gateway_release(&call->answers->wheels->core));
+    }
 }
 
 static void do_tare(const gw_call_t *call) {
@@ -350,6 +360,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         [IWN_CMD_DISARM] = do_stop,
         [IWN_CMD_ESTOP] = do_estop,
         [IWN_CMD_RESET] = do_reset,
+        [IWN_CMD_RELEASE] = do_release,
         [IWN_CMD_TARE] = do_tare,
         [IWN_CMD_WHY] = do_why,
         [IWN_CMD_CONFIRM] = do_confirm,

@@ -21,6 +21,7 @@
 #define REST_RULE "rule R15, a wheel that rolls must not count as at rest"
 
 static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+static const settings_word_t release_hold[] = {{"release", 0}, {"hold", 1}, {NULL, 0}};
 static const settings_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};
 static const settings_word_t low_high[] = {{"low", 0}, {"high", 1}, {NULL, 0}};
 static const settings_word_t mismatch[] = {
@@ -138,6 +139,11 @@ static const settings_key_t keys[] = {
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
     {"drive", "hold_max_s", " s", "With a wheel still moving zeros go on, but end after this: then the parking brake.",
      CORE(hold_max_s, IW_CONFIG_HOLD_MAX)},
+    {"drive", "after_stop", "",
+     "release: silence when the zeros after a stop end, and the wheels may roll. hold: zeros until iwheelctl release "
+     "or\n"
+     "arm, also in a latch; not against another sender of setpoints. The parking brake is not replaced.",
+     WORD(core.hold, release_hold)},
 
     {"limits", "wheel_silent_ms", " ms",
      "A wheel not heard for this long is lost; raise it for adapters that deliver late.",
@@ -207,7 +213,8 @@ static const settings_key_t keys[] = {
     {"northbound", "max_watchers", " clients", "Connections to it at the same time; they take none of max_clients.",
      NUMBER(northbound.max_watchers, 1, 64)},
     {"northbound", "max_age_ms", " ms",
-     "An arm, reset or confirm that says since when it is wanted (t_us) may be so old; an older one is refused.",
+     "An arm, reset, release or confirm that says since when it is wanted (t_us) may be so old; an older one is "
+     "refused.",
      NUMBER(northbound.max_age_ms, 200, 2000)},
 
     {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",

@@ -133,6 +133,7 @@ static void put_request(iwn_out_t *json, const blackbox_entry_t *entry) {
         iwn_out_text(json, "cause", iwn_cause_name((iw_cause_t)entry->a));
         break;
     case BLACKBOX_RESET:
+    case BLACKBOX_RELEASE:
         put_refusal(json, entry->b);
         break;
     case BLACKBOX_LEDGER:
@@ -169,6 +170,7 @@ size_t gw_box_line_entry(const blackbox_entry_t *entry, uint64_t frames, char ou
     case BLACKBOX_STOP:
     case BLACKBOX_ESTOPPED:
     case BLACKBOX_RESET:
+    case BLACKBOX_RELEASE:
     case BLACKBOX_GONE:
     case BLACKBOX_TARE:
     case BLACKBOX_LEDGER:

@@ -30,12 +30,19 @@ static iwn_out_t begin_event(gw_status_t *self, const char *name) {
 
 static void observe_state(gw_status_t *self, const iw_snapshot_t *seen, bool first) {
     const iw_state_t state = seen->state;
-    if (state == self->observed.state && !first) {
+    const bool changed = state != self->observed.state || first;
+    if (!changed && seen->holding == self->observed.holding) {
         return;
     }
-    gw_log(self->log, GW_LOG_INFO, "state: %s", iwn_state_name(state));
-    gw_wheels_note_state(self->wheels, seen, first ? state : self->observed.state);
+    if (changed) {
+        gw_log(self->log, GW_LOG_INFO, "state: %s", iwn_state_name(state));
+        gw_wheels_note_state(self->wheels, seen, first ? state : self->observed.state);
+    }
+    if (seen->holding != self->observed.holding) {
+        gw_log(self->log, GW_LOG_INFO, seen->holding ? "holding: zeros until release or arm" : "holding: no longer");
+    }
     self->observed.state = state;
+    self->observed.holding = seen->holding;
     iwn_out_t json = gw_clients_begin_event(self->clients, "state");
     gw_snapshot_write(self, &json);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_STATE);

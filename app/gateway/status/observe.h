@@ -28,6 +28,7 @@ typedef struct {
     uint32_t still_moving;
     bool left_behind;
     bool zeros_ending;
+    bool holding;
     bool rolling;
     bool rolling_fault;      ///< As told, which is not every one.
     iw_time_us_t rolling_us; ///< When the last fault of that kind was told; 0: none yet.

@@ -60,6 +60,10 @@ iwn_surroundings_t gw_snapshot_around(const gw_status_t *status, const iw_snapsh
     for (uint32_t i = 0; i < wheels->warnings; i++) {
         around.warning[i] = wheels->warning[i];
     }
+    if (seen->holding && around.warnings < IWN_WARNINGS) {
+        around.warning[around.warnings++] = "zeros hold the wheels until release (iwheelctl release) or arm; without "
+                                            "them the machine may roll: use its parking brake";
+    }
     if (seen->rolling && around.warnings < IWN_WARNINGS) {
         around.warning[around.warnings++] =
             "a wheel turns although nothing is sent to it; hold the machine, or use its parking brake";

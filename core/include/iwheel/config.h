@@ -20,6 +20,7 @@ typedef struct {
     bool setpoint_type_set;         ///< The wheels do not move until this is true.
     bool rpm_of_rotor;              ///< The rpm in telemetry are the rotor's, not the wheel's.
     bool listen_only;               ///< Nothing is ever sent; arm is refused.
+    bool hold;                      ///< Zeros after a stop or a latch end only by `iw_gateway_release` or arm.
     bool asymmetric_current;        ///< IW_ROLE_LIMIT: a client may limit one wheel lower than the other.
     iw_current_role_t current_role; ///< The wheels do not move while it is IW_ROLE_UNSET.
     bool invert[IW_SIDES];          ///< This wheel is mounted mirrored: negate its speed, both ways.

@@ -11,7 +11,7 @@
 ///
 /// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
 ///
-/// R1 to R17 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R19 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
@@ -128,6 +128,10 @@ void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t clien
 
 /// Leaves the latch, if nothing speaks against it.
 iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// Ends a hold (`iw_config_t::hold`): from now on time ends the zeros, as without it. It permits motion: on a slope the
+/// machine rolls. Refused as IW_REFUSE_NOT_AT_REST while the wheels are driven, ramp down, or wait to be armed.
+iw_refusal_t iw_gateway_release(iw_gateway_t *self);
 
 /// A client's connection ended.
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);

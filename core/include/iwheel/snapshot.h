@@ -87,6 +87,7 @@ typedef struct {
     bool arming;              ///< An arm that was granted waits for its TX confirmation.
     bool output_zero;         ///< The pair last sent was zero, or a stop without ramp has made the next one so.
     bool echo_proven;         ///< See `iw_bus_facts_t`.
+    bool holding;             ///< Zeros are held without limit of time, in STOPPING or LATCHED: until release or arm.
     bool zeros_ending;  ///< A wheel still moves after a stop, and in 5 s at the latest nothing is sent to it any more.
     bool rolling;       ///< A wheel turns faster than 100 mm/s and nothing is sent to it.
     bool rolling_fault; ///< That began within 10 s after the last setpoint: the machine rolls away.

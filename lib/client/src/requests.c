@@ -364,3 +364,10 @@ iwc_result_t iwc_reset_as(iwc_t *self, const iwc_reset_t *reset, int timeout_ms)
     add(&request, "}");
     return iwc_ask(self, request.text, timeout_ms, NULL);
 }
+
+iwc_result_t iwc_release(iwc_t *self, iwc_value_t t_us, int timeout_ms) {
+    request_t request = begin_request("release");
+    add_known(&request, "t_us", t_us);
+    add(&request, "}");
+    return iwc_ask(self, request.text, timeout_ms, NULL);
+}

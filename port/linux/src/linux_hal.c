@@ -104,6 +104,37 @@ int iw_linux_hal_pressed(iw_linux_hal_t *self) {
     return self->estop_last;
 }
 
+static int hal_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
+    return iw_bus_send(&((iw_linux_hal_t *)context)->bus, frames, count);
+}
+
+static int hal_receive(void *context, iw_can_frame_t *out_frame) {
+    return iw_bus_receive(&((iw_linux_hal_t *)context)->bus, out_frame);
+}
+
+static iw_bus_state_t hal_bus_state(void *context) {
+    return iw_bus_state(&((iw_linux_hal_t *)context)->bus);
+}
+
+static int hal_purge(void *context) {
+    return iw_bus_purge(&((iw_linux_hal_t *)context)->bus);
+}
+
+static int hal_estop_pressed(void *context) {
+    return iw_linux_hal_pressed((iw_linux_hal_t *)context);
+}
+
+iw_hal_t iw_linux_hal(iw_linux_hal_t *self) {
+    return (iw_hal_t){
+        .send = hal_send,
+        .receive = hal_receive,
+        .bus_state = hal_bus_state,
+        .purge = hal_purge,
+        .estop_pressed = hal_estop_pressed,
+        .context = self,
+    };
+}
+
 int iw_linux_hal_bus_fd(const iw_linux_hal_t *self) {
     return iw_bus_fd(&self->bus);
 }

@@ -337,6 +337,9 @@ class AsyncGateway:
     async def reset(self) -> State:
         return cast(State, (await self._ask("reset"))["state"])
 
+    async def release(self) -> State:
+        return cast(State, (await self._ask("release"))["state"])
+
     async def tare(self, side: Optional[str] = None) -> Tared:
         return cast(Tared, without_envelope(await self._ask("tare", side=side)))
 

@@ -141,6 +141,10 @@ class Gateway:
         """Leaves the latch, if its cause is gone. Moves nothing."""
         return cast(State, self._ask("reset")["state"])
 
+    def release(self) -> State:
+        """Ends a hold (`after_stop = hold`): on a slope the wheels roll then. Set the parking brake first."""
+        return cast(State, self._ask("release")["state"])
+
     def tare(self, side: Optional[str] = None) -> Tared:
         """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing.
 

@@ -338,6 +338,8 @@ class Status(TypedDict):
     pair: Pair
     counters: Counters
     clients: int
+    holding: bool
+    """zeros are held without limit of time, until `release` or `arm` (key after_stop)"""
     rolling: bool
     """a wheel turns faster than 100 mm/s and nothing is sent to it"""
     listen_only: bool

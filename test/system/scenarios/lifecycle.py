@@ -12,6 +12,8 @@ from harness import Process, now_us
 from judge_log import LEFT, RIGHT, Event
 from scenario import scenario
 
+from .bus_faults import wait_reset
+
 
 def crash(t, number):
     rig, client = t.running()
@@ -50,6 +52,34 @@ def crash(t, number):
 @scenario("kill -9 while driving, restarted: zeros first", 12)
 def row25_killed(t):
     crash(t, signal.SIGKILL)
+
+
+@scenario("after_stop = hold: zeros until release, through a reset and a kill -9", 14)
+def hold_until_release(t):
+    rig, client = t.running({"drive": {"after_stop": "hold"}})
+    t.arm(client)
+    t.drive_for(client, 300, 300, 0.8)
+    t.expect(client.request("estop"))
+    time.sleep(4)
+    t.check(client.request("status")["holding"], "a latch is held")
+    wait_reset(t, client)
+    time.sleep(1)
+    status = client.request("status")
+    t.check(status["holding"] and status["state"] == "stopping", f"a reset ends the latch, not the hold: {status['state']}")
+    rig.kill_gateway(signal.SIGKILL)
+    client.close()
+    rig.start_gateway(wheels=False, restart_hold=True)
+    client = rig.client("again")
+    time.sleep(3)
+    t.check(client.request("status")["holding"], "the next start resumes it")
+    sent = [at for at, _, _ in rig.bus.setpoints(now_us() - 1_000_000)]
+    t.check(len(sent) > 90 and max(b - a for a, b in zip(sent, sent[1:])) < 100_000, f"{len(sent)} zeros in a second, without a gap")
+    t.expect(client.request("release"))
+    time.sleep(0.2)
+    begin_us = now_us()
+    time.sleep(1)
+    t.check(not rig.bus.setpoints(begin_us), "silence after release")
+    t.check(client.request("status")["state"] == "listening", "and it listens")
 
 
 @scenario("abort while driving, restarted: zeros first", 12)

@@ -140,6 +140,7 @@ function presentAdvice(state) {
 function advise(state) {
   const next = STRINGS.next, cure = state.cause ? cureOf(state, state.cause) : null;
   if (state.state === "armed") return [next.armed];
+  if (state.state === "stopping" && state.holding) return [next.holding];
   if (state.state === "stopping") return [cure ?? next.stopping];
   if (state.state === "latched") return [fill(next.latched, { cure: cure ?? next.remove }), ...presentAdvice(state)].slice(0, 6);
   if (state.state !== "listening") return [next.newer];
@@ -202,7 +203,8 @@ function tried(estop) {
 }
 
 function showState(state) {
-  const word = state.arming ? STRINGS.state_arming : STRINGS.states[state.state] ?? state.state;
+  const known = state.arming ? STRINGS.state_arming : STRINGS.states[state.state] ?? state.state;
+  const word = state.holding ? fill(STRINGS.state_holding, { state: known }) : known;
   text("state", state.cause ? `${word} (${state.cause})` : word, state.state === "latched" ? "bad" : state.state === "listening" ? "" : "care");
   list("advice", advise(state));
   const { estop, bus, lease, budget } = state;

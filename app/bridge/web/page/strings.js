@@ -134,10 +134,12 @@ const STRINGS = {
   player_label: "Time in the recording",
   ledger_head: ["Assumption", "State", "Value", "Evidence"],
   disabled: "disabled: {what}",
+  state_holding: "{state}, holding",
   states: { listening: "listening", armed: "armed", stopping: "stopping", latched: "latched" },
   next: {
     armed: "the wheels obey the holder of the lease; iwheelctl stop ends that",
     stopping: "wait until both wheels are at rest, then arm again",
+    holding: "zeros hold the wheels; end that: iwheelctl release, and the machine may roll; or arm again",
     latched: "{cure}, then: iwheelctl reset",
     remove: "remove the cause",
     ready: "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels",

@@ -27,6 +27,10 @@
 /// remembered, to refuse arm and reset while present; some only stop. RESTARTING sends zeros for a process that died,
 /// and nothing but those is ours yet: there only what latches in every state latches.
 ///
+/// With `iw_config_t::hold` (R19) time ends neither HOLDING nor CUT; held RESTARTING becomes HOLDING, and `reset` leads
+/// from CUT to HOLDING. Another sender's setpoint ends that, `iw_permit_release`, and the end of the gateway: from then
+/// on time ends the zeros as without it.
+///
 /// The lease is fed by accepted drive commands and by nothing else.
 #ifndef IW_PERMIT_H
 #define IW_PERMIT_H
@@ -79,6 +83,7 @@ typedef struct {
     uint8_t strangers;          ///< Setpoints of other senders counted in RESTARTING.
     bool quiet;                 ///< No latching cause is there or happened lately: nothing to look for.
     bool at_once;               ///< BRAKING, CUT and what follows: zero without ramp.
+    bool kept;                  ///< Time does not end the zeros that follow: not before release.
     iw_permit_view_t view;      ///< Of the last step, by the owner: requests are judged by it.
     iw_client_t stale_client;   ///< Who sent the last nonzero drive.
     iw_client_t holder;         ///< Of the lease; IW_CLIENT_NONE: nobody.
@@ -158,6 +163,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
 void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
 
 /// Somebody wants a stop without a latch: IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN. Needs no lease. Ends arming.
+/// SHUTDOWN releases too.
 void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);
 
 /// A client's connection ended.
@@ -165,6 +171,13 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
 
 /// Leaves LATCHED for LISTENING if nothing speaks against it; not latched, it changes nothing and is not refused.
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us);
+
+/// From now on time ends the zeros that are held. Refused as IW_REFUSE_NOT_AT_REST before they are: while the wheels
+/// are driven, ramp down, or wait to be armed. Without a hold it changes nothing and is not refused.
+iw_refusal_t iw_permit_release(iw_permit_t *self);
+
+/// Zeros are held, and time does not end that.
+bool iw_permit_holding(const iw_permit_t *self);
 
 /// Bit per latching cause that keeps reset from succeeding now (present, or event-like and seen less than
 /// IW_PERMIT_EVENT_US ago).

@@ -355,6 +355,10 @@ typedef struct {
 /// As `iwc_reset`; refused ("stale_command") if another stop is the last one, or the request is too old. As `iwc_ask`.
 IWC_API iwc_result_t iwc_reset_as(iwc_t *self, const iwc_reset_t *reset, int timeout_ms);
 
+/// Ends a hold of zeros (after_stop = hold): on a slope the wheels roll then. Only on the socket that may drive. `t_us` as of
+/// `iwc_arm_t`. As `iwc_ask`.
+IWC_API iwc_result_t iwc_release(iwc_t *self, iwc_value_t t_us, int timeout_ms);
+
 #ifdef __cplusplus
 }
 #endif

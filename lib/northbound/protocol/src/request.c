@@ -10,16 +10,16 @@ typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind
 /// A field that some commands have. `cmd` and `id` are common to all and treated apart.
 typedef struct {
     const char *name;
-    uint16_t offset;  ///< Of the value in iwn_request_t.
-    uint16_t max;     ///< Of a text, in bytes.
-    uint16_t allowed; ///< Bit per iwn_cmd_t.
-    bool required;
-    uint8_t kind; ///< field_kind_t
+    uint32_t allowed : 24; ///< Bit per iwn_cmd_t.
+    uint32_t kind : 7;     ///< field_kind_t
+    uint32_t required : 1;
+    uint16_t offset; ///< Of the value in iwn_request_t.
+    uint16_t max;    ///< Of a text, in bytes.
 } field_t;
 
 #define BIT(cmd) (1U << IWN_CMD_##cmd)
 #define ROW(name, member, kind, bytes, required, allowed)                                                              \
-    {#name, offsetof(iwn_request_t, member), bytes, allowed, required, kind},
+    {#name, allowed, kind, required, offsetof(iwn_request_t, member), bytes},
 #define INDEX(name, member, kind, bytes, required, allowed) FIELD_##member,
 #define HAS_ROOM(name, member, kind, bytes, required, allowed)                                                         \
     &&((bytes) == 0 || sizeof(((iwn_request_t *)0)->member) == (bytes) + 1U)
@@ -31,7 +31,7 @@ enum { IWN_REQUEST_FIELDS(INDEX) FIELDS };
 static const char *const cmd_names[] = {IWN_REQUEST_NAMES(NAME)};
 IW_STATIC_ASSERT(sizeof cmd_names / sizeof cmd_names[0] == IWN_CMDS, a_name_for_each_command);
 IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
-IW_STATIC_ASSERT(IWN_CMDS <= 16 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
+IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
 
 #define REFUSE(refusal, error, ...) refuse((refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
 #define NOT_PLAIN                                                                                                      \
@@ -305,7 +305,7 @@ static bool read_fields(iwn_json_t root, iwn_request_t *request, uint32_t *out_s
 /// Every field that must be there is.
 static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *out_refusal) {
     for (unsigned i = 0; i < FIELDS; i++) {
-        const bool needed = fields[i].required && (fields[i].allowed & 1U << request->cmd) != 0U;
+        const bool needed = fields[i].required != 0U && (fields[i].allowed & 1U << request->cmd) != 0U;
         if (needed && (seen & 1U << i) == 0U) {
             return REFUSE(out_refusal, IWN_MISSING_FIELD, cmd_names[request->cmd], " needs ", fields[i].name);
         }

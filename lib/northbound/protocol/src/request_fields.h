@@ -15,6 +15,7 @@
     NAME(disarm)                                                                                                       \
     NAME(estop)                                                                                                        \
     NAME(reset)                                                                                                        \
+    NAME(release)                                                                                                      \
     NAME(tare)                                                                                                         \
     NAME(why)                                                                                                          \
     NAME(confirm)                                                                                                      \
@@ -28,7 +29,7 @@
     ROW(rate_hz, rate_hz, RATE, 0, false, BIT(WATCH))                                                                  \
     ROW(name, name, TEXT, 64, false, BIT(ARM))                                                                         \
     ROW(takeover, takeover, FLAG, 0, false, BIT(ARM))                                                                  \
-    ROW(t_us, t_us, INTEGER, 0, false, BIT(ARM) | BIT(RESET) | BIT(CONFIRM))                                           \
+    ROW(t_us, t_us, INTEGER, 0, false, BIT(ARM) | BIT(RESET) | BIT(RELEASE) | BIT(CONFIRM))                            \
     ROW(left_mm_s, left_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                            \
     ROW(right_mm_s, right_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                          \
     ROW(left_mA, left_mA, INTEGER, 0, false, BIT(DRIVE))                                                               \

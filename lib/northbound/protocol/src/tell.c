@@ -227,6 +227,7 @@ void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, 
     write_pair(seen, json);
     write_counters(seen, json);
     iwn_out_int(json, "clients", around->clients);
+    iwn_out_bool(json, "holding", seen->holding);
     iwn_out_bool(json, "rolling", seen->rolling);
     iwn_out_bool(json, "listen_only", seen->config->listen_only);
     iwn_out_bool(json, "shutting_down", around->shutting_down);

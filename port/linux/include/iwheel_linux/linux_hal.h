@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// A bus and an e-stop input, opened and tended together: what a HAL for the core is made of. Whoever makes that HAL
-/// passes frames by the functions of backend.h.
+/// A bus and an e-stop input, opened and tended together, as one HAL for the core.
 ///
 /// A loss or an edge is reported once: asking a second time would take it from the core.
 #ifndef IWHEEL_LINUX_HAL_H
@@ -30,6 +29,9 @@ int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop
                       const char **out_culprit);
 /// Closes both.
 void iw_linux_hal_close(iw_linux_hal_t *self);
+
+/// The table of functions for the core. It is valid, as `self` is, until the HAL is closed; `self` must not move.
+iw_hal_t iw_linux_hal(iw_linux_hal_t *self);
 
 /// As `estop_pressed` of iw_hal_t.
 int iw_linux_hal_pressed(iw_linux_hal_t *self);

@@ -28,7 +28,7 @@ typedef struct {
     bool shutting_down;        ///< Nobody can arm any more.
 } iwn_refuse_context_t;
 
-/// The limit of the age of `arm`, `reset` and `confirm` where none is configured.
+/// The limit of the age of `arm`, `reset`, `release` and `confirm` where none is configured.
 #define IWN_MAX_AGE_MS 1000U
 /// A request may be ahead of the gateway's clock by so much: clocks of one machine are read one after the other.
 #define IWN_AHEAD_MAX_US 100000U

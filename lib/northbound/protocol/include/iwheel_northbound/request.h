@@ -33,6 +33,7 @@ typedef enum {
     IWN_CMD_DISARM,
     IWN_CMD_ESTOP,
     IWN_CMD_RESET,
+    IWN_CMD_RELEASE,
     IWN_CMD_TARE,
     IWN_CMD_WHY,
     IWN_CMD_CONFIRM,
@@ -70,7 +71,7 @@ typedef struct {
     int64_t yaw_mrad_s;                     ///< Of twist: positive to the left.
     int64_t rate_hz;                        ///< At least 1; not limited yet.
     int64_t offset;                         ///< Of recording, in bytes; may be negative.
-    int64_t t_us;                           ///< Of arm, reset and confirm, with `has_t_us`: since when it is wanted.
+    int64_t t_us;                           ///< Of arm, reset, release and confirm, with `has_t_us`: since when.
     int64_t stop;                           ///< Of reset, with `has_stop`: the number of the stop that is meant.
     bool has_t_us;                          ///< `t_us` was given.
     bool has_stop;                          ///< `stop` was given.

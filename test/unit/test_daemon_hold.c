@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+// after_stop = hold through the daemon, in virtual time: zeros, the crash marker, the request that ends it, the end of the process.
+#include "daemon_client.h"
+
+#include "unity.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static void begin_again(void) {
+    daemon_rig.hold = true;
+    (void)close(client);
+    daemon_rig_crash();
+    daemon_rig_start();
+    daemon_rig_run(1000);
+    client = daemon_rig_connect();
+}
+
+static bool holds(void) {
+    return strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "\"holding\":true,") != NULL;
+}
+
+static void drive_and_stop(void) {
+    begin_again();
+    daemon_rig_begin_driving(client);
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    daemon_rig_run(5000);
+}
+
+static void assert_held(iw_state_t state, unsigned for_ms) {
+    for (unsigned ms = 0; ms < for_ms; ms += 50U) {
+        daemon_rig_run(50);
+        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us < MS(100));
+        TEST_ASSERT_TRUE(daemon_rig_marked());
+    }
+    TEST_ASSERT_EQUAL_INT(state, daemon_rig_state());
+    TEST_ASSERT_TRUE(holds());
+}
+
+static void assert_silent(iw_state_t state) {
+    daemon_rig_run(200);
+    const uint32_t before = daemon_rig.sent[IW_LEFT];
+    daemon_rig_run(2000);
+    TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(state, daemon_rig_state());
+    TEST_ASSERT_FALSE(holds());
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static const char *aged_release(int64_t age_ms) {
+    static char line[96];
+    (void)snprintf(line, sizeof line, "{\"cmd\":\"release\",\"t_us\":%lld}",
+                   (long long)daemon_rig.now_us - (long long)age_ms * 1000);
+    return line;
+}
+
+static void test_hold_lasts_until_release_and_so_does_its_marker(void) {
+    drive_and_stop();
+    assert_held(IW_STATE_STOPPING, 120000);
+    assert_reply("{\"cmd\":\"status\"}", "\"zeros hold the wheels until release (iwheelctl release) or arm;");
+    assert_reply("{\"cmd\":\"release\"}", "\"ok\":true");
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_hold_of_a_latch_outlives_its_reset(void) {
+    begin_again();
+    daemon_rig_begin_driving(client);
+    daemon_rig.estop = 1;
+    daemon_rig_run(5000);
+    assert_held(IW_STATE_LATCHED, 10000);
+    daemon_rig.estop = 0;
+    daemon_rig_run(2000);
+    assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true");
+    assert_held(IW_STATE_STOPPING, 10000);
+    assert_reply("{\"cmd\":\"release\"}", "\"ok\":true");
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_hold_is_resumed_by_the_next_start(void) {
+    drive_and_stop();
+    daemon_rig_crash();
+    daemon_rig_start();
+    daemon_rig_run(2000);
+    (void)close(client);
+    client = daemon_rig_connect();
+    assert_held(IW_STATE_STOPPING, 60000);
+    daemon_rig_arm(client);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static void test_hold_ends_with_the_process_which_warns(void) {
+    drive_and_stop();
+    daemon_rig_keep_log();
+    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+    daemon_rig_run(200);
+    TEST_ASSERT_TRUE(daemon_rig.ended);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "use its parking brake"));
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static void test_release_that_is_too_old_changes_nothing(void) {
+    static const int64_t late_ms[] = {1001, 1100, 60000};
+    drive_and_stop();
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_reply(aged_release(late_ms[i]), "\"error\":\"stale_command\"");
+    }
+    assert_held(IW_STATE_STOPPING, 5000);
+    assert_reply(aged_release(999), "\"ok\":true");
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_release_from_before_a_stop_of_somebody_else_changes_nothing(void) {
+    drive_and_stop();
+    const int other = daemon_rig_connect();
+    daemon_rig_run(20);
+    (void)daemon_rig_ask(other, "{\"cmd\":\"stop\"}");
+    daemon_rig_run(100);
+    assert_reply(aged_release(500), "\"error\":\"stale_command\"");
+    assert_held(IW_STATE_STOPPING, 5000);
+    (void)close(other);
+}
+
+static void test_release_is_refused_to_who_only_watches_and_while_somebody_drives(void) {
+    drive_and_stop();
+    const int watcher = daemon_rig_connect_with(GW_WATCH);
+    daemon_rig_run(20);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(watcher, "{\"cmd\":\"release\"}"), "\"error\":\"denied\""));
+    assert_held(IW_STATE_STOPPING, 5000);
+    daemon_rig_arm(client);
+    assert_reply("{\"cmd\":\"release\"}", "\"error\":\"not_at_rest\"");
+    (void)close(watcher);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_hold_lasts_until_release_and_so_does_its_marker);
+    RUN_TEST(test_hold_of_a_latch_outlives_its_reset);
+    RUN_TEST(test_hold_is_resumed_by_the_next_start);
+    RUN_TEST(test_hold_ends_with_the_process_which_warns);
+    RUN_TEST(test_release_that_is_too_old_changes_nothing);
+    RUN_TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing);
+    RUN_TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives);
+    return UNITY_END();
+}

@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: MIT
+// after_stop = hold: zeros after a stop or a latch end by release, arm, another master or the end of the gateway, and by nothing else.
+#include "permit_rig.h"
+#include "unity.h"
+
+static permit_rig_t rig;
+
+#define DAY_US ((iw_time_us_t)86400U * 1000000U)
+
+void setUp(void) {
+    permit_rig_init(&rig);
+    rig.config.hold = true;
+}
+
+void tearDown(void) {}
+
+static void assert_held_for_a_day(iw_state_t state) {
+    permit_rig_wait(&rig, DAY_US);
+    TEST_ASSERT_EQUAL_INT(state, iw_permit_state(&rig.permit));
+    TEST_ASSERT_TRUE(iw_permit_demand(&rig.permit) != IW_DEMAND_SILENCE);
+    TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
+    TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void assert_silent(iw_state_t state) {
+    TEST_ASSERT_EQUAL_INT(state, iw_permit_state(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+}
+
+static void calm(void) {
+    rig.view.at_rest = true;
+    rig.view.settled = true;
+    rig.view.output_zero = true;
+}
+
+static void release(void) {
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_release(&rig.permit));
+    permit_rig_step(&rig);
+}
+
+static void test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    calm();
+    assert_held_for_a_day(IW_STATE_STOPPING);
+}
+
+static void test_permit_keep_latched_zeros_have_no_end(void) {
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    assert_held_for_a_day(IW_STATE_LATCHED);
+}
+
+static void test_permit_keep_begins_when_the_ramp_has_ended(void) {
+    permit_rig_begin(&rig, PERMIT_STOPPING);
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
+    rig.view.output_zero = true;
+    permit_rig_step(&rig);
+    TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
+}
+
+static void test_permit_keep_is_not_there_unless_configured(void) {
+    rig.config.hold = false;
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+}
+
+static void test_permit_keep_ends_by_release(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    release();
+    assert_silent(IW_STATE_LISTENING);
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    calm();
+    assert_held_for_a_day(IW_STATE_LATCHED);
+    release();
+    assert_silent(IW_STATE_LATCHED);
+}
+
+/// As without a hold: first the wheels' own second is over, and they stand.
+static void test_permit_keep_released_early_ends_as_without_it(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    release();
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    permit_rig_wait(&rig, MS(1500) - 1U);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    permit_rig_wait(&rig, 1);
+    assert_silent(IW_STATE_LISTENING);
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    release();
+    permit_rig_wait(&rig, MS(59999));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
+    permit_rig_wait(&rig, MS(1));
+    assert_silent(IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+}
+
+static void test_permit_keep_release_is_refused_while_somebody_drives_or_arms(void) {
+    static const permit_situation_t refused[] = {PERMIT_ARMING, PERMIT_ARMED, PERMIT_STOPPING};
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        permit_rig_begin(&rig, refused[i]);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
+        permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+        assert_held_for_a_day(IW_STATE_LATCHED);
+    }
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(600));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
+}
+
+static void test_permit_keep_release_in_silence_changes_nothing(void) {
+    release();
+    assert_silent(IW_STATE_LISTENING);
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    assert_silent(IW_STATE_LATCHED);
+    release();
+    assert_silent(IW_STATE_LATCHED);
+}
+
+static void test_permit_keep_latch_out_of_silence_is_silent(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(2000));
+    release();
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    assert_silent(IW_STATE_LATCHED);
+}
+
+static void test_permit_keep_reset_ends_the_latch_and_not_the_hold(void) {
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    permit_rig_wait(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    release();
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_permit_keep_no_other_request_ends_it(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
+    iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_arm(&rig, HOLDER));
+    assert_held_for_a_day(IW_STATE_STOPPING);
+}
+
+static void test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    permit_rig_wait(&rig, MS(50));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    rig.view.proven = true;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+}
+
+static void test_permit_keep_ends_with_the_gateway(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    calm();
+    permit_rig_step(&rig);
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_wait(&rig, MS(1500));
+    assert_silent(IW_STATE_LATCHED);
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    permit_rig_step(&rig);
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_permit_keep_gives_way_to_a_second_master(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    permit_rig_wait(&rig, MS(1500) - 1U);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    permit_rig_wait(&rig, 1);
+    assert_silent(IW_STATE_LATCHED);
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    calm();
+    permit_rig_wait(&rig, MS(5000));
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    permit_rig_step(&rig);
+    assert_silent(IW_STATE_LATCHED);
+}
+
+static void test_permit_keep_lasts_through_every_other_fault(void) {
+    static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,     IW_CAUSE_BUS_DOWN,   IW_CAUSE_SEND_STALLED,
+                                        IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_OVERSPEED};
+    for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {
+        permit_rig_begin(&rig, PERMIT_HOLDING);
+        rig.view.heard = false;
+        permit_rig_raise(&rig, causes[i]);
+        permit_rig_step(&rig);
+        assert_held_for_a_day(IW_STATE_LATCHED);
+    }
+}
+
+static void begin_restarted(void) {
+    rig.view.proven = false;
+    calm();
+    iw_permit_init(&rig.permit, &rig.config, rig.now_us, true);
+    permit_rig_step(&rig);
+}
+
+static void hear_strangers(unsigned frames) {
+    for (unsigned i = 0; i < frames; i++) {
+        permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    }
+}
+
+static void test_permit_keep_is_resumed_by_a_restart(void) {
+    begin_restarted();
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    hear_strangers(4); // What the dead process had left in its controller.
+    permit_rig_wait(&rig, MS(1500));
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+}
+
+static void test_permit_keep_resumed_gives_way_to_a_second_master(void) {
+    begin_restarted();
+    hear_strangers(5);
+    assert_silent(IW_STATE_LISTENING);
+    begin_restarted();
+    permit_rig_wait(&rig, MS(1500));
+    permit_rig_wait(&rig, MS(1500));
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    permit_rig_wait(&rig, MS(1500));
+    assert_silent(IW_STATE_LATCHED);
+}
+
+static void test_permit_keep_resumed_can_be_released_at_once(void) {
+    begin_restarted();
+    release();
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    permit_rig_wait(&rig, MS(1500));
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_permit_keep_latched_by_one_wheel_offline_ramps_first(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 50, IW_REACT_RAMP};
+    iw_permit_raise(&rig.permit, &lost, rig.now_us);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    rig.view.output_zero = true;
+    assert_held_for_a_day(IW_STATE_LATCHED);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels);
+    RUN_TEST(test_permit_keep_latched_zeros_have_no_end);
+    RUN_TEST(test_permit_keep_begins_when_the_ramp_has_ended);
+    RUN_TEST(test_permit_keep_is_not_there_unless_configured);
+    RUN_TEST(test_permit_keep_ends_by_release);
+    RUN_TEST(test_permit_keep_released_early_ends_as_without_it);
+    RUN_TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms);
+    RUN_TEST(test_permit_keep_release_in_silence_changes_nothing);
+    RUN_TEST(test_permit_keep_latch_out_of_silence_is_silent);
+    RUN_TEST(test_permit_keep_reset_ends_the_latch_and_not_the_hold);
+    RUN_TEST(test_permit_keep_no_other_request_ends_it);
+    RUN_TEST(test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails);
+    RUN_TEST(test_permit_keep_ends_with_the_gateway);
+    RUN_TEST(test_permit_keep_gives_way_to_a_second_master);
+    RUN_TEST(test_permit_keep_lasts_through_every_other_fault);
+    RUN_TEST(test_permit_keep_is_resumed_by_a_restart);
+    RUN_TEST(test_permit_keep_resumed_gives_way_to_a_second_master);
+    RUN_TEST(test_permit_keep_resumed_can_be_released_at_once);
+    RUN_TEST(test_permit_keep_latched_by_one_wheel_offline_ramps_first);
+    return UNITY_END();
+}
