@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/hal.h"
 
+#include "magnitude.h"
+
 void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us) {
     self->differ_us = IW_NEVER;
     self->limit_us = limit_us;
@@ -9,7 +11,7 @@ void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us) {
 }
 
 static bool has_differed(const iw_estop_pair_t *self, iw_time_us_t now_us) {
-    return self->differ_us != IW_NEVER && now_us > self->differ_us && now_us - self->differ_us > self->limit_us;
+    return self->differ_us != IW_NEVER && iw_age_us(self->differ_us, now_us) > self->limit_us;
 }
 
 /// Only a press that both have seen, and its end, shows that both contacts work again.

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import sys
+import tempfile
 import threading
 import time
 import unittest
@@ -122,7 +123,10 @@ class Story(unittest.TestCase):
     """A gateway is led through its states; all that it sends is looked at."""
 
     def setUp(self):
-        self.rig = Rig(BUILD, RigCase.config, ("--uptime", "100"))
+        folder = tempfile.TemporaryDirectory(prefix="iwheel-second-")
+        self.addCleanup(folder.cleanup)
+        self.second = os.path.join(folder.name, "button")
+        self.rig = Rig(BUILD, RigCase.config, ("--uptime", "100", "--estop2", self.second))
         self.addCleanup(self.rig.close)
         self.records = self.rig.path("records")
         os.mkdir(self.records)
@@ -300,12 +304,16 @@ class Story(unittest.TestCase):
         os.mkdir(self.records)
 
     def another_start(self):
-        """Without a setpoint type."""
+        """Without a setpoint type, and with the second contact of the e-stop."""
         del self.rig.settings["wheels"]["setpoint_type"]
+        self.rig.settings["estop"] = {"line": self.rig.estop_line(), "line2": f"unix:{self.second}"}
         self.rig.write_config()
         self.rig.start_gateway()
         self.ask(self.connect(), "arm", refused="type_not_set")
-        self.ask(self.connect(), "status")
+        me = self.connect("estop")
+        self.rig.sim.ask("contact 2 press")
+        self.wait(me, lambda s: s["estop"]["pressed_at"] == "line2" and "estop_disagrees" in s["present"])
+        self.hear(me)
 
 
 class Requests(RigCase):

@@ -12,6 +12,7 @@ static iw_time_us_t now_us;
 
 void setUp(void) {
     now_us = MS(5000);
+    pair = (iw_estop_pair_t){.disagrees = true, .proven = true}; // Nothing of before is left.
     iw_estop_pair_init(&pair, (uint32_t)MS(LIMIT_MS));
 }
 

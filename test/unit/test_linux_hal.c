@@ -39,7 +39,7 @@ static void bus_tend(iw_bus_t *self) {
     (void)self;
 }
 
-static const iw_bus_kind_t bus_kind = {.tend = bus_tend};
+static const iw_bus_kind_t bus_kind = {.close = bus_tend, .tend = bus_tend};
 static unsigned tended;
 static unsigned closed;
 
@@ -203,6 +203,15 @@ static void test_each_contact_is_watched_tended_and_told_of(void) {
     TEST_ASSERT_EQUAL_INT(2, iw_linux_hal_estop_trouble(&hal, 1));
 }
 
+static void test_each_contact_is_closed(void) {
+    closed = 0;
+    iw_linux_hal_close(&hal);
+    TEST_ASSERT_EQUAL_UINT(1, closed);
+    set_up_two();
+    iw_linux_hal_close(&hal);
+    TEST_ASSERT_EQUAL_UINT(12, closed);
+}
+
 static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(void) {
     iw_bus_t *bus = (iw_bus_t *)(void *)&hal.bus;
     bus->look_us = 5000000;
@@ -216,6 +225,8 @@ static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(
     TEST_ASSERT_EQUAL_UINT64(1200001, iw_linux_hal_next_us(&hal));
     estop_due_us = 1100000;
     TEST_ASSERT_EQUAL_UINT64(1100000, iw_linux_hal_next_us(&hal));
+    bus->look_us = 1000000;
+    TEST_ASSERT_EQUAL_UINT64(1000000, iw_linux_hal_next_us(&hal));
 }
 
 int main(void) {
@@ -230,6 +241,7 @@ int main(void) {
     RUN_TEST(test_second_contact_is_read_whatever_the_first_says);
     RUN_TEST(test_contacts_are_judged_at_the_time_of_the_round);
     RUN_TEST(test_each_contact_is_watched_tended_and_told_of);
+    RUN_TEST(test_each_contact_is_closed);
     RUN_TEST(test_next_time_is_the_soonest_of_both_contacts_and_their_difference);
     return UNITY_END();
 }
