@@ -10,6 +10,7 @@ set(IWHEEL_CORE_SOURCES
     src/current.c
     src/diverge.c
     src/envelope.c
+    src/estop_pair.c
     src/evidence.c
     src/follow.c
     src/force_offset.c

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from file_by_file import ROOT, commands_of, look_at_all, tell, with_output
 
-FOLDERS = ("core/", "port/", "lib/", "app/", "bridge/")
+FOLDERS = ("core/", "port/", "lib/", "app/")
 
 
 def look(name, command):

@@ -14,7 +14,7 @@ import re
 import sys
 from pathlib import Path
 
-FOLDERS = ("core", "northbound", "port", "lib", "app", "bridge", "test", "examples")
+FOLDERS = ("core", "port", "lib", "app", "test", "examples")
 # Comments, strings, characters, preprocessor lines; words; operators.
 TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*|\w+|->|\+\+|--|<<=|>>=|<<|>>|&&|\|\||[<>=!+\-*/%&|^]=|.',
                    re.DOTALL | re.MULTILINE)

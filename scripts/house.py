@@ -21,12 +21,12 @@ ROOT = Path(__file__).resolve().parent.parent
 HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
-PRODUCTION = ("core", "lib", "northbound", "port", "app")
+PRODUCTION = ("core", "lib", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
-COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "lib/client": ("lib/client/include", "lib/client/src"),
+COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
               "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": ()}
-OUTSIDE = ("lib", "northbound", "port", "app", "examples", "zephyr", "bridge")
+OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
 
 
 def sources(*folders):
@@ -124,12 +124,13 @@ def arrows(program):
 def component(path):
     """The library or program that a file belongs to."""
     parts = path.relative_to(ROOT).parts
-    return "/".join(parts[:2] if parts[0] in ("lib", "app", "port", "bridge") else parts[:1])
+    depth = 3 if parts[:2] in (("app", "bridge"), ("lib", "northbound")) else 2 if parts[0] in ("lib", "app", "port") else 1
+    return "/".join(parts[:depth])
 
 
 def arrows_of_the_tree():
     """The same between libraries and programs: a header is of the one whose folder it is found in, beside the file first."""
-    files = sources(*PRODUCTION, "bridge")
+    files = sources(*PRODUCTION)
     used = set()
     for path in files:
         for included in INCLUDE.findall(path.read_text()):

@@ -23,8 +23,8 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-serial": "../bridge/serial", "iwheel-web": "../bridge/web",
-           "iwheel-mqtt": "../bridge/mqtt", "iwheel-fleet": "../bridge/mqtt"}
+FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "bridge/ros2", "iwheel-serial": "bridge/serial", "iwheel-web": "bridge/web",
+           "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt"}
 BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 

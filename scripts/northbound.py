@@ -29,26 +29,26 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TYPES = os.path.join("python", "src", "iwheel", "_protocol.py")
-FIELDS = os.path.join("northbound", "src", "request_fields.h")
+FIELDS = os.path.join("lib", "northbound", "protocol", "src", "request_fields.h")
 DOCUMENT = os.path.join("docs", "northbound.md")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
 FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least", "most", "default", "bytes"}
 # Where the words are kept: the function whose texts they are, and what else is among them.
 SOURCES = {
-    "error": ("northbound/src/words.c", "iwn_error_name", {"ok"}),
-    "topic": ("northbound/src/words.c", "iwn_topic_name", set()),
-    "state": ("northbound/src/states.c", "iwn_state_name", set()),
-    "cause": ("northbound/src/states.c", "iwn_cause_name", {"none"}),
-    "bus_state": ("northbound/src/states.c", "iwn_bus_state_name", set()),
-    "estop_state": ("northbound/src/words.c", "iwn_estop_name", set()),
-    "sides": ("northbound/src/words.c", "iwn_sides_name", set()),
-    "provenance": ("northbound/src/words.c", "iwn_provenance_name", set()),
-    "window": ("northbound/src/words.c", "iwn_window_name", set()),
-    "unit_evidence": ("northbound/src/words.c", "iwn_unit_evidence_name", set()),
-    "force_validity": ("northbound/src/words.c", "iwn_force_validity_name", set()),
-    "ledger_item": ("northbound/src/words.c", "iwn_ledger_item_name", set()),
-    "ledger_state": ("northbound/src/words.c", "iwn_ledger_state_name", set()),
-    "evidence": ("northbound/src/words.c", "iwn_evidence_name", set()),
+    "error": ("lib/northbound/protocol/src/words.c", "iwn_error_name", {"ok"}),
+    "topic": ("lib/northbound/protocol/src/words.c", "iwn_topic_name", set()),
+    "state": ("lib/northbound/protocol/src/states.c", "iwn_state_name", set()),
+    "cause": ("lib/northbound/protocol/src/states.c", "iwn_cause_name", {"none"}),
+    "bus_state": ("lib/northbound/protocol/src/states.c", "iwn_bus_state_name", set()),
+    "estop_state": ("lib/northbound/protocol/src/words.c", "iwn_estop_name", set()),
+    "sides": ("lib/northbound/protocol/src/words.c", "iwn_sides_name", set()),
+    "provenance": ("lib/northbound/protocol/src/words.c", "iwn_provenance_name", set()),
+    "window": ("lib/northbound/protocol/src/words.c", "iwn_window_name", set()),
+    "unit_evidence": ("lib/northbound/protocol/src/words.c", "iwn_unit_evidence_name", set()),
+    "force_validity": ("lib/northbound/protocol/src/words.c", "iwn_force_validity_name", set()),
+    "ledger_item": ("lib/northbound/protocol/src/words.c", "iwn_ledger_item_name", set()),
+    "ledger_state": ("lib/northbound/protocol/src/words.c", "iwn_ledger_state_name", set()),
+    "evidence": ("lib/northbound/protocol/src/words.c", "iwn_evidence_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
     "memory_state": ("app/gateway/ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
     "fault_alone": ("app/gateway/status/observe.c", "observe_faults", set()),
@@ -473,7 +473,7 @@ def gateway_words(description):
 
 def c_limits(description):
     """Numbers and orders that a header has and the description does not, or the other way round."""
-    path = "northbound/include/iwheel_northbound/{}.h"
+    path = "lib/northbound/protocol/include/iwheel_northbound/{}.h"
     limits, watch = description.limits, description.fields(description.requests["watch"])
     wanted = {"IWN_LINE_MAX": limits["request_bytes"], "IWN_ID_TEXT_MAX": limits["id_text_bytes"], "IWN_RATE_MAX_HZ": limits["granted_rate_hz"],
               "IWN_RATE_DEFAULT_HZ": watch["rate_hz"]["default"], "IWN_DEPTH_MAX": limits["depth"]}

@@ -118,7 +118,7 @@ def deviations(folder, fault):
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
-    sources = [*(f"northbound/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)), *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
+    sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)), *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
@@ -153,12 +153,12 @@ def mcdc(folder, calls):
 
 
 def style(folder, code):
-    for part in ("core/src", "core/include", "northbound/src", "northbound/include", "port", "lib", "app", "test"):
+    for part in ("core/src", "core/include", "lib/northbound/protocol/src", "lib/northbound/protocol/include", "port", "app", "test"):
         (folder / part).mkdir(parents=True)
     (folder / "core/src/planted.c").write_text(code)
     for part in ("core/src", "port"):
         (folder / part / "commented.c").write_text(CLEAN + ("// A reason.\n" + "int iw_x;\n" * 7) * 12)
-    for part in ("northbound/src", "app"):
+    for part in ("lib/northbound/protocol/src", "app"):
         (folder / part / "clean.c").write_text(CLEAN)
     return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
 
@@ -173,7 +173,7 @@ def put(folder, fault):
 
 def house(folder, fault):
     """The tree with one change. Of the programs only the one changed is compiled anew."""
-    for part in ("core", "northbound", "port", "lib", "app", "bridge", "scripts"):
+    for part in ("core", "port", "lib", "app", "scripts"):
         if (ROOT / part).is_dir():
             shutil.copytree(ROOT / part, folder / part)
     put(folder, fault)
@@ -185,7 +185,7 @@ def house(folder, fault):
 
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
-    for part in ("core", "northbound", "port", "lib", "app", "bridge", "python", "test/faults"):
+    for part in ("core", "port", "lib", "app", "python", "test/faults"):
         shutil.copytree(ROOT / part, folder / part)
     for part in ("target", "fuzz", "support"):
         (folder / "test" / part).symlink_to(ROOT / "test" / part)
@@ -197,7 +197,7 @@ def faults(folder, fault):
 
 def api(folder, fault):
     """The reference of small copies of the headers' folders, of which one is `fault`."""
-    for name in ("core", "northbound", "lib/client", "port/linux"):
+    for name in ("core", "lib/northbound/protocol", "lib/client", "port/linux"):
         (folder / name / "include").mkdir(parents=True)
     (folder / "docs").mkdir()
     shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
@@ -412,14 +412,14 @@ CASES = [
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
-    (northbound, "python3", "a word that only the gateway has", ("northbound/src/states.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("app/gateway/status/observe.c", '"still_moving", true', '"still_rolling", true'), True),
     (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
     (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
-    (northbound, "python3", "a field that the reader does not know", ("northbound/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "), True),
-    (northbound, "python3", "a request in another place", ("northbound/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"), True),
-    (northbound, "python3", "a limit of the reader's own", ("northbound/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"), True),
+    (northbound, "python3", "a field that the reader does not know", ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "), True),
+    (northbound, "python3", "a request in another place", ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"), True),
+    (northbound, "python3", "a limit of the reader's own", ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"), True),
     (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
     (northbound, "python3", "a field that is only documented", ("docs/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
     (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),

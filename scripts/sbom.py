@@ -96,7 +96,7 @@ def archives(linker_map):
 
 def foreign_files(root):
     """{file of the page: checksum} of those that are not this project's."""
-    own = {checksum(path) for path in (ROOT / "bridge/web/page").iterdir()}
+    own = {checksum(path) for path in (ROOT / "app/bridge/web/page").iterdir()}
     return {path.name: checksum(path) for path in Path(root, PAGE).glob("*") if checksum(path) not in own}
 
 

@@ -15,16 +15,16 @@ import lizard
 # group: (folders, longest function, median function, complexity)
 GROUPS = {
     "core": (("core/src",), 60, 15, 10),
-    "northbound": (("northbound/src",), 60, 15, 10),
-    "ports and apps": (("port", "lib", "app", "bridge"), 80, 25, 15),
+    "northbound": (("lib/northbound",), 60, 15, 10),
+    "ports and apps": (("port", "lib/client", "lib/config", "lib/inspect", "lib/recording", "app"), 80, 25, 15),
 }
 FILE_LINES = 400  # Without lines of comment alone: saying why must not cost anything.
 TEST_FILE_LINES = 600  # Tables of cases may be longer than code.
 LINE = 120
-HEADERS = ("core/include", "northbound/include")
+HEADERS = ("core/include", "lib/northbound/protocol/include")
 COMMENTED = ("core", "port")  # What these name in comments must be there, their lines are not longer than LINE ...
 COMMENT_SHARE = {"core/src": (5, 20), "port": (5, 20)}  # ... and so much of their sources' lines, in percent, says why.
-CODE = ("core", "northbound", "port", "lib", "app", "bridge", "zephyr")
+CODE = ("core", "port", "lib", "app", "zephyr")
 PARAMETERS = 5
 IMPOSED = ("web_call_handle",)  # A library calls these: it says what they take.
 SPDX = "SPDX-License-Identifier: MIT"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from file_by_file import ROOT, commands_of, look_at_all, tell
 
-FOLDERS = ("core/src/", "northbound/src/", "port/linux/", "lib/", "app/", "bridge/")
+FOLDERS = ("core/src/", "port/linux/", "lib/", "app/")
 
 
 def main(arguments):

@@ -12,12 +12,14 @@ void gw_daemon_compose(gw_daemon_t *self) {
     gw_clients_t *clients = &self->clients;
     wheels->bus = gw_report_wish(config);
     wheels->estop = config->estop.line;
+    wheels->estop2 = config->estop.line2;
     wheels->health.limits = (gw_health_limits_t){config->health.battery_low_dV, config->health.temperature_high_degC};
     self->knowledge.wheels = wheels;
     self->knowledge.log = &self->log;
     self->knowledge.clients = clients;
     self->knowledge.configured = (gw_configured_t){&config->core, config->core.track_mm};
-    self->knowledge.button = (gw_button_t){.line = config->estop.line, .active_high = config->estop.active_high};
+    self->knowledge.button = (gw_button_t){.contact = {{config->estop.line, config->estop.active_high},
+                                                       {config->estop.line2, config->estop.active2_high}}};
     self->knowledge.bus = config->bus.interface;
     self->status = (gw_status_t){
         .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};

@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 7)
 
 /// While setpoints leave, bus and e-stop are looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
 /// While one of them waits for its echo, more often.
@@ -61,9 +61,11 @@ int gw_loop_open(gw_daemon_t *daemon) {
                        daemon->clients.listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->wheels.hal),
                        iw_linux_hal_estop_fd(&daemon->wheels.hal),
+                       iw_linux_hal_estop2_fd(&daemon->wheels.hal),
                        daemon->box.writer.fd,
                        daemon->box.reader.fd};
-    const uint64_t tags[] = {GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP,
+    const uint64_t tags[] = {GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
+                             GW_TAG_BUS,    GW_TAG_ESTOP,    GW_TAG_ESTOP,
                              GW_TAG_BOX,    GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);

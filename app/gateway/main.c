@@ -8,6 +8,7 @@
 
 #include "iwheel_linux/clock.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +22,7 @@ static int open_hal(gw_daemon_t *daemon) {
     const int error = iw_linux_hal_open(&daemon->wheels.hal, daemon->config.bus.interface, &estop, &culprit);
     if (error != 0) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);
-        return EX_UNAVAILABLE;
+        return (error == ENOTUNIQ) ? EX_CONFIG : EX_UNAVAILABLE;
     }
     return 0;
 }

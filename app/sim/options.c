@@ -18,6 +18,7 @@ static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simu
                             "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
                             "  --can IFACE         or a CAN interface, for example vcan0\n"
                             "  --estop PATH        the e-stop button: a local socket\n"
+                            "  --estop2 PATH       a second contact of the same button; else it has one\n"
                             "  --control PATH      where commands come in, one a line; iwheel-sim help\n"
                             "                      lists them\n"
                             "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`,\n"
@@ -37,19 +38,13 @@ static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simu
 
 /// Only q, V and h are letters of the command line as well.
 static const struct option long_options[] = {
-    {"can", required_argument, NULL, 'c'},
-    {"estop", required_argument, NULL, 'e'},
-    {"control", required_argument, NULL, 'k'},
-    {"script", required_argument, NULL, 's'},
-    {"log", required_argument, NULL, 'l'},
-    {"log-direction", no_argument, NULL, 'd'},
-    {"no-keys", no_argument, NULL, 'n'},
-    {"seed", required_argument, NULL, 'r'},
-    {"uptime", required_argument, NULL, 'u'},
-    {"quiet", no_argument, NULL, 'q'},
-    {"version", no_argument, NULL, 'V'},
-    {"help", no_argument, NULL, 'h'},
-    {NULL, 0, NULL, 0},
+    {"can", required_argument, NULL, 'c'},     {"estop", required_argument, NULL, 'e'},
+    {"estop2", required_argument, NULL, 'f'},  {"control", required_argument, NULL, 'k'},
+    {"script", required_argument, NULL, 's'},  {"log", required_argument, NULL, 'l'},
+    {"log-direction", no_argument, NULL, 'd'}, {"no-keys", no_argument, NULL, 'n'},
+    {"seed", required_argument, NULL, 'r'},    {"uptime", required_argument, NULL, 'u'},
+    {"quiet", no_argument, NULL, 'q'},         {"version", no_argument, NULL, 'V'},
+    {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
 };
 
 static int complain(const char *what, const char *value) {
@@ -110,6 +105,8 @@ static int set_option(sim_options_t *options, int option, const char *value) {
         return set_can(options, value);
     case 'e':
         return set_path(options->estop_path, value);
+    case 'f':
+        return set_path(options->estop2_path, value);
     case 'k':
         return set_path(options->control_path, value);
     case 's':

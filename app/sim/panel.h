@@ -19,6 +19,7 @@
 typedef struct {
     sim_hub_t *hub;
     sim_button_t *button;
+    sim_button_t *second; ///< Contact of the same button.
     void (*mark)(void *context, const char *text);
     void (*quit)(void *context);
     void *context;

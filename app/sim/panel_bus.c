@@ -94,33 +94,58 @@ static result_t set_babble(const sim_call_t *call) {
     return NULL;
 }
 
-static result_t pulse(const sim_call_t *call, sim_button_t *button) {
-    if (button != NULL && button->pressed) {
+/// What is asked of a button: everything but a pulse is on or off.
+typedef struct {
+    bool plug;
+    bool pulses;
+    bool on;
+    iw_time_us_t until_us;
+} wish_t;
+
+static result_t obey(const wish_t *wish, sim_button_t *button) {
+    if (wish->pulses && button->pressed) {
         return "the button is pressed already; first: estop release";
     }
-    if (button != NULL) {
-        sim_button_pulse(button, call->now_us + (iw_time_us_t)call->value[1]);
+    if (wish->pulses) {
+        sim_button_pulse(button, wish->until_us);
+    } else {
+        (wish->plug ? sim_button_unplug : sim_button_press)(button, wish->on);
     }
     return NULL;
 }
 
+/// A button moves all its contacts.
+static result_t obey_all(const wish_t *wish, const sim_hooks_t *hooks) {
+    result_t result = (hooks->button != NULL) ? obey(wish, hooks->button) : NULL;
+    return (result == NULL && hooks->second != NULL) ? obey(wish, hooks->second) : result;
+}
+
+/// False: there is no such action. `span` is that of a pulse, or UNTOLD.
+static bool read_wish(const sim_call_t *call, const char *action, int64_t span, wish_t *out_wish) {
+    *out_wish = (wish_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
+    out_wish->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_wish->on);
+    return out_wish->pulses == (span != UNTOLD) &&
+           (out_wish->pulses || out_wish->plug ||
+            sim_words_choice(action, (sim_choice_t){"press", "release"}, &out_wish->on));
+}
+
 static result_t set_estop(const sim_call_t *call) {
-    const char *const action = call->words->word[1];
-    sim_button_t *const button = call->panel->hooks.button;
-    bool on = false;
-    const bool plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &on);
-    const bool pulses = strcmp(action, "pulse") == 0;
-    if (pulses != (call->value[1] != UNTOLD) ||
-        (!pulses && !plug && !sim_words_choice(action, (sim_choice_t){"press", "release"}, &on))) {
+    wish_t wish;
+    return read_wish(call, call->words->word[1], call->value[1], &wish) ? obey_all(&wish, &call->panel->hooks)
+                                                                        : SIM_USAGE;
+}
+
+static result_t set_contact(const sim_call_t *call) {
+    const sim_hooks_t *const hooks = &call->panel->hooks;
+    sim_button_t *const button = (call->value[0] == 1) ? hooks->button : hooks->second;
+    wish_t wish;
+    if (!read_wish(call, call->words->word[2], call->value[2], &wish)) {
         return SIM_USAGE;
     }
-    if (pulses) {
-        return pulse(call, button);
+    if (hooks->button != NULL && hooks->second == NULL) {
+        return "the button has one contact; give the simulator --estop2 PATH for another";
     }
-    if (button != NULL) {
-        (plug ? sim_button_unplug : sim_button_press)(button, on);
-    }
-    return NULL;
+    return (button != NULL) ? obey(&wish, button) : NULL;
 }
 
 static result_t log_mark(const sim_call_t *call) {
@@ -145,18 +170,15 @@ static result_t status(const sim_call_t *call) {
 
 static result_t heal(const sim_call_t *call) {
     sim_hub_t *const hub = call->panel->hooks.hub;
-    sim_button_t *const button = call->panel->hooks.button;
+    static const wish_t mended[] = {{.plug = true}, {.plug = false}};
     bool const was_off = call->world->bus_off;
     sim_world_heal(call->world, call->now_us);
     tell(call, was_off ? SIM_ERROR_RESTARTED : SIM_ERROR_ACTIVE);
     if (hub != NULL) {
         sim_hub_down(hub, false);
     }
-    if (button != NULL) {
-        sim_button_unplug(button, false);
-        sim_button_press(button, false);
-    }
-    return NULL;
+    (void)obey_all(&mended[0], &call->panel->hooks);
+    return obey_all(&mended[1], &call->panel->hooks);
 }
 
 static result_t quit(const sim_call_t *call) {
@@ -183,6 +205,8 @@ const sim_command_t sim_bus_commands[] = {
     {ONCE("babble", "ID PERIOD_US on|off", "another node floods; PERIOD_US from 100", set_babble, {WORD},
           {WHOLE(100, 10000000)}, {ON_OFF})},
     {ONCE("estop", "press|release|pulse MS|unplug|plug", "the button, or its wire", set_estop, {WORD}, {PULSE})},
+    {ONCE("contact", "1|2 press|release|pulse MS|unplug|plug", "one contact of the button alone", set_contact,
+          {WHOLE(1, 2)}, {WORD}, {PULSE})},
     {ONCE("log", "mark TEXT", "writes TEXT into the log as a comment", log_mark, {CHOICE("mark", "mark")},
           {.kind = SIM_REST}),
      .asks = true},

@@ -63,6 +63,10 @@ static void add_bus(text_t *text, const sim_world_t *world) {
         truth(world->babble.due_us != IW_NEVER));
 }
 
+static const char *button_word(const sim_button_t *button) {
+    return button->unplugged ? "unplugged" : button->pressed ? "pressed" : "released";
+}
+
 size_t sim_panel_status(const sim_panel_t *self, iw_time_us_t now_us, char *out, size_t size) {
     text_t text = {out, size, 0U};
     const sim_world_t *const world = self->world;
@@ -81,7 +85,10 @@ size_t sim_panel_status(const sim_panel_t *self, iw_time_us_t now_us, char *out,
     }
     add(&text, "}");
     if (button != NULL) {
-        add(&text, ",\"estop\":\"%s\"", button->unplugged ? "unplugged" : button->pressed ? "pressed" : "released");
+        add(&text, ",\"estop\":\"%s\"", button_word(button));
+    }
+    if (self->hooks.second != NULL) {
+        add(&text, ",\"estop2\":\"%s\"", button_word(self->hooks.second));
     }
     add(&text, "}");
     return text.used;

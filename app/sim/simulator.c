@@ -132,7 +132,8 @@ static void awake(void *context) {
     if (sim_socketcan_step(&self->can, now_us)) {
         say(self, "the interface is %s", interface_state(self->can.state));
     }
-    if (sim_button_step(&self->button, now_us)) {
+    const bool second_ends = sim_button_step(&self->second, now_us);
+    if (sim_button_step(&self->button, now_us) || second_ends) {
         mark(self, "estop release");
         say(self, "estop release (end of the pulse)");
     }
@@ -156,7 +157,7 @@ static iw_time_us_t next_us(const sim_simulator_t *self) {
     iw_time_us_t const script_us = sim_script_next_us(&self->script);
     iw_time_us_t const step_us = (script_us == IW_NEVER) ? IW_NEVER : self->start_us + script_us;
     iw_time_us_t const world_us = earlier(sim_world_wake_us(&self->world), sim_socketcan_next_us(&self->can));
-    return earlier(earlier(step_us, world_us), self->button.release_us);
+    return earlier(earlier(step_us, world_us), earlier(self->button.release_us, self->second.release_us));
 }
 
 void sim_simulator_run(sim_simulator_t *self) {
@@ -195,22 +196,30 @@ static bool open_bus(sim_simulator_t *self, const sim_options_t *options, sim_re
     return sim_hub_open(&self->hub, options->can_path, out_reason);
 }
 
+/// True without one too.
+static bool open_second(sim_simulator_t *self, const sim_options_t *options, sim_reason_t *out_reason) {
+    return options->estop2_path[0] == '\0' || sim_button_open(&self->second, options->estop2_path, out_reason);
+}
+
 static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
     sim_reason_t reason = {""};
     self->hub = (sim_hub_t){.loop = &self->loop, .world = &self->world, .now_us = &self->now_us};
     self->button = (sim_button_t){.loop = &self->loop};
+    self->second = (sim_button_t){.loop = &self->loop, .release_us = IW_NEVER};
     self->control = (sim_control_t){.loop = &self->loop, .execute = execute, .context = self};
     self->hub.listener.watch.fd = -1;
     self->button.listener.watch.fd = -1;
+    self->second.listener.watch.fd = -1;
     self->control.listener.watch.fd = -1;
     if (open_bus(self, options, &reason) && sim_button_open(&self->button, options->estop_path, &reason) &&
-        sim_control_open(&self->control, options->control_path, &reason)) {
+        open_second(self, options, &reason) && sim_control_open(&self->control, options->control_path, &reason)) {
         return -1;
     }
     (void)fprintf(stderr, "iwheel-sim: %s\n", reason.text);
     sim_socketcan_close(&self->can);
     sim_listener_close(&self->hub.listener);
     sim_listener_close(&self->button.listener);
+    sim_listener_close(&self->second.listener);
     sim_listener_close(&self->control.listener);
     return EX_UNAVAILABLE;
 }
@@ -225,6 +234,9 @@ static void greet(sim_simulator_t *self, const sim_options_t *options) {
     say(self, "start the gateway with: --can %s%s --estop unix:%s",
         self->on_socketcan ? "" : "unix:", self->on_socketcan ? options->can_interface : options->can_path,
         options->estop_path);
+    if (options->estop2_path[0] != '\0') {
+        say(self, "its configuration: [estop] line2 = unix:%s", options->estop2_path);
+    }
     say(self, "commands: iwheel-sim --control %s help", options->control_path);
 }
 
@@ -255,7 +267,12 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
     int const result = open_sockets(self, options);
     if (result < 0) {
         self->panel.world = &self->world;
-        self->panel.hooks = (sim_hooks_t){self->on_socketcan ? NULL : &self->hub, &self->button, mark, quit, self};
+        self->panel.hooks = (sim_hooks_t){self->on_socketcan ? NULL : &self->hub,
+                                          &self->button,
+                                          (self->second.listener.watch.fd >= 0) ? &self->second : NULL,
+                                          mark,
+                                          quit,
+                                          self};
         greet(self, options);
         self->keys = (sim_keys_t){.watch.fd = -1, .loop = &self->loop, .execute = execute, .context = self};
         if (!options->quiet && !options->no_keys) {
@@ -269,6 +286,9 @@ void sim_simulator_close(sim_simulator_t *self) {
     sim_keys_close(&self->keys);
     sim_control_close(&self->control);
     sim_button_close(&self->button);
+    if (self->second.listener.watch.fd >= 0) {
+        sim_button_close(&self->second);
+    }
     if (self->on_socketcan) {
         sim_socketcan_close(&self->can);
     } else {

@@ -25,6 +25,7 @@ typedef struct {
     char can_path[SIM_PATH_BYTES]; ///< Of the local bus.
     char can_interface[16];        ///< SocketCAN instead of it; empty: none.
     char estop_path[SIM_PATH_BYTES];
+    char estop2_path[SIM_PATH_BYTES]; ///< Of its second contact; empty: it has none.
     char control_path[SIM_PATH_BYTES];
     const char *script_path; ///< NULL: none.
     const char *log_path;    ///< NULL: none.
@@ -51,6 +52,7 @@ typedef struct {
     sim_hub_t hub;
     sim_socketcan_t can; ///< In place of the hub.
     sim_button_t button;
+    sim_button_t second; ///< Contact of the same button; only if it has a socket.
     sim_control_t control;
     sim_keys_t keys;
     sim_script_t script;

@@ -72,7 +72,8 @@ static void watch_loop(iw_gateway_t *self) {
 static void begin(iw_gateway_t *self) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
-        raise_cause(self, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE, (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
+        raise_cause(self, (pressed == IW_ESTOP_DISAGREES) ? IW_CAUSE_ESTOP_DISAGREES : IW_CAUSE_ESTOP_LINE,
+                    IW_SIDES_NONE, (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
     }
     watch_loop(self);
     self->bus = self->hal.bus_state(self->hal.context);

@@ -123,7 +123,9 @@ void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const 
 /// What is known of the e-stop.
 typedef struct {
     const char *line; ///< Its name in the configuration.
-    bool present;     ///< False: there is none at all.
+    const char
+        *pressed_at; ///< Of two contacts: which one is pressed or unreadable, as `inspect_pressed_at`; else NULL.
+    bool present;    ///< False: there is none at all.
     bool simulated;
     int level;           ///< As in iw_hal_t: 0 released, > 0 pressed, < 0 unreadable.
     const char *trouble; ///< Why it is unreadable, and what to do; may be empty.
@@ -132,6 +134,9 @@ typedef struct {
 
 /// The same from an open HAL, as last asked.
 inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line);
+
+/// Of two contacts the one that does not say released: "neither", "line", "line2" or "both".
+const char *inspect_pressed_at(const iw_linux_hal_t *hal);
 
 /// The e-stop's level.
 void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings);

@@ -16,7 +16,8 @@ static bool has_gpio(void) {
 }
 
 const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
-    const int trouble = iw_linux_hal_estop_trouble(hal);
+    const int first = iw_linux_hal_estop_trouble(hal, 0);
+    const int trouble = (first != 0) ? first : iw_linux_hal_estop_trouble(hal, 1);
     if (trouble == 0) {
         return "";
     }
@@ -42,9 +43,16 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
     }
 }
 
+const char *inspect_pressed_at(const iw_linux_hal_t *hal) {
+    static const char *const names[] = {"neither", "line", "line2", "both"};
+    const unsigned first = (hal->contact_last[0] != 0) ? 1U : 0U;
+    return names[first + ((hal->contact_last[1] != 0) ? 2U : 0U)];
+}
+
 inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line) {
     return (inspect_estop_t){
         .line = line,
+        .pressed_at = hal->two_contacts ? inspect_pressed_at(hal) : NULL,
         .present = hal->estop_ops->present,
         .simulated = hal->estop_ops->simulated,
         .level = hal->estop_last,
@@ -61,9 +69,15 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
         inspect_say(findings, "estop", estop->no_gpio ? findings->absent : INSPECT_FAIL,
                     "e-stop %s: unreadable, which counts as pressed", estop->line);
         inspect_cure(findings, "%s", estop->trouble);
+    } else if (estop->level == IW_ESTOP_DISAGREES) {
+        inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: its two contacts disagree, pressed at %s", estop->line,
+                    (estop->pressed_at != NULL) ? estop->pressed_at : "one");
+        inspect_cure(findings, "mend contact or wire, press and release the button");
     } else {
-        inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s", estop->line,
-                    (estop->level > 0) ? "pressed" : "released", estop->simulated ? ", SIMULATED" : "");
+        const bool where = estop->level > 0 && estop->pressed_at != NULL;
+        inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s%s%s", estop->line,
+                    (estop->level > 0) ? "pressed" : "released", where ? " at " : "", where ? estop->pressed_at : "",
+                    estop->simulated ? ", SIMULATED" : "");
         if (estop->simulated) {
             inspect_cure(findings, "wire a button before real wheels turn");
         }
@@ -79,6 +93,11 @@ void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findi
                     is_bus ? "libmnl" : "libgpiod",
                     is_bus ? "serves the simulator's bus" : "reads the simulator's button");
         inspect_cure(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
+    } else if (error == ENOTUNIQ && !is_bus) {
+        inspect_say(findings, check, INSPECT_FAIL,
+                    "e-stop %s: [estop] line and line2 are the same line, which shows nothing of a second contact",
+                    culprit);
+        inspect_cure(findings, "write the line of the other contact as line2 (gpioinfo lists them), or line2 = none");
     } else if (error == EAFNOSUPPORT && is_bus) {
         inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", culprit);
         inspect_cure(findings, "modprobe can_raw, or use the simulator's bus: --can unix:PATH");

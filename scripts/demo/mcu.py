@@ -68,7 +68,7 @@ class Story:
         self.tell(f"an emulated CPU runs it; its serial port is {port}")
         settings = self.folder / "serial.conf"
         settings.write_text("[northbound]\ngroup = none\n", encoding="ascii")
-        relay = self.start("relay", [self.build / "bridge/serial/iwheel-serial", "-c", settings, "--port", port, "--socket", self.socket])
+        relay = self.start("relay", [self.build / "app/bridge/serial/iwheel-serial", "-c", settings, "--port", port, "--socket", self.socket])
         said = self.wait(relay, r"board on \S+: start (\w+), version (\S+)", READY_S)
         self.tell(f"iwheel-serial meets it: start {said[1]}, version {said[2]}")
         self.ctl("drive", "200", "200", "--for", "2s")

@@ -141,7 +141,7 @@ def main():
         rig.start_gateway()
         with open(rig.path("ros2.conf"), "w", encoding="utf-8") as file:
             file.write(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[ros]\ndomain = {domain}\nnetwork = loopback\n")
-        bridge = Process([os.path.join(options.build, "bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
+        bridge = Process([os.path.join(options.build, "app/bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
         rig.processes.append(bridge)
         tell(rig, Peer(domain), view)
         print("The page: docs/ros2.md")

@@ -21,7 +21,7 @@ CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_m
 def bridge(rig, port):
     """The bridge, allowed to drive, and the page's address."""
     settings = rig.path("web.conf")
-    page = Path(rig.build, "bridge/web/page").resolve()
+    page = Path(rig.build, "app/bridge/web/page").resolve()
     Path(settings).write_text(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[web]\nport = {port}\ntoken_file = {rig.path('token')}\npage = {page}\n"
                               "[drive]\nenabled = yes\nallow_reset = yes\n", encoding="utf-8")
     program = find_program(rig.build, "iwheel-web")

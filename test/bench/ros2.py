@@ -104,7 +104,7 @@ def main():
         preload = rig.path("stamps.so")
         subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", preload, os.path.join(ROOT, "test/bench/ros2_stamps.c"), "-ldl"], check=True)
         surroundings = {**os.environ, "LD_PRELOAD": preload, "BENCH_STAMPS": rig.path("stamps")}
-        bridge = Process([os.path.join(options.build, "bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"), env=surroundings)
+        bridge = Process([os.path.join(options.build, "app/bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"), env=surroundings)
         rig.processes.append(bridge)
         peer, client = Peer(domain), rig.client()
         writer = peer.writer("cmd_vel", "geometry_msgs/msg/Twist")

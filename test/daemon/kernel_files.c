@@ -362,6 +362,16 @@ const char *gpiod_chip_label(struct gpiod_chip *unused) {
     return "virtual-gpio";
 }
 
+const char *gpiod_chip_name(struct gpiod_chip *unused) {
+    (void)unused;
+    return "gpiochip0";
+}
+
+unsigned gpiod_line_offset(struct gpiod_line *line) {
+    (void)line;
+    return 0;
+}
+
 int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
     (void)line;
     (void)consumer;

@@ -32,7 +32,7 @@ def judge(work, applied, folder, image, scenario):
     (folder / Path(applied.file).relative_to(PORT.relative_to(ROOT))).write_text(applied.text)
     flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections",
              "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
-             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'northbound/include'}",
+             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}",
              f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}", "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
              '-DIWHEEL_VERSION="0.0.0"',
              f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}"]

@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-PLACES = ("core", "northbound", "lib", "app", "bridge", "port", "python/src")
+PLACES = ("core", "lib", "app", "port", "python/src")
 CORE_MEANS = ("unit", "sim", "orders")
 SYMBOLS = re.compile(r"^(?:__attribute__\(\(\w+\)\) )?[\w \*]*?\b(?P<function>\w+)\([^;{}]*\) \{$.*?^\}$|^#define (?P<macro>\w+)(?:[^\n]*\\\n)*[^\n]*$"
                      r"|^static const struct \{[^{}]*\} (?P<table>\w+)\[.*?^\};$|^(?!typedef|return)[\w \*]+?\b(?P<object>\w+)(?:\[[^\]]*\])*(?: =[^;]*?)?;", re.M | re.S)

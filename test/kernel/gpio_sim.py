@@ -28,17 +28,19 @@ def read(path):
 
 
 class GpioChip:
-    """The line `name` at OFFSET, and one without a name at WITNESS. `pull` is what contact and resistor do to a line."""
+    """The line `name` at OFFSET, `second` at SECOND, one without a name at WITNESS. `pull` is what contact and resistor do to a line."""
 
-    OFFSET, WITNESS, LINES = 4, 3, 8
+    OFFSET, SECOND, WITNESS, LINES = 4, 5, 3, 8
 
-    def __init__(self, folder, name):
+    def __init__(self, folder, name, second=None):
         self.folder = os.path.join(ROOT, folder)
         os.mkdir(self.folder)
         os.mkdir(f"{self.folder}/bank")
         write(f"{self.folder}/bank/num_lines", str(self.LINES))
-        os.mkdir(f"{self.folder}/bank/line{self.OFFSET}")
-        write(f"{self.folder}/bank/line{self.OFFSET}/name", name)
+        self.named = {self.OFFSET: name, **({self.SECOND: second} if second else {})}
+        for offset, line in self.named.items():
+            os.mkdir(f"{self.folder}/bank/line{offset}")
+            write(f"{self.folder}/bank/line{offset}/name", line)
         self.appear()
 
     def appear(self):
@@ -61,7 +63,8 @@ class GpioChip:
     def remove(self):
         if self.is_there():
             self.vanish()
-        os.rmdir(f"{self.folder}/bank/line{self.OFFSET}")
+        for offset in self.named:
+            os.rmdir(f"{self.folder}/bank/line{offset}")
         os.rmdir(f"{self.folder}/bank")
         os.rmdir(self.folder)
 

@@ -27,7 +27,7 @@ class Group(NamedTuple):
 
 
 # What differs between the generations of libgpiod is how a line is opened, read, lost and found again.
-READS_THE_LINE = ("row11_presses_low", "row12_pulses_low", "row12_glitch", "row13_pressed", "row14_")
+READS_THE_LINE = ("row11_presses_low", "row11_two_lines", "row13_line_shorted", "row29_line_twice", "row12_pulses_low", "row12_glitch", "row13_pressed", "row14_")
 # On the distribution's kernel: a drive, an interface that goes, a gateway that is killed.
 SHORT = ("controller_nominal", "controller_row15", "controller_row25_killed")
 # The longest come first, so that no processor waits for one of them at the end.

@@ -56,11 +56,13 @@ class GpioButton:
     its edge is when the edge happened. `presses` lists all of them.
     """
 
+    two_contacts = False
     active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see HighVcanRig
 
     def make_button(self):
         self.line = f"ESTOP{next(NUMBERS)}"
-        self.chip = GpioChip(f"iwheel{os.getpid()}-{next(NUMBERS)}", self.line)
+        self.line2 = f"SECOND{next(NUMBERS)}" if self.two_contacts else None
+        self.chip = GpioChip(f"iwheel{os.getpid()}-{next(NUMBERS)}", self.line, self.line2)
         self.chip.pull(self.active == "low")
         self.chip.pull(False, self.chip.WITNESS)
         self.witness = Edges(self.chip.chip, self.chip.WITNESS, RISING)
@@ -183,6 +185,24 @@ class VcanRig(GpioButton, Rig):
         self.remove_button()
         netdev.remove_all([self.interface])
         remove_marker(self.interface)
+
+
+class TwoContactsRig(VcanRig):
+    """The button has a second contact, on another line of the same chip. `press` moves the first one alone."""
+
+    two_contacts = True
+
+    def make_button(self):
+        super().make_button()
+        self.second(False)
+        self.settings["estop"].update({"line2": self.line2, "line2_active": "low", "estop_discrepancy_ms": 1000})
+        self.write_config()
+
+    def second(self, pressed):
+        """Moves the second contact alone; a press may stop the wheels from now on."""
+        if pressed:
+            self.timeline.append(Event(now_us(), "cut", within_us=RAW_ESTOP_US))
+        self.chip.pull(not pressed, self.chip.SECOND)
 
 
 class HighVcanRig(VcanRig):

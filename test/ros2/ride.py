@@ -144,7 +144,7 @@ class Ride:
             t.check(self.await_state(lambda s: s["gateway"] == "up"), f"the bridge meets the gateway: {self.bridge.text()}")
 
     def program(self):
-        return os.path.join(self.rig.build, "bridge", "ros2", "iwheel-ros2")
+        return os.path.join(self.rig.build, "app", "bridge", "ros2", "iwheel-ros2")
 
     def start_bridge(self, setup=None):
         self.bridge = Process([self.program(), "-c", self.conf], self.rig.path("bridge.out"), setup)

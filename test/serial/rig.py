@@ -16,7 +16,7 @@ from bus import now_us
 from harness import Process, Rig, wait_connect
 from judge_log import Event
 
-PROGRAMS = {"iwheel-serial": "bridge/serial", "serial_board": "test/serial"}
+PROGRAMS = {"iwheel-serial": "app/bridge/serial", "serial_board": "test/serial"}
 
 
 def framed(text):

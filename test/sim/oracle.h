@@ -12,6 +12,9 @@
 #define ORACLE_NO_RULE 0U
 
 /// A wheel as the oracle knows it.
+/// Two contacts of the e-stop may differ for so long.
+#define ORACLE_CONTACTS_US 200000U
+
 typedef struct {
     iw_time_us_t fresh_us;   ///< Speed frame received in a step that was on time.
     iw_time_us_t rest_us;    ///< Since when at rest without a gap.
@@ -83,6 +86,10 @@ typedef struct {
     iw_time_us_t setpoint_us; ///< When setpoints were last due; IW_NEVER: never.
 
     int estop;
+    iw_time_us_t apart_us; ///< Since when its contacts say different, if `apart`.
+    bool apart;
+    bool quarrel;      ///< They did for too long ...
+    bool both_pressed; ///< ... and have both been pressed since.
     iw_bus_state_t bus;
     iw_time_us_t foreign_us;
     uint32_t foreign;     ///< Setpoints since the start.
@@ -116,6 +123,8 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us);
 
 /// What the gateway saw and did through the port.
 void oracle_estop(oracle_t *self, int result);
+/// What both contacts said, where there are two, and what was made of it.
+void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int said[2], int result);
 void oracle_bus(oracle_t *self, iw_time_us_t now_us, iw_bus_state_t state);
 void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 /// The frames that one call brings; `oracle_sent` follows for each that the port tries.

@@ -21,6 +21,10 @@
 /// Against a second master.
 #define CONTESTED_US (10000U * MS)
 
+/// Right after the step: two contacts that disagree are told, and others are not. After a reset that was done: they do not.
+void oracle_judge_contacts(oracle_t *self, iw_time_us_t now_us);
+void oracle_judge_quarrel(oracle_t *self, iw_time_us_t now_us);
+
 /// A rule is broken; the first one is kept.
 __attribute__((format(printf, 4, 5))) void oracle_break(oracle_t *self, iw_time_us_t now_us, uint32_t rule,
                                                         const char *format, ...);

@@ -21,7 +21,8 @@ static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before
     if (self->estop != 0 && state != IW_STATE_LATCHED) {
         oracle_break(self, now_us, 204, "not LATCHED although the e-stop is pressed");
     }
-    if (self->estop != 0 && before != IW_STATE_LATCHED && self->gateway->permit.stop.cause != IW_CAUSE_ESTOP_LINE) {
+    const iw_cause_t cause = (self->estop == IW_ESTOP_DISAGREES) ? IW_CAUSE_ESTOP_DISAGREES : IW_CAUSE_ESTOP_LINE;
+    if (self->estop != 0 && before != IW_STATE_LATCHED && self->gateway->permit.stop.cause != cause) {
         oracle_break(self, now_us, 205, "the e-stop is not told as the cause");
     }
     if (sending && self->bus < IW_BUS_PASSIVE && state != IW_STATE_LATCHED) {
@@ -233,6 +234,7 @@ static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
 void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t before = self->state;
     judge_latches(self, now_us, before);
+    oracle_judge_contacts(self, now_us);
     judge_reboot(self, now_us);
     if (self->armed && now_us >= self->lease_until_us) {
         oracle_soft_stop(self, self->lease_until_us);

@@ -133,10 +133,39 @@ static int port_purge(void *context) {
     return 1;
 }
 
+/// The second contact follows the first one when that has stayed so for its lag.
+static bool lag_behind(rig_t *rig, bool first) {
+    if (first != rig->contact_was) {
+        rig->contact_was = first;
+        rig->contact_us = rig->now_us;
+    }
+    if (rig->now_us - rig->contact_us >= rig->scenario->contact_lag_us) {
+        rig->second_contact = first;
+    }
+    return rig->second_contact;
+}
+
+/// When all is healed, somebody presses and releases the button if its contacts still disagree.
+static bool press_to_mend(rig_t *rig) {
+    const bool healed = rig->now_us >= SCENARIO_START_US + rig->scenario->chaos_us;
+    rig->mending = healed && rig->oracle.quarrel && !rig->mending;
+    return rig->mending;
+}
+
+static int see_both(rig_t *rig, int first) {
+    const bool second = lag_behind(rig, first > 0);
+    const bool mend = press_to_mend(rig);
+    const int said[2] = {(mend && first == 0) ? 1 : first, (first < 0) ? -1 : (int)(mend || second)};
+    const int result = iw_estop_pair_see(&rig->pair, rig->now_us, said[0], said[1]);
+    oracle_contacts(&rig->oracle, rig->now_us, said, result);
+    return result;
+}
+
 static int port_estop(void *context) {
     rig_t *const rig = context;
     const bool pressed = rig_active(rig, EV_ESTOP) || rig->edge;
-    const int result = rig_active(rig, EV_ESTOP_GONE) ? -1 : (pressed ? 1 : 0);
+    const int first = rig_active(rig, EV_ESTOP_GONE) ? -1 : (pressed ? 1 : 0);
+    const int result = rig->scenario->two_contacts ? see_both(rig, first) : first;
     rig->edge = false;
     oracle_estop(&rig->oracle, result);
     return result;

@@ -102,6 +102,7 @@ static void start_gateway(rig_t *rig, bool restarted) {
     const iw_hal_t hal = port_hal(rig);
     (void)iw_gateway_init(&rig->gateway, &rig->scenario->config, &hal, rig->now_us, restarted);
     oracle_start(&rig->oracle, &rig->gateway, rig->now_us, restarted);
+    iw_estop_pair_init(&rig->pair, ORACLE_CONTACTS_US);
     rig->alive = true;
     rig->result->stats.stops[IW_CAUSE_RESTART] += restarted ? 1U : 0U;
     rig->stops_seen = rig->gateway.permit.stop.number;

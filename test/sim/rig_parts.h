@@ -62,6 +62,11 @@ typedef struct {
     uint8_t port;
     bool alive;
     bool edge;
+    iw_estop_pair_t pair;    ///< The port's, of two contacts.
+    iw_time_us_t contact_us; ///< When the first of them last changed.
+    bool contact_was;
+    bool second_contact;
+    bool mending;
     bool bus_lost;
     uint32_t stops_seen;
     iw_state_t state_seen;

@@ -191,11 +191,16 @@ static int by_time(const void *a, const void *b) {
     return 0;
 }
 
+/// By seed: well within what is allowed, just within, beyond it, and as good as shorted.
+static const iw_time_us_t contact_lags_ms[] = {0, 90, 180, 300, 10000};
+
 void scenario_draw(scenario_t *self, uint64_t seed) {
     sim_random_t random;
     memset(self, 0, sizeof *self);
     sim_random_init(&random, seed);
     self->seed = seed;
+    self->two_contacts = seed % 9U == 4U;
+    self->contact_lag_us = contact_lags_ms[seed / 9U % 5U] * MS;
     self->chaos_us = (iw_time_us_t)between(&random, 30, 150) * S;
     self->slow_permille = (seed % 10U == 0U) ? 1000U : between(&random, 4, 12) * 1000U;
     self->age_us = chance(&random, 50) ? (uint64_t)between(&random, 1, 200) * S : 0U;
@@ -226,13 +231,13 @@ void scenario_print(const scenario_t *self, FILE *out) {
         out,
         "seed %llu: period %u ms, lease %u ms, accel %u mm/s2, decel %u mm/s2, max %u mm/s %u mA, hold %u ms, "
         "silent %u ms, echo %u ms, current %s, invert %d %d, telemetry x%u, offset frames for %d s, wake-up within %u "
-        "us%s%s%s\n",
+        "us%s%s%s%s\n",
         (unsigned long long)self->seed, c->period_ms, c->lease_ms, c->accel_mm_s2, c->decel_mm_s2, c->max_speed_mm_s,
         c->max_current_mA, c->zero_hold_ms, c->wheel_silent_ms, c->echo_ms,
         (c->current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint", c->invert[0], c->invert[1],
         self->slow_permille / 1000U, (self->offset_us == IW_NEVER) ? -1 : (int)(self->offset_us / S),
         self->wake_latency_us, self->can_purge ? ", purges" : "", self->echo_early ? ", echo unproven" : "",
-        self->requests_first ? ", requests before step" : "");
+        self->requests_first ? ", requests before step" : "", self->two_contacts ? ", two contacts" : "");
     for (size_t i = 0; i < self->count; i++) {
         const event_t *const e = &self->event[i];
         fprintf(out, "  %11.6f s  %-34s", (double)(SCENARIO_START_US + e->at_us) / 1e6, draws[e->kind].name);

@@ -67,12 +67,14 @@ typedef enum {
 typedef struct {
     uint64_t seed;
     iw_config_t config;
-    iw_time_us_t chaos_us;    ///< Events lie before this; then all is healed.
-    uint64_t age_us;          ///< How long the wheels have been running already.
-    uint32_t slow_permille;   ///< Factor of the telemetry's periods; 1000: as documented.
-    iw_time_us_t offset_us;   ///< How long wheels send offset frames; IW_NEVER: for ever.
-    uint32_t wake_latency_us; ///< How late each wake-up may be.
-    uint32_t rx_depth;        ///< Frames that the port's receive queue holds.
+    iw_time_us_t chaos_us;       ///< Events lie before this; then all is healed.
+    uint64_t age_us;             ///< How long the wheels have been running already.
+    uint32_t slow_permille;      ///< Factor of the telemetry's periods; 1000: as documented.
+    iw_time_us_t offset_us;      ///< How long wheels send offset frames; IW_NEVER: for ever.
+    uint32_t wake_latency_us;    ///< How late each wake-up may be.
+    uint32_t rx_depth;           ///< Frames that the port's receive queue holds.
+    iw_time_us_t contact_lag_us; ///< The e-stop's second contact follows the first so much later.
+    bool two_contacts;           ///< It has one.
     bool can_purge;
     bool echo_early; ///< The echo comes right after queueing and proves nothing.
     bool requests_first;

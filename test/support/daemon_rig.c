@@ -159,8 +159,10 @@ static int rig_estop_fd(const void *self) {
 
 static int rig_pressed(void *self, bool quiet) {
     daemon_rig_t *rig = &daemon_rig;
+    if (self == &rig->daemon->wheels.hal.estop2) {
+        return rig->estop2;
+    }
     const bool pulse = rig->estop_pulse && !quiet; // Without a word from the wait, edges are not read.
-    (void)self;
     rig->looks++;
     rig->unlooked_us = rig->now_us - rig->looked_us;
     rig->looked_us = rig->now_us;

@@ -30,6 +30,7 @@ typedef struct {
     iw_bus_state_t bus;          ///< What the bus answers.
     iw_bus_link_t link;          ///< What is known of its link.
     int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
+    int estop2;                  ///< The same of its second contact, if wheels.hal has two.
     bool estop_pulse;            ///< Edges wait to be read: pressed and released again. They wake.
     bool estop_late;             ///< Such edges come as soon as the next wait has found something else.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.

@@ -442,8 +442,8 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web", "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt",
-              "iwheel-serial": "bridge/serial", "iwheel-ros2": "bridge/ros2"}[name]
+    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "app/bridge/web", "iwheel-mqtt": "app/bridge/mqtt", "iwheel-fleet": "app/bridge/mqtt",
+              "iwheel-serial": "app/bridge/serial", "iwheel-ros2": "app/bridge/ros2"}[name]
     for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path

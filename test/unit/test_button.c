@@ -10,25 +10,31 @@
 #define MS(value) ((iw_time_us_t)(value)*1000U)
 
 static iw_estop_seen_t seen;
+static iw_estop_seen_t seen2;
 static bool readable;
-
-static const iw_estop_seen_t *fake_seen(const void *self) {
-    (void)self;
-    return readable ? &seen : NULL;
-}
-
+static bool readable2;
+static unsigned names_read;
 static iw_estop_ops_t ops;
 static iw_linux_hal_t hal;
+
+static const iw_estop_seen_t *fake_seen(const void *self) {
+    const bool second = self == &hal.estop2;
+    names_read++;
+    return !(second ? readable2 : readable) ? NULL : second ? &seen2 : &seen;
+}
+
 static gw_button_t button;
 static gw_tried_t tried;
 static iw_time_us_t now_us;
 
 void setUp(void) {
-    seen = (iw_estop_seen_t){"pinctrl-bcm2711", "GPIO4"};
+    seen = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO4"};
+    seen2 = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO5"};
     readable = true;
+    readable2 = true;
     ops = (iw_estop_ops_t){.seen = fake_seen, .present = true};
     hal = (iw_linux_hal_t){.estop_ops = &ops};
-    button = (gw_button_t){.line = "ESTOP", .active_high = true};
+    button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", true}}};
     memset(&tried, 0, sizeof tried);
     now_us = MS(5000);
 }
@@ -39,7 +45,7 @@ void tearDown(void) {}
 static gw_button_news_t hold(int answer, unsigned for_ms) {
     gw_button_news_t news = GW_BUTTON_NO_NEWS;
     for (unsigned ms = 0; ms < for_ms; ms += 10U) {
-        hal.estop_last = answer;
+        hal.contact_last[0] = answer;
         const gw_button_news_t one = gw_button_look(&button, &hal, now_us, &tried);
         news = (one != GW_BUTTON_NO_NEWS) ? one : news;
         now_us += MS(10);
@@ -53,10 +59,10 @@ static void test_button_pressed_and_released_is_tried_on_this_wiring(void) {
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
     TEST_ASSERT_TRUE(tried.wall_us > 0);
-    TEST_ASSERT_TRUE(tried.active_high);
-    TEST_ASSERT_EQUAL_STRING("ESTOP", tried.line);
-    TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", tried.seen.chip);
-    TEST_ASSERT_EQUAL_STRING("GPIO4", tried.seen.line);
+    TEST_ASSERT_TRUE(tried.contact[0].active_high);
+    TEST_ASSERT_EQUAL_STRING("ESTOP", tried.contact[0].line);
+    TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", tried.contact[0].seen.chip);
+    TEST_ASSERT_EQUAL_STRING("GPIO4", tried.contact[0].seen.line);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
 }
 
@@ -80,8 +86,8 @@ static void test_button_unreadable_or_gone_breaks_the_press(void) {
     (void)hold(-1, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
     (void)hold(1, 1000);
-    readable = false;
-    (void)hold(1, 10);
+    readable = false; // Gone and back within a look, which is told.
+    (void)hold(-1, 10);
     readable = true;
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
@@ -113,8 +119,9 @@ static void test_button_of_any_other_wiring_is_void(void) {
         press();
         TEST_ASSERT_TRUE(tried.wall_us > 0);
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
-        button.line = (change == 0U) ? "gpiochip0:4" : button.line;
-        button.active_high = (change == 1U) ? false : button.active_high;
+        (void)hold(-1, 10); // As whoever has called it otherwise.
+        button.contact[0].line = (change == 0U) ? "gpiochip0:4" : button.contact[0].line;
+        button.contact[0].active_high = (change == 1U) ? false : button.contact[0].active_high;
         (void)snprintf(seen.chip, sizeof seen.chip, "%s", (change == 2U) ? "gpio-sim" : "pinctrl-bcm2711");
         (void)snprintf(seen.line, sizeof seen.line, "%s", (change == 3U) ? "GPIO5" : "GPIO4");
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold(0, 10));
@@ -131,6 +138,92 @@ static void test_button_whose_line_cannot_be_read_is_not_void(void) {
     TEST_ASSERT_EQUAL_INT64(before, tried.wall_us);
 }
 
+/// A button with two contacts.
+static void set_up_two(void) {
+    setUp();
+    hal.two_contacts = true;
+    button.contact[1].line = "ESTOP2";
+}
+
+static gw_button_news_t hold_both(int first, int second, unsigned for_ms) {
+    hal.contact_last[1] = second;
+    return hold(first, for_ms);
+}
+
+static void test_button_of_two_contacts_is_tried_by_a_press_of_both(void) {
+    set_up_two();
+    (void)hold_both(0, 0, 10);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 1000));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the first.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 1, 1000));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the second.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 100));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 1, 40));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Both, but for a moment only.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 1, 100));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 1, 100));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+    TEST_ASSERT_EQUAL_STRING("ESTOP2", tried.contact[1].line);
+    TEST_ASSERT_EQUAL_STRING("GPIO5", tried.contact[1].seen.line);
+    TEST_ASSERT_TRUE(tried.contact[1].active_high);
+}
+
+static void test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing(void) {
+    set_up_two();
+    (void)hold_both(0, 0, 10);
+    (void)hold_both(1, 1, 100);
+    (void)hold_both(1, -1, 10);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+    (void)hold_both(1, 1, 100);
+    readable2 = false;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+}
+
+static void test_button_with_another_second_contact_is_void(void) {
+    for (unsigned change = 0; change < 4U; change++) {
+        set_up_two();
+        (void)hold_both(0, 0, 10);
+        (void)hold_both(1, 1, 100);
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+        (void)hold_both(0, -1, 10);
+        button.contact[1].line = (change == 0U) ? "gpiochip0:5" : "ESTOP2";
+        button.contact[1].active_high = change != 1U;
+        (void)snprintf(seen2.chip, sizeof seen2.chip, "%s", (change == 2U) ? "gpio-sim" : "pinctrl-bcm2711");
+        (void)snprintf(seen2.line, sizeof seen2.line, "%s", (change == 3U) ? "GPIO6" : "GPIO5");
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
+    }
+}
+
+static void test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round(void) {
+    press();
+    TEST_ASSERT_TRUE(tried.wall_us > 0);
+    button = (gw_button_t){.contact = {{"ESTOP", true}, {"ESTOP2", true}}}; // Started anew.
+    hal.two_contacts = true;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
+    (void)hold_both(1, 1, 100);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+    button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", true}}};
+    hal.two_contacts = false;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
+}
+
+static void test_button_stored_without_a_second_contact_is_that_of_one(void) {
+    press();
+    tried.contact[1].line[0] = '\0';
+    button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", false}}};
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 10));
+    TEST_ASSERT_TRUE(tried.wall_us > 0);
+}
+
+static void test_button_that_says_the_same_is_not_asked_for_its_names(void) {
+    (void)hold(0, 10);
+    names_read = 0;
+    (void)hold(0, 1000);
+    TEST_ASSERT_EQUAL_UINT(0, names_read);
+    (void)hold(1, 10);
+    TEST_ASSERT_EQUAL_UINT(1, names_read);
+}
+
 static bool stored_is_read(const gw_known_t *known, gw_known_t *out_known) {
     static char text[GW_MEMORY_SIZE];
     char reason[GW_MEMORY_REASON_SIZE];
@@ -142,15 +235,18 @@ static void test_button_is_stored_and_read_back(void) {
     static gw_known_t known;
     static gw_known_t got;
     memset(&known, 0, sizeof known);
-    known.tried = (gw_tried_t){.wall_us = 1, .active_high = true};
-    memset(known.tried.line, 'l', sizeof known.tried.line - 1U);
-    memset(known.tried.seen.chip, 'c', sizeof known.tried.seen.chip - 1U);
-    memset(known.tried.seen.line, 'n', sizeof known.tried.seen.line - 1U);
+    known.tried = (gw_tried_t){.wall_us = 1, .contact[0].active_high = true};
+    memset(known.tried.contact[0].line, 'l', sizeof known.tried.contact[0].line - 1U);
+    memset(known.tried.contact[0].seen.chip, 'c', sizeof known.tried.contact[0].seen.chip - 1U);
+    memset(known.tried.contact[0].seen.line, 'n', sizeof known.tried.contact[0].seen.line - 1U);
+    known.tried.contact[1] = known.tried.contact[0];
+    known.tried.contact[1].active_high = false;
+    known.tried.contact[1].line[0] = '2';
     TEST_ASSERT_TRUE(stored_is_read(&known, &got));
     TEST_ASSERT_EQUAL_MEMORY(&known.tried, &got.tried, sizeof got.tried);
-    known.tried.active_high = false;
+    known.tried.contact[0].active_high = false;
     TEST_ASSERT_TRUE(stored_is_read(&known, &got));
-    TEST_ASSERT_FALSE(got.tried.active_high);
+    TEST_ASSERT_FALSE(got.tried.contact[0].active_high);
     memset(&known, 0, sizeof known);
     TEST_ASSERT_TRUE(stored_is_read(&known, &got));
     TEST_ASSERT_EQUAL_INT64(0, got.tried.wall_us);
@@ -170,6 +266,7 @@ static void test_button_stored_wrongly_is_refused(void) {
         "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\"}",
         "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":0}",
         "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7.5}",
+        "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"line2\":\"d\",\"wall_us\":7}",
     };
     for (size_t i = 0; i < sizeof members / sizeof members[0]; i++) {
         iwn_work_t work;
@@ -191,6 +288,12 @@ int main(void) {
     RUN_TEST(test_button_that_is_simulated_or_absent_is_never_tried);
     RUN_TEST(test_button_of_any_other_wiring_is_void);
     RUN_TEST(test_button_whose_line_cannot_be_read_is_not_void);
+    RUN_TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both);
+    RUN_TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing);
+    RUN_TEST(test_button_with_another_second_contact_is_void);
+    RUN_TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round);
+    RUN_TEST(test_button_stored_without_a_second_contact_is_that_of_one);
+    RUN_TEST(test_button_that_says_the_same_is_not_asked_for_its_names);
     RUN_TEST(test_button_is_stored_and_read_back);
     RUN_TEST(test_button_stored_wrongly_is_refused);
     return UNITY_END();

@@ -81,6 +81,9 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL_STRING("ESTOP", config.estop.line);
     TEST_ASSERT_TRUE(config.estop.active_high);
     TEST_ASSERT_EQUAL_UINT16(5, config.estop.debounce_ms);
+    TEST_ASSERT_EQUAL_STRING("none", config.estop.line2);
+    TEST_ASSERT_TRUE(config.estop.active2_high);
+    TEST_ASSERT_EQUAL_UINT16(200, config.estop.discrepancy_ms);
     TEST_ASSERT_EQUAL_STRING("/run/iwheel/gateway.sock", config.northbound.socket);
     TEST_ASSERT_EQUAL_HEX16(0660, config.northbound.mode);
     TEST_ASSERT_EQUAL_STRING("iwheel", config.northbound.group);
@@ -108,7 +111,9 @@ static void test_parse_every_key_reaches_its_field(void) {
         "zero_hold_ms=1200\nhold_max_s=61\nafter_stop=hold\n[limits]\nwheel_silent_ms="
         "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
-        "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\n"
+        "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\nline2=gpiochip0:"
+        "5\nline2_active=low\n"
+        "estop_discrepancy_ms=150\n"
         "[northbound]\nsocket=/tmp/s\nmode=0600\ngroup=dialout\nmax_clients=4\n[record]\nblackbox_s=0\ndirectory=/"
         "tmp\n");
     const iw_config_t *core = &config.core;
@@ -144,6 +149,9 @@ static void test_parse_every_key_reaches_its_field(void) {
     TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", config.estop.chip);
     TEST_ASSERT_EQUAL_STRING("GPIO4", config.estop.chip_line);
     TEST_ASSERT_FALSE(config.estop.active_high);
+    TEST_ASSERT_EQUAL_STRING("gpiochip0:5", config.estop.line2);
+    TEST_ASSERT_FALSE(config.estop.active2_high);
+    TEST_ASSERT_EQUAL_UINT16(150, config.estop.discrepancy_ms);
     TEST_ASSERT_EQUAL_UINT16(7, config.estop.debounce_ms);
     TEST_ASSERT_EQUAL_STRING("/tmp/s", config.northbound.socket);
     TEST_ASSERT_EQUAL_HEX16(0600, config.northbound.mode);
@@ -190,6 +198,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         {"limits", "battery_low_dV", 10, 254},
         {"limits", "temperature_high_degC", 20, 200},
         {"estop", "debounce_ms", 0, 1000},
+        {"estop", "estop_discrepancy_ms", 50, 1000},
         {"northbound", "max_clients", 1, 64},
         {"record", "blackbox_s", 0, 600},
         {"record", "keep_stops", 8, 256},

@@ -89,9 +89,26 @@ static void test_parse_rest_rpm_is_by_radius_and_gear(void) {
     refused("[wheels]\nradius_mm = 400\n[limits]\nrest_rpm = 2\n", "iw.conf:4: ", "write 0..1 rpm");
 }
 
+static void test_parse_second_contact_must_be_another_line_of_the_same_kind(void) {
+    accepted("[estop]\nline = A\nline2 = B\n");
+    accepted("[estop]\nline = unix:/a\nline2 = unix:/b\n");
+    accepted("[estop]\nline = none\nline2 = none\n");
+    accepted("[estop]\nline2 = B\ndebounce_ms = 199\n");
+    accepted("[estop]\ndebounce_ms = 1000\n");
+    refused("[estop]\nline = A\nline2 = A\n", "iw.conf:3: line and line2 are both A", "line2 = none");
+    refused("[estop]\nline = unix:/a\nline2 = unix:/a\n", "iw.conf:3: line and line2 are both", "line2 = none");
+    refused("[estop]\nline2 = ESTOP\n", "iw.conf:2: line and line2 are both ESTOP", "line2 = none");
+    refused("[estop]\nline = none\nline2 = B\n", "iw.conf:3: line2 = B but line = none", "first contact");
+    refused("[estop]\nline = unix:/a\nline2 = B\n", "iw.conf:3: line = unix:/a and line2 = B", "simulated");
+    refused("[estop]\nline = A\nline2 = unix:/b\n", "iw.conf:3: line = A and line2 = unix:/b", "simulated");
+    refused("[estop]\nline2 = B\ndebounce_ms = 200\n", "estop_discrepancy_ms = 200", "debounce_ms = 200");
+    refused("[estop]\nline2 = B\nestop_discrepancy_ms = 50\ndebounce_ms = 60\n", "iw.conf:3: ", "shorter debounce_ms");
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule);
     RUN_TEST(test_parse_rest_rpm_is_by_radius_and_gear);
+    RUN_TEST(test_parse_second_contact_must_be_another_line_of_the_same_kind);
     return UNITY_END();
 }

@@ -24,7 +24,7 @@ int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
 void setUp(void) {
     memset(&bringup, 0, sizeof bringup);
     gateway_config_default(&bringup.config);
-    seen = (iw_estop_seen_t){"pinctrl-bcm2711", "ESTOP"};
+    seen = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "ESTOP"};
     error = 0;
 }
 

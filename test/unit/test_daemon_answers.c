@@ -290,6 +290,42 @@ static void test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "500000 bit/s"), warnings);
 }
 
+/// The log names the contact too.
+static void expect_contacts(int first, int second, const char *status, const char *told) {
+    daemon_rig.estop = first;
+    daemon_rig.estop2 = second;
+    daemon_rig_run(20);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, status), reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), told), daemon_rig_log());
+}
+
+static void test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree(void) {
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    TEST_ASSERT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "pressed_at"));
+    wheels->hal.two_contacts = true;
+    wheels->estop2 = "ESTOP2";
+    iw_estop_pair_init(&wheels->hal.pair, 200000U);
+    daemon_rig_keep_log();
+    expect_contacts(0, 1, "\"state\":\"pressed\",\"line2\":\"ESTOP2\",\"pressed_at\":\"line2\"",
+                    "pressed, pressed at line2");
+    expect_contacts(1, 1, "\"pressed_at\":\"both\"", "pressed, pressed at both");
+    expect_contacts(1, 0, "\"pressed_at\":\"line\"", "pressed, pressed at line");
+    daemon_rig_run(300);
+    expect_contacts(0, 0, "\"state\":\"disagrees\",\"line2\":\"ESTOP2\",\"pressed_at\":\"neither\"",
+                    "disagrees, pressed at neither");
+    daemon_rig_run(2000);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"reset\"}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"cause_present\""), reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "estop_disagrees was seen"), reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "press and release the button"), reply);
+    expect_contacts(1, 1, "\"state\":\"disagrees\"", "disagrees, pressed at both");
+    expect_contacts(0, 0, "\"state\":\"released\"", "released, pressed at neither");
+    daemon_rig_run(1500);
+    reply = daemon_rig_ask(client, "{\"cmd\":\"reset\"}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
+}
+
 static void test_warning_that_goes_on_is_said_once(void) {
     static iw_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
@@ -322,5 +358,6 @@ int main(void) {
     RUN_TEST(test_purge_by_the_port_is_told_once_in_the_log);
     RUN_TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link);
     RUN_TEST(test_warning_that_goes_on_is_said_once);
+    RUN_TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree);
     return UNITY_END();
 }

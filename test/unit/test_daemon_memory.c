@@ -152,7 +152,7 @@ static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
     TEST_ASSERT_TRUE(wheels->estop_untried);
     TEST_ASSERT_EQUAL_INT64(0, wheels->estop_tried_us);
     TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
-    stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .line = "ESTOP", .active_high = true};
+    stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .contact = {{.active_high = true, .line = "ESTOP"}}};
     tell_stored();
     daemon_rig_run(50);
     TEST_ASSERT_FALSE(wheels->estop_untried);
@@ -419,8 +419,10 @@ static void test_status_that_does_not_fit_keeps_nothing(void) {
 
 static void test_memory_watches_the_button_of_the_configured_line(void) {
     const gateway_config_t *config = &daemon_rig.daemon->config;
-    TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->knowledge.button.line);
-    TEST_ASSERT_EQUAL(config->estop.active_high, daemon_rig.daemon->knowledge.button.active_high);
+    TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->knowledge.button.contact[0].line);
+    TEST_ASSERT_EQUAL_STRING(config->estop.line2, daemon_rig.daemon->knowledge.button.contact[1].line);
+    TEST_ASSERT_EQUAL(config->estop.active2_high, daemon_rig.daemon->knowledge.button.contact[1].active_high);
+    TEST_ASSERT_EQUAL(config->estop.active_high, daemon_rig.daemon->knowledge.button.contact[0].active_high);
 }
 
 int main(void) {

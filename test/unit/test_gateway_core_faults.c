@@ -96,6 +96,31 @@ static void test_gateway_estop_edge_alone_latches(void) {
     assert_no_motion_until_armed_anew();
 }
 
+static void test_gateway_estop_contacts_that_disagree_latch_until_they_agree(void) {
+    drive_on();
+    rig.bus.estop_level = IW_ESTOP_DISAGREES;
+    gateway_rig_step(&rig);
+    assert_latched(IW_CAUSE_ESTOP_DISAGREES);
+    TEST_ASSERT_TRUE(stop()->at_once);
+    TEST_ASSERT_EQUAL_UINT32(1, stop()->detail);
+    gateway_rig_run(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, gateway_rig_reset(&rig));
+    rig.bus.estop_level = 0;
+    gateway_rig_run(&rig, MS(1500));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
+}
+
+static void test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it(void) {
+    drive_on();
+    gateway_rig_press(&rig, true);
+    gateway_rig_step(&rig);
+    assert_latched(IW_CAUSE_ESTOP_LINE);
+    rig.bus.estop_level = IW_ESTOP_DISAGREES;
+    gateway_rig_run(&rig, MS(100));
+    assert_latched(IW_CAUSE_ESTOP_LINE);
+    TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_ESTOP_DISAGREES, iw_permit_present(&rig.gateway.permit, rig.now_us));
+}
+
 static void test_gateway_estop_unreadable_latches_in_every_state(void) {
     rig.bus.estop_level = -1;
     gateway_rig_step(&rig);
@@ -371,6 +396,8 @@ int main(void) {
     RUN_TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase);
     RUN_TEST(test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing);
     RUN_TEST(test_gateway_estop_edge_alone_latches);
+    RUN_TEST(test_gateway_estop_contacts_that_disagree_latch_until_they_agree);
+    RUN_TEST(test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it);
     RUN_TEST(test_gateway_estop_unreadable_latches_in_every_state);
     RUN_TEST(test_gateway_estop_held_stays_latched_whoever_asks);
     RUN_TEST(test_gateway_software_estop_latches_from_anybody);

@@ -7,7 +7,6 @@
 
 static blackbox_ring_t *ring;
 static gw_tape_t tape;
-static iw_linux_hal_t port;
 static iw_hal_t hal;
 static blackbox_entry_t entries[8U * BLACKBOX_BLOCK];
 static size_t count;
@@ -16,33 +15,39 @@ static size_t count;
 static int send_answer, estop_answer, waiting;
 static iw_bus_state_t bus_answer;
 
-int iw_bus_send(iw_backend_store_t *context, const iw_can_frame_t *frames, uint32_t frame_count) {
+static int answer_send(void *context, const iw_can_frame_t *frames, uint32_t frame_count) {
     (void)context;
     (void)frames;
     (void)frame_count;
     return send_answer;
 }
 
-int iw_bus_receive(iw_backend_store_t *context, iw_can_frame_t *out_frame) {
+static int answer_receive(void *context, iw_can_frame_t *out_frame) {
     (void)context;
     *out_frame = (iw_can_frame_t){.id = 256, .dlc = 4, .data = {(uint8_t)waiting}};
     return (waiting > 0) ? waiting-- : 0;
 }
 
-iw_bus_state_t iw_bus_state(iw_backend_store_t *context) {
+static iw_bus_state_t answer_bus_state(void *context) {
     (void)context;
     return bus_answer;
 }
 
-int iw_bus_purge(iw_backend_store_t *context) {
+static int answer_purge(void *context) {
     (void)context;
     return 1;
 }
 
-int iw_linux_hal_pressed(iw_linux_hal_t *context) {
+static int answer_estop(void *context) {
     (void)context;
     return estop_answer;
 }
+
+static const iw_hal_t port = {.send = answer_send,
+                              .receive = answer_receive,
+                              .bus_state = answer_bus_state,
+                              .purge = answer_purge,
+                              .estop_pressed = answer_estop};
 
 void setUp(void) {
     ring = (blackbox_ring_t *)malloc(blackbox_ring_size(0));

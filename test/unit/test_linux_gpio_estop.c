@@ -29,7 +29,7 @@ static iw_time_us_t now_us;
 
 int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
     (void)address;
-    *out_seen = (iw_estop_seen_t){"label", "name"};
+    *out_seen = (iw_estop_seen_t){.chip = "label", .line = "name"};
     return 0;
 }
 
@@ -41,7 +41,7 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
         return wire.open_error;
     }
     wire.fd = self->fd = eventfd(0, EFD_NONBLOCK);
-    self->seen = (iw_estop_seen_t){"label", "name"};
+    self->seen = (iw_estop_seen_t){.chip = "label", .line = "name"};
     return 0;
 }
 
@@ -213,10 +213,10 @@ static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
         const char *chip;
         const char *chip_line;
         iw_estop_seen_t expected;
-    } cases[] = {{NULL, NULL, {"", ""}},
-                 {"any", "any", {"", ""}},
-                 {"pinctrl", "any", {"pinctrl", ""}},
-                 {"any", "GPIO4", {"", "GPIO4"}}};
+    } cases[] = {{NULL, NULL, {.chip = "", .line = ""}},
+                 {"any", "any", {.chip = "", .line = ""}},
+                 {"pinctrl", "any", {.chip = "pinctrl", .line = ""}},
+                 {"any", "GPIO4", {.chip = "", .line = "GPIO4"}}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const iw_estop_wish_t wish = {.name = "ESTOP", .chip = cases[i].chip, .chip_line = cases[i].chip_line};
         tearDown();

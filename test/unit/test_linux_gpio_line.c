@@ -146,14 +146,14 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
     static const struct {
         iw_estop_seen_t expected;
         int error;
-    } cases[] = {{{"", ""}, 0},
-                 {{FAKE_GPIO_LABEL, ""}, 0},
-                 {{"", FAKE_GPIO_NAME}, 0},
-                 {{FAKE_GPIO_LABEL, FAKE_GPIO_NAME}, 0},
-                 {{"another-chip", FAKE_GPIO_NAME}, EREMCHG},
-                 {{FAKE_GPIO_LABEL, "OTHER"}, EREMCHG},
-                 {{"pinctrl-fak", ""}, EREMCHG},
-                 {{"pinctrl-fake2", ""}, EREMCHG}};
+    } cases[] = {{{.chip = "", .line = ""}, 0},
+                 {{.chip = FAKE_GPIO_LABEL, .line = ""}, 0},
+                 {{.chip = "", .line = FAKE_GPIO_NAME}, 0},
+                 {{.chip = FAKE_GPIO_LABEL, .line = FAKE_GPIO_NAME}, 0},
+                 {{.chip = "another-chip", .line = FAKE_GPIO_NAME}, EREMCHG},
+                 {{.chip = FAKE_GPIO_LABEL, .line = "OTHER"}, EREMCHG},
+                 {{.chip = "pinctrl-fak", .line = ""}, EREMCHG},
+                 {{.chip = "pinctrl-fake2", .line = ""}, EREMCHG}};
     const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U * sizeof cases / sizeof cases[0]; i++) {
         iw_gpio_address_t address = *addresses[i % 2U];
@@ -169,12 +169,12 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
 
 static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
     iw_gpio_address_t address = by_offset;
-    address.expected = (iw_estop_seen_t){FAKE_GPIO_LABEL, ""};
+    address.expected = (iw_estop_seen_t){.chip = FAKE_GPIO_LABEL};
     iw_gpio_line_close(&line);
     fake_gpio.label = "raspberrypi-exp-gpio"; // Has the number of the other one now.
     TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
-    address.expected = (iw_estop_seen_t){"", FAKE_GPIO_NAME};
+    address.expected = (iw_estop_seen_t){.line = FAKE_GPIO_NAME};
     fake_gpio.unnamed = true;
     TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
 }
@@ -182,12 +182,14 @@ static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
 static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
     const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U; i++) {
-        iw_estop_seen_t seen = {"x", "y"};
+        iw_estop_seen_t seen = {.chip = "x", .line = "y"};
         iw_gpio_line_close(&line);
         fake_gpio.busy_error = EBUSY; // Somebody else has it.
         TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_see(addresses[i], &seen));
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_LABEL, seen.chip);
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_NAME, seen.line);
+        TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_CHIP, seen.node);
+        TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, seen.offset);
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
     }

@@ -3,29 +3,66 @@
 
 #include "iwheel_linux/linux_hal.h"
 
+#include <errno.h>
+#include <stdio.h>
 #include <unity.h>
 
 static iw_linux_hal_t hal;
 static bool was_quiet;
 static int answer;
+static int answer2;
+static unsigned reads;
 
 static int fake_pressed(void *self, bool quiet) {
-    (void)self;
+    const bool second = self == &hal.estop2;
+    reads += second ? 10U : 1U;
     was_quiet = quiet;
-    return answer;
+    return second ? answer2 : answer;
 }
 
 static iw_time_us_t estop_due_us;
+static iw_time_us_t estop2_due_us;
 
 static iw_time_us_t fake_next_us(const void *self) {
-    (void)self;
-    return estop_due_us;
+    return (self == &hal.estop2) ? estop2_due_us : estop_due_us;
 }
 
-static const iw_estop_ops_t fake_ops = {.pressed = fake_pressed, .next_us = fake_next_us, .present = true};
+static int fake_trouble(const void *self) {
+    return (self == &hal.estop2) ? 2 : 1;
+}
+
+static int fake_fd(const void *self) {
+    return (self == &hal.estop2) ? 20 : 10;
+}
+
+static void bus_tend(iw_bus_t *self) {
+    (void)self;
+}
+
+static const iw_bus_kind_t bus_kind = {.tend = bus_tend};
+static unsigned tended;
+static unsigned closed;
+
+static void fake_tend(void *self, iw_time_us_t now_us) {
+    (void)now_us;
+    tended += (self == &hal.estop2) ? 10U : 1U;
+}
+
+static void fake_close(void *self) {
+    closed += (self == &hal.estop2) ? 10U : 1U;
+}
+
+static const iw_estop_ops_t fake_ops = {.close = fake_close,
+                                        .watch_fd = fake_fd,
+                                        .tend = fake_tend,
+                                        .pressed = fake_pressed,
+                                        .next_us = fake_next_us,
+                                        .trouble = fake_trouble,
+                                        .present = true};
 
 void setUp(void) {
     hal = (iw_linux_hal_t){.estop_ops = &fake_ops, .estop_last = -1};
+    ((iw_bus_t *)(void *)&hal.bus)->kind = &bus_kind;
     answer = 0;
 }
 
@@ -75,6 +112,112 @@ static void test_next_time_is_the_sooner_of_bus_and_estop(void) {
     TEST_ASSERT_EQUAL_UINT64(200, iw_linux_hal_next_us(&hal));
 }
 
+static void set_up_two(void) {
+    hal.two_contacts = true;
+    iw_estop_pair_init(&hal.pair, 200000U);
+    hal.now_us = 1000000U;
+    answer = 0;
+    answer2 = 0;
+    reads = 0;
+}
+
+int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
+
+/// "A" and "a" are one line; "B" is another of its chip, "C" one of another chip; nobody has "D".
+int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+    if (name[0] == 'D') {
+        return ENOENT;
+    }
+    *out_seen = (iw_estop_seen_t){.offset = (name[0] == 'B') ? 5U : 4U};
+    (void)snprintf(out_seen->node, sizeof out_seen->node, "gpiochip%c", (name[0] == 'C') ? '1' : '0');
+    return 0;
+}
+
+static int open_with(const char *first, const char *second) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    const iw_estop_wish_t wish = {.name = first, .name2 = second, .discrepancy_ms = 200};
+    const int error = iw_linux_hal_open(&other, "unix:/nowhere/bus", &wish, &culprit);
+    if (error == 0) {
+        TEST_ASSERT_TRUE(other.two_contacts);
+        iw_linux_hal_close(&other);
+    } else {
+        TEST_ASSERT_EQUAL_STRING(second, culprit);
+    }
+    return error;
+}
+
+static void test_one_line_under_two_names_is_no_second_contact(void) {
+    if (iw_gpio_estop_ops == NULL) {
+        TEST_IGNORE_MESSAGE("without libgpiod");
+    }
+    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, open_with("A", "a"));
+    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, open_with("A", "A"));
+    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, open_with("D", "D"));
+    TEST_ASSERT_EQUAL_INT(0, open_with("A", "B"));
+    TEST_ASSERT_EQUAL_INT(0, open_with("A", "C"));
+    TEST_ASSERT_EQUAL_INT(0, open_with("A", "D"));
+    TEST_ASSERT_EQUAL_INT(0, open_with("D", "A"));
+}
+
+static void test_second_contact_is_read_whatever_the_first_says(void) {
+    set_up_two();
+    answer = 1;
+    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_UINT(11, reads);
+    TEST_ASSERT_EQUAL_INT(1, hal.contact_last[0]);
+    TEST_ASSERT_EQUAL_INT(0, hal.contact_last[1]);
+    answer = 0;
+    answer2 = 1;
+    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, hal.contact_last[1]);
+    answer2 = 0;
+    TEST_ASSERT_EQUAL_INT(0, look());
+    answer2 = -1;
+    TEST_ASSERT_EQUAL_INT(-1, look());
+}
+
+static void test_contacts_are_judged_at_the_time_of_the_round(void) {
+    set_up_two();
+    answer2 = 1;
+    TEST_ASSERT_EQUAL_INT(1, look());
+    iw_linux_hal_tend(&hal, 1200001U);
+    TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, look());
+    TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hal.estop_last);
+}
+
+static void test_each_contact_is_watched_tended_and_told_of(void) {
+    TEST_ASSERT_EQUAL_INT(10, iw_linux_hal_estop_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop2_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(1, iw_linux_hal_estop_trouble(&hal, 0));
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_estop_trouble(&hal, 1));
+    tended = 0;
+    iw_linux_hal_tend(&hal, 1);
+    TEST_ASSERT_EQUAL_UINT(1, tended);
+    set_up_two();
+    iw_linux_hal_tend(&hal, 2);
+    TEST_ASSERT_EQUAL_UINT(12, tended);
+    TEST_ASSERT_EQUAL_INT(10, iw_linux_hal_estop_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(20, iw_linux_hal_estop2_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(1, iw_linux_hal_estop_trouble(&hal, 0));
+    TEST_ASSERT_EQUAL_INT(2, iw_linux_hal_estop_trouble(&hal, 1));
+}
+
+static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(void) {
+    iw_bus_t *bus = (iw_bus_t *)(void *)&hal.bus;
+    bus->look_us = 5000000;
+    estop_due_us = 4000000;
+    estop2_due_us = 3000000;
+    TEST_ASSERT_EQUAL_UINT64(4000000, iw_linux_hal_next_us(&hal));
+    set_up_two();
+    TEST_ASSERT_EQUAL_UINT64(3000000, iw_linux_hal_next_us(&hal));
+    answer2 = 1;
+    (void)look();
+    TEST_ASSERT_EQUAL_UINT64(1200001, iw_linux_hal_next_us(&hal));
+    estop_due_us = 1100000;
+    TEST_ASSERT_EQUAL_UINT64(1100000, iw_linux_hal_next_us(&hal));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_estop_is_read_whole_by_whoever_does_not_wait);
@@ -83,5 +226,10 @@ int main(void) {
     RUN_TEST(test_wait_counts_for_one_look);
     RUN_TEST(test_last_answer_is_kept);
     RUN_TEST(test_next_time_is_the_sooner_of_bus_and_estop);
+    RUN_TEST(test_one_line_under_two_names_is_no_second_contact);
+    RUN_TEST(test_second_contact_is_read_whatever_the_first_says);
+    RUN_TEST(test_contacts_are_judged_at_the_time_of_the_round);
+    RUN_TEST(test_each_contact_is_watched_tended_and_told_of);
+    RUN_TEST(test_next_time_is_the_soonest_of_both_contacts_and_their_difference);
     return UNITY_END();
 }

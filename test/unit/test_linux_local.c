@@ -360,6 +360,40 @@ static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
+static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
+    static iw_linux_hal_t other;
+    static char second_name[200];
+    const char *culprit = NULL;
+    const int before = dup(0);
+    (void)close(before);
+    (void)snprintf(second_name, sizeof second_name, "%s2", estop_name);
+    const struct {
+        const char *first;
+        const char *second;
+        int error;
+    } rows[] = {{estop_name, estop_name, ENOTUNIQ},
+                {estop_name, "gpiochip0:4", EXDEV},
+                {"none", second_name, EXDEV},
+                {estop_name, "unix:", ENOENT},
+                {estop_name, "none", 0},
+                {estop_name, NULL, 0},
+                {estop_name, second_name, 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const iw_estop_wish_t wish = {.name = rows[i].first, .name2 = rows[i].second, .discrepancy_ms = 200};
+        TEST_ASSERT_EQUAL_INT(rows[i].error, iw_linux_hal_open(&other, bus_name, &wish, &culprit));
+        if (rows[i].error != 0) {
+            TEST_ASSERT_EQUAL_STRING(rows[i].second, culprit);
+        } else {
+            TEST_ASSERT_EQUAL(rows[i].second == second_name, other.two_contacts);
+            TEST_ASSERT_EQUAL_UINT32(200000U, other.pair.limit_us);
+            iw_linux_hal_close(&other);
+        }
+    }
+    const int after = dup(0);
+    (void)close(after);
+    TEST_ASSERT_EQUAL_INT(before, after);
+}
+
 static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
     static iw_linux_hal_t other;
     const char *culprit = NULL;
@@ -483,6 +517,7 @@ int main(void) {
     RUN_TEST(test_estop_any_byte_but_zero_is_pressed);
     RUN_TEST(test_estop_connection_lost_and_back_released_was_unreadable_once);
     RUN_TEST(test_hal_refuses_names_without_a_backend_and_keeps_nothing_open);
+    RUN_TEST(test_hal_opens_two_contacts_of_one_kind_or_none);
     RUN_TEST(test_hal_without_an_estop_is_released_and_watches_nothing);
     const int failed = UNITY_END();
     (void)unlink(bus_name + 5);

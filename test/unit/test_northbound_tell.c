@@ -76,6 +76,17 @@ static void test_holder_without_name_or_process_is_told_by_its_number(void) {
     assert_says("\"commanded_mm_s\":300");
 }
 
+static void test_estop_tells_its_second_contact_only_if_it_has_one(void) {
+    status();
+    assert_says("\"estop\":{\"line\":\"PA0\",\"state\":\"released\",\"simulated\":false");
+    around.estop.line2 = "PA1";
+    around.estop.pressed_at = "line2";
+    around.estop.answer = IW_ESTOP_DISAGREES;
+    status();
+    assert_says("\"state\":\"disagrees\",\"line2\":\"PA1\",\"pressed_at\":\"line2\",\"simulated\":false");
+    around.estop = (iwn_estop_t){.line = "PA0", .present = true};
+}
+
 static void test_warnings_are_told_in_their_order(void) {
     around.warning[0] = "one";
     around.warning[1] = "two";
@@ -140,6 +151,7 @@ int main(void) {
     RUN_TEST(test_status_of_a_machine_without_a_clock_of_the_day_says_null);
     RUN_TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it);
     RUN_TEST(test_holder_without_name_or_process_is_told_by_its_number);
+    RUN_TEST(test_estop_tells_its_second_contact_only_if_it_has_one);
     RUN_TEST(test_warnings_are_told_in_their_order);
     RUN_TEST(test_stop_without_a_clock_of_the_day_has_its_age);
     RUN_TEST(test_stop_that_never_was_has_nothing_but_its_number);

@@ -118,6 +118,7 @@ static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
     }
     TEST_ASSERT_EQUAL_STRING("offset_doubted", iwn_force_validity_name(IW_FORCE_OFFSET_DOUBTED));
     TEST_ASSERT_EQUAL_STRING("unreadable", iwn_estop_name(-1, true));
+    TEST_ASSERT_EQUAL_STRING("disagrees", iwn_estop_name(IW_ESTOP_DISAGREES, true));
     TEST_ASSERT_EQUAL_STRING("none", iwn_estop_name(0, false));
 }
 

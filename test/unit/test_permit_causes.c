@@ -35,6 +35,7 @@ typedef struct {
 
 static const row_t rows[] = {
     ALWAYS(IW_CAUSE_ESTOP_LINE),
+    ALWAYS(IW_CAUSE_ESTOP_DISAGREES),
     ALWAYS(IW_CAUSE_ESTOP_SOFTWARE),
     ALWAYS(IW_CAUSE_INTERNAL),
     MOVING(IW_CAUSE_WHEEL_LOST),
@@ -192,8 +193,8 @@ static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
 }
 
 static void test_permit_present_tells_levels_while_told_and_events_for_a_second(void) {
-    static const iw_cause_t levels[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_BUS_DOWN, IW_CAUSE_SEND_STALLED,
-                                        IW_CAUSE_WHEEL_LOST};
+    static const iw_cause_t levels[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_DISAGREES, IW_CAUSE_BUS_DOWN,
+                                        IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_LOST};
     static const iw_cause_t events[] = {IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED,
                                         IW_CAUSE_FEEDBACK_SIGN,  IW_CAUSE_OVERSPEED,     IW_CAUSE_LOOP_HUNG,
                                         IW_CAUSE_INTERNAL};

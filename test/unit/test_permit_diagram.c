@@ -328,7 +328,7 @@ static void test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so(vo
         TEST_ASSERT_EQUAL_INT_MESSAGE(latched ? IW_PHASE_CUT : IW_PHASE_BRAKING, rig.permit.phase, what);
         latching += latched ? 1U : 0U;
     }
-    TEST_ASSERT_EQUAL_UINT(11, latching);
+    TEST_ASSERT_EQUAL_UINT(12, latching);
     TEST_ASSERT_FALSE(iw_cause_latches(IW_CAUSE_NONE));
 }
 

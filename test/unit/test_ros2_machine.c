@@ -253,6 +253,12 @@ static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
     facts.machine.rolling = false;
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "pressed");
     expect(ROS_TELLS_ESTOP, ROS_ERROR, "release the button");
+    (void)snprintf(facts.machine.pressed_at, sizeof facts.machine.pressed_at, "both");
+    expect(ROS_TELLS_ESTOP, ROS_ERROR, "the e-stop is pressed: release the button");
+    (void)snprintf(facts.machine.pressed_at, sizeof facts.machine.pressed_at, "line2");
+    expect(ROS_TELLS_ESTOP, ROS_ERROR, "pressed at its contact line2: release the button");
+    (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "disagrees");
+    expect(ROS_TELLS_ESTOP, ROS_ERROR, "two contacts disagree, pressed at line2");
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "unreadable");
     expect(ROS_TELLS_ESTOP, ROS_ERROR, "check its wire");
     (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "down");

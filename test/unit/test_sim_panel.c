@@ -35,7 +35,7 @@ void setUp(void) {
     memset(&panel, 0xA5, sizeof panel);
     sim_world_init(&world, NULL, START_US, 1U);
     panel.world = &world;
-    panel.hooks = (sim_hooks_t){NULL, NULL, mark, quit, NULL};
+    panel.hooks = (sim_hooks_t){.mark = mark, .quit = quit};
     marked[0] = '\0';
     quits = 0U;
     run_until(NOW_US);
@@ -152,6 +152,11 @@ static void test_panel_every_command_with_right_arguments_is_done(void) {
         "estop pulse 0.5",
         "estop unplug",
         "estop plug",
+        "contact 1 press",
+        "contact 2 release",
+        "contact 2 pulse 20",
+        "contact 1 unplug",
+        "contact 2 plug",
         "normal",
     };
     for (size_t i = 0U; i < sizeof right / sizeof right[0]; i++) {
@@ -274,6 +279,14 @@ static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
         "estop pulse 0",
         "estop pulse 60001",
         "estop unplug 1",
+        "contact",
+        "contact 1",
+        "contact 0 press",
+        "contact 3 press",
+        "contact press",
+        "contact 1 push",
+        "contact 1 press 5",
+        "contact 2 pulse",
         "log",
         "log mark",
         "log it please",
@@ -398,6 +411,39 @@ static void test_words_frame_reads_what_candump_writes(void) {
     TEST_ASSERT_EQUAL_HEX32(0x7FFU | IW_CAN_REMOTE, frame.id);
 }
 
+static void test_each_contact_moves_alone_and_the_button_moves_both(void) {
+    static sim_button_t first;
+    static sim_button_t second;
+    first = (sim_button_t){.release_us = IW_NEVER};
+    second = first;
+    for (unsigned i = 0; i < SIM_BUTTON_CLIENTS; i++) {
+        first.client[i].fd = second.client[i].fd = -1;
+    }
+    panel.hooks.button = &first;
+    expect_refused("contact 1 press"); // It has one only.
+    expect_refused("contact 2 press");
+    TEST_ASSERT_FALSE(first.pressed);
+    panel.hooks.second = &second;
+    expect_done("contact 2 press");
+    TEST_ASSERT_TRUE(!first.pressed && second.pressed);
+    expect_done("contact 1 unplug");
+    TEST_ASSERT_TRUE(first.unplugged && !second.unplugged);
+    (void)sim_panel_execute(&panel, NOW_US, "status");
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"estop\":\"unplugged\",\"estop2\":\"pressed\"}"));
+    expect_refused("contact 2 pulse 20"); // Pressed already.
+    expect_done("normal");
+    TEST_ASSERT_FALSE(first.pressed || second.pressed || first.unplugged || second.unplugged);
+    expect_done("estop press");
+    TEST_ASSERT_TRUE(first.pressed && second.pressed);
+    expect_done("contact 1 release");
+    TEST_ASSERT_TRUE(!first.pressed && second.pressed);
+    expect_done("contact 1 pulse 20");
+    TEST_ASSERT_TRUE(first.pressed && first.release_us == NOW_US + 20000U);
+    expect_done("estop release");
+    expect_done("estop pulse 5");
+    TEST_ASSERT_TRUE(first.release_us == NOW_US + 5000U && second.release_us == NOW_US + 5000U);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_panel_every_command_with_right_arguments_is_done);
@@ -413,5 +459,6 @@ int main(void) {
     RUN_TEST(test_panel_commands_reach_the_side_they_name);
     RUN_TEST(test_panel_mark_and_quit_reach_the_hooks);
     RUN_TEST(test_words_frame_reads_what_candump_writes);
+    RUN_TEST(test_each_contact_moves_alone_and_the_button_moves_both);
     return UNITY_END();
 }

@@ -19,7 +19,7 @@ void setUp(void) {
     memset(&panel, 0xA5, sizeof panel);
     sim_world_init(&world, NULL, NOW_US, 1U);
     panel.world = &world;
-    panel.hooks = (sim_hooks_t){NULL, NULL, NULL, NULL, NULL};
+    panel.hooks = (sim_hooks_t){.hub = NULL};
 }
 
 void tearDown(void) {}

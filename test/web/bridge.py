@@ -1039,7 +1039,7 @@ def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
 def test_words_of_the_page_are_those_of_iwheelctl(rig):
     """The cures of causes, and what to do next, stand once more in strings.js: letter for letter."""
     advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
-    strings = (ROOT / "bridge/web/page/strings.js").read_text(encoding="utf-8")
+    strings = (ROOT / "app/bridge/web/page/strings.js").read_text(encoding="utf-8")
     cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
     ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {"):], re.MULTILINE))
     assert cures and cures == ours, set(cures.items()) ^ set(ours.items())

@@ -178,4 +178,4 @@ class WebRig(Rig):
 
 def page_folder(build):
     """The page as it would be installed."""
-    return Path(build).resolve() / "bridge/web/page"
+    return Path(build).resolve() / "app/bridge/web/page"

@@ -13,7 +13,7 @@ void bringup_store_wiring(bringup_t *self) {
     iw_estop_seen_t seen;
     FILE *const nowhere = fopen("/dev/null", "we");
     if (nowhere == NULL || iw_estop_see(self->config.estop.line, &seen) != 0) {
-        seen = (iw_estop_seen_t){"", ""};
+        seen = (iw_estop_seen_t){.chip = ""};
     }
     const char *const found[][2] = {{"chip", seen.chip}, {"chip_line", seen.line}};
     for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {

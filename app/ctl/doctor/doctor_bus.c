@@ -136,7 +136,10 @@ static bool open_hal(doctor_t *self) {
                                   .active_high = self->config.estop.active_high,
                                   .debounce_ms = self->config.estop.debounce_ms,
                                   .chip = self->config.estop.chip,
-                                  .chip_line = self->config.estop.chip_line};
+                                  .chip_line = self->config.estop.chip_line,
+                                  .name2 = is_occupied(self) ? NULL : self->config.estop.line2,
+                                  .active_high2 = self->config.estop.active2_high,
+                                  .discrepancy_ms = self->config.estop.discrepancy_ms};
     const inspect_opened_t opened = inspect_open(&self->hal, self->bus, &line, &self->findings);
     self->open = opened.hal;
     return opened.hal && opened.bus;
@@ -171,9 +174,11 @@ inspect_estop_t doctor_estop(doctor_t *self) {
         .line = text_word(estop, "line"),
         .present = strcmp(state, "none") != 0,
         .simulated = json_is_true(json_object_get(estop, "simulated")),
-        .level = (strcmp(state, "released") == 0)  ? 0
-                 : (strcmp(state, "pressed") == 0) ? 1
-                                                   : -1,
+        .pressed_at = json_string_value(json_object_get(estop, "pressed_at")),
+        .level = (strcmp(state, "released") == 0)    ? 0
+                 : (strcmp(state, "pressed") == 0)   ? 1
+                 : (strcmp(state, "disagrees") == 0) ? IW_ESTOP_DISAGREES
+                                                     : -1,
         .trouble = "the gateway's log tells why: journalctl -u iwheel-gateway",
     };
 }

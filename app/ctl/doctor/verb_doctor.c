@@ -172,7 +172,8 @@ static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
             self->gateway.status = near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
         }
         const inspect_estop_t estop = doctor_estop(self);
-        if (estop.level >= 0 && (estop.level > 0) == pressed) {
+        const char *where = (estop.pressed_at != NULL) ? estop.pressed_at : "both";
+        if (estop.level >= 0 && (estop.level > 0) == pressed && (!pressed || strcmp(where, "both") == 0)) {
             return true;
         }
         struct pollfd key = {.fd = STDIN_FILENO, .events = POLLIN};

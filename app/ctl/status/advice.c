@@ -14,6 +14,7 @@ typedef struct {
 
 static const cure_t cures[] = {
     {"estop_line", "release the e-stop button (or mend its wire)"},
+    {"estop_disagrees", "mend the e-stop's contact or wire, press and release its button"},
     {"estop_software", "see that nobody is in the way"},
     {"wheel_lost", "switch the wheels on; check their cable and the termination"},
     {"wheel_rebooted", "find out why a wheel lost power; wait until both are heard"},

@@ -78,9 +78,19 @@ static const char *tell_tried(const json_t *estop, char *out_text, size_t size) 
     return (tried == NULL) ? "" : out_text;
 }
 
+/// Of two contacts: the other line, and which of them is pressed.
+static const char *tell_second(const json_t *estop, char *out_text, size_t size) {
+    const char *line2 = json_string_value(get(estop, "line2"));
+    const char *where = text_word(estop, "pressed_at");
+    (void)snprintf(out_text, size, ", line2 %.128s%s%.16s", (line2 != NULL) ? line2 : "",
+                   is(where, "neither") ? "" : "; pressed at ", is(where, "neither") ? "" : where);
+    return (line2 == NULL) ? "" : out_text;
+}
+
 static void draw_surroundings(const paper_t *paper, const json_t *status) {
     char text[512];
     char tried[TEXT_CELL + 32U];
+    char second[192];
     const json_t *bus = get(status, "bus");
     const json_t *estop = get(status, "estop");
     const char *button = text_word(estop, "state");
@@ -88,8 +98,8 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
                    text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
     paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
     const bool simulated = json_is_true(get(estop, "simulated"));
-    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s%s", is(button, "none") ? "NONE" : button,
-                   simulated ? " (SIMULATED)" : "", text_word(estop, "line"),
+    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s%s%s", is(button, "none") ? "NONE" : button,
+                   simulated ? " (SIMULATED)" : "", text_word(estop, "line"), tell_second(estop, second, sizeof second),
                    (simulated || is(button, "none")) ? "" : tell_tried(estop, tried, sizeof tried));
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }

@@ -48,7 +48,10 @@ static void draw_head(const top_model_t *model) {
     const char *button = text_word(estop, "state");
     const bool released = strcmp(button, "released") == 0;
     char right[96];
-    (void)snprintf(right, sizeof right, "e-stop %.16s%s ", (strcmp(button, "none") == 0) ? "NONE" : button,
+    const char *where = json_string_value(get(estop, "pressed_at"));
+    const bool at_one = where != NULL && strncmp(where, "line", 4) == 0;
+    (void)snprintf(right, sizeof right, "e-stop %.16s%s%.8s%s ", (strcmp(button, "none") == 0) ? "NONE" : button,
+                   at_one ? " at " : "", at_one ? where : "",
                    json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "");
     const int column = COLS - (int)strlen(right);
     const int room = column - 10;

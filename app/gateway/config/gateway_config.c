@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "gateway_config.h"
 
+#include "contacts.h"
+
 #include "config/settings.h"
 
 #include <string.h>
@@ -185,6 +187,13 @@ static const settings_key_t keys[] = {
      TEXT(estop.chip, settings_wrong_address)},
     {"estop", "chip_line", "", "The line's own name then (gpioinfo shows it); any: not compared.",
      TEXT(estop.chip_line, settings_wrong_address)},
+    {"estop", "line2", "",
+     "The button's second contact, as line: pressed if either says so, released only if both do. none: there is none.",
+     TEXT(estop.line2, settings_wrong_address)},
+    {"estop", "line2_active", "", "Level of line2 that means pressed, as active.", WORD(estop.active2_high, low_high)},
+    {"estop", "estop_discrepancy_ms", " ms",
+     "If the contacts differ for longer, the stop latches until both were seen pressed, then released.",
+     NUMBER(estop.discrepancy_ms, 50, 1000)},
 
     {"northbound", "socket", "", "Where clients connect.", TEXT(northbound.socket, settings_wrong_socket)},
     {"northbound", "mode", "", "Permissions of the socket, octal: who may connect may move the wheels.",
@@ -285,8 +294,18 @@ static void complain_rest(settings_report_t *report, const iw_config_t *core, un
                       core->rest_rpm, core->radius_mm, iw_config_rest(core).max, iw_config_rest(core).standard);
 }
 
+static unsigned line_of_key(const char *name, const unsigned *lines) {
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        if (strcmp(keys[i].section, "estop") == 0 && strcmp(keys[i].key, name) == 0) {
+            return lines[i];
+        }
+    }
+    return 0;
+}
+
 static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
     const iw_config_t *core = &((const gateway_config_t *)values)->core;
+    config_relate_contacts(values, report, line_of_key("line2", lines), line_of_key("estop_discrepancy_ms", lines));
     char cures[SETTINGS_MESSAGE_SIZE];
     const iw_config_fault_t fault = iw_config_check(core);
     if (fault == IW_CONFIG_STOP_BUDGET) {
@@ -326,7 +345,7 @@ IW_STATIC_ASSERT(sizeof keys / sizeof keys[0] <= SETTINGS_KEYS_MAX, keys_fit);
 void gateway_config_default(gateway_config_t *out_config) {
     static const gateway_config_t standard = {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
-        .estop = {"ESTOP", true, 5U, "any", "any"},
+        .estop = {"ESTOP", true, 5U, "any", "any", "none", true, 200U},
         .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U, 1000U},
         .record = {30U, "/var/lib/iwheel", 200U},
     };

@@ -37,11 +37,14 @@ typedef struct gateway_config {
         gateway_mismatch_t on_mismatch;       ///< Whether a contradicted timing refuses arm or only warns.
     } bus;
     struct {
-        char line[GATEWAY_ADDRESS_SIZE]; ///< gpiod line name, `gpiochipN:OFFSET`, `unix:PATH` (SIMULATED) or `none`.
-        bool active_high;                ///< Pressed, or a cut wire, reads high.
-        uint16_t debounce_ms;            ///< On release only, 0..1000.
-        char chip[32];                   ///< Label of the line's chip, as seen at bringup; `any`: not compared.
-        char chip_line[32];              ///< The line's own name, as seen at bringup; `any`: not compared.
+        char line[GATEWAY_ADDRESS_SIZE];  ///< gpiod line name, `gpiochipN:OFFSET`, `unix:PATH` (SIMULATED) or `none`.
+        bool active_high;                 ///< Pressed, or a cut wire, reads high.
+        uint16_t debounce_ms;             ///< On release only, 0..1000.
+        char chip[32];                    ///< Label of the line's chip, as seen at bringup; `any`: not compared.
+        char chip_line[32];               ///< The line's own name, as seen at bringup; `any`: not compared.
+        char line2[GATEWAY_ADDRESS_SIZE]; ///< The button's second contact, as `line`; `none`: it has one.
+        bool active2_high;                ///< As `active_high`.
+        uint16_t discrepancy_ms;          ///< The contacts may differ for so long, 50..1000; more than `debounce_ms`.
     } estop;
     struct {
         char socket[GATEWAY_PATH_SIZE];

@@ -6,9 +6,40 @@
 #include <stdio.h>
 #include <string.h>
 
-static bool is_same(const gw_button_t *self, const iw_estop_seen_t *seen, const gw_tried_t *tried) {
-    return self->active_high == tried->active_high && strcmp(self->line, tried->line) == 0 &&
-           strcmp(seen->chip, tried->seen.chip) == 0 && strcmp(seen->line, tried->seen.line) == 0;
+/// What the kernel calls the lines of all contacts. False if one cannot be read.
+static bool see(const iw_linux_hal_t *hal, iw_estop_seen_t seen[IW_ESTOP_CONTACTS]) {
+    memset(seen, 0, IW_ESTOP_CONTACTS * sizeof seen[0]);
+    return hal->estop_ops->present && !hal->estop_ops->simulated && iw_linux_hal_estop_seen(hal, 0, &seen[0]) &&
+           (!hal->two_contacts || iw_linux_hal_estop_seen(hal, 1, &seen[1]));
+}
+
+/// A second contact that is not there has no polarity; what was stored before there were two has no name of it.
+static bool is_same_contact(const gw_button_t *self, const iw_estop_seen_t *seen, const gw_tried_t *tried, unsigned i) {
+    const char *line = (tried->contact[i].line[0] != '\0') ? tried->contact[i].line : "none";
+    const bool none = strcmp(line, "none") == 0;
+    return strcmp(self->contact[i].line, line) == 0 &&
+           (none || self->contact[i].active_high == tried->contact[i].active_high) &&
+           strcmp(seen->chip, tried->contact[i].seen.chip) == 0 && strcmp(seen->line, tried->contact[i].seen.line) == 0;
+}
+
+static void note(const gw_button_t *self, const iw_estop_seen_t seen[IW_ESTOP_CONTACTS], gw_tried_t *out_tried) {
+    memset(out_tried, 0, sizeof *out_tried);
+    out_tried->wall_us = iw_clock_wall_us();
+    for (unsigned i = 0; i < IW_ESTOP_CONTACTS; i++) {
+        out_tried->contact[i].active_high = self->contact[i].active_high;
+        (void)snprintf(out_tried->contact[i].line, sizeof out_tried->contact[i].line, "%s", self->contact[i].line);
+        out_tried->contact[i].seen = seen[i];
+    }
+}
+
+/// What all contacts say together; `before` while they differ.
+static int said_by_all(const iw_linux_hal_t *hal, int before) {
+    const int first = hal->contact_last[0];
+    const int second = hal->two_contacts ? hal->contact_last[1] : first;
+    if (first < 0 || second < 0) {
+        return -1;
+    }
+    return ((first > 0) == (second > 0)) ? first : before;
 }
 
 /// True if the answer ends a press.
@@ -29,29 +60,45 @@ static bool follow(gw_button_t *self, int answer, iw_time_us_t now_us) {
     return false;
 }
 
+/// The answers of the last look, and no time, decide what a look shows.
+static bool is_news(gw_button_t *self, const iw_linux_hal_t *hal) {
+    const bool news = !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0;
+    self->looked = true;
+    memcpy(self->last, hal->contact_last, sizeof self->last);
+    return news;
+}
+
 gw_button_news_t gw_button_look(gw_button_t *self, const iw_linux_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried) {
-    iw_estop_seen_t seen;
-    const bool known = hal->estop_ops->present && !hal->estop_ops->simulated && iw_linux_hal_estop_seen(hal, &seen);
-    if (follow(self, known ? hal->estop_last : -1, now_us)) {
-        memset(tried, 0, sizeof *tried);
-        tried->wall_us = iw_clock_wall_us();
-        tried->active_high = self->active_high;
-        (void)snprintf(tried->line, sizeof tried->line, "%s", self->line);
-        tried->seen = seen;
+    iw_estop_seen_t seen[IW_ESTOP_CONTACTS];
+    if (!is_news(self, hal)) {
+        return GW_BUTTON_NO_NEWS;
+    }
+    const bool known = see(hal, seen);
+    const int before = (self->state == GW_BUTTON_UNKNOWN) ? -1 : (int)(self->state == GW_BUTTON_PRESSED);
+    if (follow(self, known ? said_by_all(hal, before) : -1, now_us)) {
+        note(self, seen, tried);
         return GW_BUTTON_TRIED;
     }
-    if (known && tried->wall_us != 0 && !is_same(self, &seen, tried)) {
+    const bool same = is_same_contact(self, &seen[0], tried, 0) && is_same_contact(self, &seen[1], tried, 1);
+    if (known && tried->wall_us != 0 && !same) {
         memset(tried, 0, sizeof *tried);
         return GW_BUTTON_VOID;
     }
     return GW_BUTTON_NO_NEWS;
 }
 
+static const struct {
+    const char *line, *active_high, *chip, *chip_line;
+} fields[IW_ESTOP_CONTACTS] = {{"line", "active_high", "chip", "chip_line"},
+                               {"line2", "active2_high", "chip2", "chip2_line"}};
+
 void gw_tried_write(const gw_tried_t *tried, iwn_out_t *json) {
-    iwn_out_text(json, "line", tried->line);
-    iwn_out_bool(json, "active_high", tried->active_high);
-    iwn_out_text(json, "chip", tried->seen.chip);
-    iwn_out_text(json, "chip_line", tried->seen.line);
+    for (unsigned i = 0; i < IW_ESTOP_CONTACTS; i++) {
+        iwn_out_text(json, fields[i].line, tried->contact[i].line);
+        iwn_out_bool(json, fields[i].active_high, tried->contact[i].active_high);
+        iwn_out_text(json, fields[i].chip, tried->contact[i].seen.chip);
+        iwn_out_text(json, fields[i].chip_line, tried->contact[i].seen.line);
+    }
     iwn_out_int(json, "wall_us", tried->wall_us);
 }
 
@@ -60,6 +107,20 @@ static bool read_text(iwn_json_t object, const char *field, char *out_text, size
     return iwn_json_find(object, field, &value) && iwn_json_text(value, out_text, size);
 }
 
+static bool read_contact(iwn_json_t object, unsigned i, gw_tried_t *out_tried) {
+    iwn_json_t value;
+    if (!iwn_json_find(object, fields[i].active_high, &value) ||
+        (iwn_json_kind(value) != IWN_JSON_TRUE && iwn_json_kind(value) != IWN_JSON_FALSE)) {
+        return false;
+    }
+    out_tried->contact[i].active_high = iwn_json_kind(value) == IWN_JSON_TRUE;
+    return read_text(object, fields[i].line, out_tried->contact[i].line, sizeof out_tried->contact[i].line) &&
+           read_text(object, fields[i].chip, out_tried->contact[i].seen.chip, sizeof out_tried->contact[i].seen.chip) &&
+           read_text(object, fields[i].chip_line, out_tried->contact[i].seen.line,
+                     sizeof out_tried->contact[i].seen.line);
+}
+
+/// What was stored before there were two contacts knows nothing of the second.
 bool gw_tried_read(iwn_json_t object, gw_tried_t *out_tried) {
     iwn_json_t value;
     memset(out_tried, 0, sizeof *out_tried);
@@ -67,12 +128,7 @@ bool gw_tried_read(iwn_json_t object, gw_tried_t *out_tried) {
         return false;
     }
     out_tried->wall_us = iwn_json_integer(value);
-    if (!iwn_json_find(object, "active_high", &value) ||
-        (iwn_json_kind(value) != IWN_JSON_TRUE && iwn_json_kind(value) != IWN_JSON_FALSE)) {
-        return false;
-    }
-    out_tried->active_high = iwn_json_kind(value) == IWN_JSON_TRUE;
-    return out_tried->wall_us > 0 && read_text(object, "line", out_tried->line, sizeof out_tried->line) &&
-           read_text(object, "chip", out_tried->seen.chip, sizeof out_tried->seen.chip) &&
-           read_text(object, "chip_line", out_tried->seen.line, sizeof out_tried->seen.line);
+    const bool has_second = iwn_json_find(object, fields[1].line, &value);
+    return out_tried->wall_us > 0 && read_contact(object, 0, out_tried) &&
+           (!has_second || read_contact(object, 1, out_tried));
 }

@@ -4,7 +4,7 @@
 ///     UNKNOWN --released--> RELEASED --pressed--> PRESSED --released after GW_BUTTON_PRESS_US or more--> RELEASED: it was tried
 ///     (unreadable: UNKNOWN; a line that is pressed at the start shows nothing; nor does a shorter pulse, which may be noise)
 ///
-/// What was tried is a line of a chip, by the kernel's names, with its polarity: with another wiring it counts no more.
+/// Of two contacts both must be seen pressed for so long and then released. What was tried is a line of a chip, by the kernel's names, with its polarity: with another wiring it counts no more.
 #ifndef GATEWAY_BUTTON_H
 #define GATEWAY_BUTTON_H
 
@@ -20,17 +20,23 @@
 /// The wiring on which a button was seen to work, and when. All of it is zero if it never was.
 typedef struct {
     int64_t wall_us; ///< Of the release; 0: never.
-    bool active_high;
-    char line[GW_BUTTON_LINE_SIZE]; ///< As configured.
-    iw_estop_seen_t seen;           ///< As the kernel calls it.
+    struct {
+        bool active_high;
+        char line[GW_BUTTON_LINE_SIZE]; ///< As configured; of the second: "none" if there is none, or empty.
+        iw_estop_seen_t seen;           ///< As the kernel calls it.
+    } contact[IW_ESTOP_CONTACTS];
 } gw_tried_t;
 
 typedef enum { GW_BUTTON_UNKNOWN = 0, GW_BUTTON_RELEASED, GW_BUTTON_PRESSED } gw_button_state_t;
 
-/// The button that is watched. It begins all zero but for the first two.
+/// The button that is watched. It begins all zero but for its contacts.
 typedef struct {
-    const char *line; ///< As configured.
-    bool active_high; ///< The same.
+    struct {
+        const char *line; ///< As configured.
+        bool active_high; ///< The same.
+    } contact[IW_ESTOP_CONTACTS];
+    bool looked; ///< At these answers:
+    int last[IW_ESTOP_CONTACTS];
     gw_button_state_t state;
     iw_time_us_t pressed_us;
 } gw_button_t;
@@ -42,7 +48,8 @@ typedef enum {
     GW_BUTTON_VOID,  ///< `tried` was for another wiring, and is forgotten.
 } gw_button_news_t;
 
-/// What the last look at the e-stop has shown. A simulated button, or none, is no news.
+/// What the last look at the e-stop has shown. A simulated button, or none, is no news; nor is a look like the one before it:
+/// a line is never called otherwise without having been unreadable in between.
 gw_button_news_t gw_button_look(gw_button_t *self, const iw_linux_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried);
 
 /// Members of an object that is open.

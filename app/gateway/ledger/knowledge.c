@@ -167,7 +167,7 @@ static void merge(gw_knowledge_t *self, const gw_known_t *stored) {
 
 /// The first news: the file, or why there is none.
 static void take_file(gw_knowledge_t *self, gw_keeper_news_t news, const char *text, size_t length) {
-    gw_known_t stored;
+    static gw_known_t stored; // Too large for a stack.
     if (news == GW_KEEPER_ABSENT) {
         self->state = GW_MEMORY_NEW;
     } else if (news == GW_KEEPER_READ && gw_memory_read(text, length, self->bus, &stored, self->reason)) {

@@ -6,6 +6,7 @@
 #include "process/log.h"
 
 #include <inttypes.h>
+#include <string.h>
 
 #define TENTHS(value) (value) / 10U, (value) % 10U
 
@@ -31,7 +32,9 @@ void gw_report_start(const gateway_config_t *config, bool simulated, bool watche
     if (watched) {
         gw_log(log, GW_LOG_INFO, "watchers at %s", config->northbound.watch_socket);
     }
-    gw_log(log, GW_LOG_INFO, "e-stop: %s%s", config->estop.line, simulated ? " (SIMULATED)" : "");
+    const bool two = strcmp(config->estop.line2, "none") != 0;
+    gw_log(log, GW_LOG_INFO, "e-stop: %s%s%s%s", config->estop.line, two ? " and " : "", two ? config->estop.line2 : "",
+           simulated ? " (SIMULATED)" : "");
     gw_log(log, GW_LOG_INFO, "stop budget, client lost: %" PRIu32 " ms and %" PRIu32 " mm after its last command",
            budget.client_lost_ms, budget.client_lost_mm);
     gw_log(log, GW_LOG_INFO,
@@ -67,7 +70,10 @@ iw_estop_wish_t gw_report_estop(const gateway_config_t *config) {
                              .active_high = config->estop.active_high,
                              .debounce_ms = config->estop.debounce_ms,
                              .chip = config->estop.chip,
-                             .chip_line = config->estop.chip_line};
+                             .chip_line = config->estop.chip_line,
+                             .name2 = config->estop.line2,
+                             .active_high2 = config->estop.active2_high,
+                             .discrepancy_ms = config->estop.discrepancy_ms};
 }
 
 gw_listener_wish_t gw_report_socket(const gateway_config_t *config, gw_right_t right) {

@@ -121,17 +121,24 @@ static void observe_bus(gw_status_t *self, iw_bus_state_t bus, bool first) {
 }
 
 static void observe_estop(gw_status_t *self, bool first) {
-    const int answer = self->wheels->hal.estop_last;
-    if (answer == self->observed.estop && !first) {
+    const iw_linux_hal_t *hal = &self->wheels->hal;
+    const int answer = hal->estop_last;
+    const char *where = hal->two_contacts ? inspect_pressed_at(hal) : NULL;
+    if (answer == self->observed.estop && where == self->observed.pressed_at && !first) {
         return;
     }
     self->observed.estop = answer;
+    self->observed.pressed_at = where;
     const char *name = iwn_estop_name(answer, self->wheels->hal.estop_ops->present);
     const char *trouble = inspect_estop_trouble(&self->wheels->hal);
-    gw_log(self->log, (answer == 0) ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", self->wheels->estop, name,
-           (trouble[0] == '\0') ? "" : ": ", trouble);
+    gw_log(self->log, (answer == 0) ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s%s%s", self->wheels->estop, name,
+           (where == NULL) ? "" : ", pressed at ", (where == NULL) ? "" : where, (trouble[0] == '\0') ? "" : ": ",
+           trouble);
     iwn_out_t json = begin_event(self, "estop");
     iwn_out_text(&json, "state", name);
+    if (where != NULL) {
+        iwn_out_text(&json, "pressed_at", where);
+    }
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_ESTOP);
 }
 

@@ -33,6 +33,7 @@ typedef struct {
     bool rolling_fault;      ///< As told, which is not every one.
     iw_time_us_t rolling_us; ///< When the last fault of that kind was told; 0: none yet.
     int estop;
+    const char *pressed_at;  ///< Which contact, one of the four words; NULL: there is only one.
     bool started;            ///< The first observation only takes notes.
     iw_time_us_t started_us; ///< When that was.
     char holder_name[IWN_NAME_MAX + 1U];

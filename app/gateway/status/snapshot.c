@@ -3,6 +3,7 @@
 
 #include "bus/bus_facts.h"
 #include "clients/clients.h"
+#include "inspect.h"
 #include "ledger/knowledge.h"
 #include "wheels/wheels.h"
 
@@ -28,6 +29,8 @@ static iwn_bus_t bus_of(const gw_wheels_t *wheels) {
 static iwn_estop_t estop_of(const gw_wheels_t *wheels) {
     const iw_estop_ops_t *kind = wheels->hal.estop_ops;
     return (iwn_estop_t){.line = wheels->estop,
+                         .line2 = wheels->hal.two_contacts ? wheels->estop2 : NULL,
+                         .pressed_at = inspect_pressed_at(&wheels->hal),
                          .answer = wheels->hal.estop_last,
                          .present = kind->present,
                          .simulated = kind->simulated,

@@ -46,7 +46,7 @@ static void put_value(gw_tape_t *self, blackbox_kind_t kind, uint32_t number, in
 /// Of the frames that the port refused the first is noted: the core passes one behind it in a call of its own, or not.
 static int tape_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = iw_bus_send(&self->port->bus, frames, count);
+    const int answer = self->port.send(self->port.context, frames, count);
     const uint32_t accepted = (answer > 0) ? (uint32_t)answer : 0U;
     if (accepted < count) {
         put_value(self, BLACKBOX_NOT_SENT, frames[accepted].id, (answer < 0) ? answer : 0);
@@ -56,7 +56,7 @@ static int tape_send(void *context, const iw_can_frame_t *frames, uint32_t count
 
 static int tape_receive(void *context, iw_can_frame_t *out_frame) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = iw_bus_receive(&self->port->bus, out_frame);
+    const int answer = self->port.receive(self->port.context, out_frame);
     if (answer > 0) {
         self->step_frames++;
         put_frame(self, out_frame);
@@ -66,7 +66,7 @@ static int tape_receive(void *context, iw_can_frame_t *out_frame) {
 
 static iw_bus_state_t tape_bus_state(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const iw_bus_state_t state = iw_bus_state(&self->port->bus);
+    const iw_bus_state_t state = self->port.bus_state(self->port.context);
     if (!self->answered || state != self->bus) {
         const blackbox_entry_t entry = {.at_us = self->step_us, .kind = BLACKBOX_BUS, .a = (uint8_t)state};
         gw_tape_put(self, &entry);
@@ -78,14 +78,14 @@ static iw_bus_state_t tape_bus_state(void *context) {
 
 static int tape_purge(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = iw_bus_purge(&self->port->bus);
+    const int answer = self->port.purge(self->port.context);
     put_value(self, BLACKBOX_PURGE, 0, answer);
     return answer;
 }
 
 static int tape_estop_pressed(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = iw_linux_hal_pressed(self->port);
+    const int answer = self->port.estop_pressed(self->port.context);
     if (!self->answered || answer != self->estop) {
         put_value(self, BLACKBOX_ESTOP, 0, answer);
     }
@@ -93,8 +93,8 @@ static int tape_estop_pressed(void *context) {
     return answer;
 }
 
-iw_hal_t gw_tape_hal(gw_tape_t *self, iw_linux_hal_t *port) {
-    self->port = port;
+iw_hal_t gw_tape_hal(gw_tape_t *self, const iw_hal_t *port) {
+    self->port = *port;
     return (iw_hal_t){
         .send = tape_send,
         .receive = tape_receive,

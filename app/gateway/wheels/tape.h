@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-/// The HAL of the gateway's core: everything that goes into the core passes here and is noted in the black box on its way, and
+/// A recorder around any HAL: everything that goes into the core passes here and is noted in the black box on its way, and
 /// requests are noted beside it by the caller. Costs a copy of a dozen bytes each; never waits, never fails.
 ///
-///     core --the one table of functions (hal.h)--> tape --> iw_bus_receive (port/linux) --> socket
+///     core --(hal.h)--> tape --(hal.h)--> port
 #ifndef GATEWAY_TAPE_H
 #define GATEWAY_TAPE_H
 
 #include "blackbox_ring.h"
 
 #include "iwheel/gateway.h"
-#include "iwheel_linux/linux_hal.h"
+#include "iwheel_linux/backend.h"
 
 /// Frames kept on either side of the last stop, for `why`.
 #define GW_AROUND 40U
@@ -23,7 +23,7 @@ typedef struct {
 
 typedef struct {
     blackbox_ring_t *ring; ///< NULL: nothing is noted.
-    iw_linux_hal_t *port;
+    iw_hal_t port;
     iw_time_us_t step_us; ///< Of the present step.
     uint32_t step_frames; ///< Taken in it.
     int estop;            ///< Last answers.
@@ -42,8 +42,9 @@ typedef struct {
 /// Begins. `ring` may be NULL.
 void gw_tape_init(gw_tape_t *self, blackbox_ring_t *ring);
 
-/// The HAL to hand to the core: this port. Both must outlive it and must not move.
-iw_hal_t gw_tape_hal(gw_tape_t *self, iw_linux_hal_t *port);
+/// The HAL to hand to the core: around this port, of which it keeps a copy. `self` and the port's context must outlive it and
+/// must not move.
+iw_hal_t gw_tape_hal(gw_tape_t *self, const iw_hal_t *port);
 
 void gw_tape_put(gw_tape_t *self, const blackbox_entry_t *entry);
 

@@ -42,7 +42,8 @@ void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json) {
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted) {
     gw_tape_init(&self->tape, ring);
     iw_motion_evidence_init(&self->evidence);
-    const iw_hal_t hal = gw_tape_hal(&self->tape, &self->hal);
+    const iw_hal_t port = iw_linux_hal(&self->hal);
+    const iw_hal_t hal = gw_tape_hal(&self->tape, &port);
     const iw_config_fault_t fault = iw_gateway_init(&self->core, config, &hal, self->now_us, restarted);
     if (fault == IW_CONFIG_OK) {
         gw_wheels_note(self, IW_CLIENT_NONE,

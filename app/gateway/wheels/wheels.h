@@ -52,6 +52,7 @@ typedef struct gw_wheels {
     gw_gaps_t gaps;
     inspect_wish_t bus;   ///< As configured.
     const char *estop;    ///< The line, as configured.
+    const char *estop2;   ///< That of its second contact.
     iw_time_us_t now_us;  ///< Of the present cycle; never goes back.
     iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
     bool requested;       ///< A request has changed something since the last step.

@@ -19,6 +19,10 @@ typedef enum {
     IW_BUS_ACTIVE,   ///< Error active: the normal state.
 } iw_bus_state_t;
 
+/// An answer of `estop_pressed`: two contacts of one button said different for too long, and have not both been seen
+/// pressed and then both released since. A port without a second contact never answers this.
+#define IW_ESTOP_DISAGREES 2
+
 /// Where the core gets frames from and gives them to.
 typedef struct {
     /// Accepts `count` frames (1..IW_SIDES) of different ids, as a whole: the setpoints of both wheels arrive in one
@@ -60,10 +64,33 @@ typedef struct {
     int (*purge)(void *context);
 
     /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last
-    /// call. < 0: unreadable or gone, which counts as pressed.
+    /// call; IW_ESTOP_DISAGREES is one of these. < 0: unreadable or gone, which counts as pressed.
     int (*estop_pressed)(void *context);
 
     void *context; ///< Passed to each of them.
 } iw_hal_t;
+
+/// What is known of two contacts of one e-stop button, for a port that has them: pressed if either says so, released
+/// only if both do.
+///
+///     AGREES --they differ for longer than the limit--> DISAGREES --both pressed, then both released--> AGREES
+///
+/// A contact that is shorted reads released for ever: the other one still stops the wheels, and the difference tells.
+typedef struct {
+    iw_time_us_t differ_us; ///< Since when they differ; IW_NEVER: they do not.
+    uint32_t limit_us;      ///< They may differ for so long.
+    bool disagrees;         ///< They differed for longer ...
+    bool proven;            ///< ... and both have been seen pressed since.
+} iw_estop_pair_t;
+
+/// Begins with contacts that agree.
+void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us);
+
+/// One answer out of two, each as of `estop_pressed` of iw_hal_t, and so is the result. A contact that cannot be read
+/// says nothing: it makes the button unreadable, but it neither begins nor ends a disagreement.
+int iw_estop_pair_see(iw_estop_pair_t *self, iw_time_us_t now_us, int first, int second);
+
+/// When the answer will change by time alone; IW_NEVER if it will not.
+iw_time_us_t iw_estop_pair_next_us(const iw_estop_pair_t *self);
 
 #endif

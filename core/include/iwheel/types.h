@@ -85,25 +85,26 @@ typedef enum {
 /// are present the first one refuses arm and reset.
 typedef enum {
     IW_CAUSE_NONE = 0,
-    IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
-    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: which iw_client_t.
-    IW_CAUSE_BUS_DOWN,       ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
-    IW_CAUSE_SECOND_MASTER,  ///< Somebody else sends setpoints. Detail: their id.
-    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
-    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
-    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
-    IW_CAUSE_FEEDBACK_SIGN,  ///< Turns against its command. Detail: |measured| mm/s.
-    IW_CAUSE_OVERSPEED,      ///< Faster than applied. Detail: |measured| mm/s.
-    IW_CAUSE_LOOP_HUNG,      ///< Our own loop was late by more than 500 ms. Detail: ms.
-    IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_envelope_verdict_t.
-    IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
-    IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
-    IW_CAUSE_PAIR_DIVERGES,  ///< The pair leaves its path. Detail: by so many mm, right against left.
-    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
-    IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
-    IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
-    IW_CAUSE_SHUTDOWN,       ///< The gateway is ending. Detail: 0.
-    IW_CAUSE_RESTART,        ///< The gateway began anew after a crash while armed. Detail: 0.
+    IW_CAUSE_ESTOP_LINE,      ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
+    IW_CAUSE_ESTOP_DISAGREES, ///< Two contacts of one button: see IW_ESTOP_DISAGREES. Detail: 1.
+    IW_CAUSE_ESTOP_SOFTWARE,  ///< A client said estop. Detail: which iw_client_t.
+    IW_CAUSE_BUS_DOWN,        ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
+    IW_CAUSE_SECOND_MASTER,   ///< Somebody else sends setpoints. Detail: their id.
+    IW_CAUSE_SEND_STALLED,    ///< A setpoint was not echoed. Detail: ms waited.
+    IW_CAUSE_WHEEL_REBOOTED,  ///< Detail: an iw_reboot_t.
+    IW_CAUSE_WHEEL_LOST,      ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
+    IW_CAUSE_FEEDBACK_SIGN,   ///< Turns against its command. Detail: |measured| mm/s.
+    IW_CAUSE_OVERSPEED,       ///< Faster than applied. Detail: |measured| mm/s.
+    IW_CAUSE_LOOP_HUNG,       ///< Our own loop was late by more than 500 ms. Detail: ms.
+    IW_CAUSE_INTERNAL,        ///< An internal check failed. Detail: an iw_envelope_verdict_t.
+    IW_CAUSE_LOOP_LATE,       ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
+    IW_CAUSE_WHEEL_BLOCKED,   ///< Below 20 % of its command. Detail: |measured| mm/s.
+    IW_CAUSE_PAIR_DIVERGES,   ///< The pair leaves its path. Detail: by so many mm, right against left.
+    IW_CAUSE_LEASE_LOST,  ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
+    IW_CAUSE_CLIENT_GONE, ///< The holder disconnected. Detail: 0.
+    IW_CAUSE_CLIENT_STOP, ///< A client said stop or disarm. Detail: 0.
+    IW_CAUSE_SHUTDOWN,    ///< The gateway is ending. Detail: 0.
+    IW_CAUSE_RESTART,     ///< The gateway began anew after a crash while armed. Detail: 0.
     IW_CAUSES,
 } iw_cause_t;
 

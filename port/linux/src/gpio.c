@@ -59,6 +59,12 @@ void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line)
     }
 }
 
+void iw_gpio_place(iw_estop_seen_t *out_seen, const char *node, unsigned offset) {
+    const size_t length = (node != NULL) ? strlen(node) : 0U;
+    memcpy(out_seen->node, (length > 0U) ? node : "", (length < IW_GPIO_NAME_SIZE) ? length : 0U);
+    out_seen->offset = offset;
+}
+
 bool iw_gpio_is_expected(const iw_gpio_address_t *address, const iw_estop_seen_t *seen) {
     const iw_estop_seen_t *expected = &address->expected;
     return (expected->chip[0] == '\0' || strcmp(expected->chip, seen->chip) == 0) &&

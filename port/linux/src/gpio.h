@@ -39,8 +39,10 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address);
 /// What the line is called, also while another program has it. 0, or an errno as above. Allocates.
 int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen);
 
-/// Copies both names; NULL: it has none.
+/// Copies both names; NULL: it has none. The node and the offset are the caller's to set.
 void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line);
+/// Copies where the line is.
+void iw_gpio_place(iw_estop_seen_t *out_seen, const char *node, unsigned offset);
 
 /// Whether the line is called as the address expects.
 bool iw_gpio_is_expected(const iw_gpio_address_t *address, const iw_estop_seen_t *seen);

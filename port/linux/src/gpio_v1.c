@@ -72,6 +72,7 @@ static struct gpiod_line *find_and_see(const iw_gpio_address_t *address, iw_esto
         return NULL;
     }
     iw_gpio_note(out_seen, gpiod_chip_label(gpiod_line_get_chip(line)), gpiod_line_name(line));
+    iw_gpio_place(out_seen, gpiod_chip_name(gpiod_line_get_chip(line)), gpiod_line_offset(line));
     return line;
 }
 

@@ -115,6 +115,7 @@ static void see(struct gpiod_chip *chip, unsigned offset, iw_estop_seen_t *out_s
     struct gpiod_line_info *info = gpiod_chip_get_line_info(chip, offset);
     iw_gpio_note(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_label(chip_info),
                  (info == NULL) ? NULL : gpiod_line_info_get_name(info));
+    iw_gpio_place(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_name(chip_info), offset);
     gpiod_line_info_free(info);
     gpiod_chip_info_free(chip_info);
 }

@@ -34,6 +34,7 @@ class Hello(TypedDict):
 
 Cause = Literal[
     "estop_line",
+    "estop_disagrees",
     "estop_software",
     "wheel_lost",
     "wheel_rebooted",
@@ -89,10 +90,14 @@ class BusStatus(TypedDict):
     """that came faster than they were read"""
 
 
-EstopState = Literal["released", "pressed", "unreadable", "none"]
+EstopState = Literal["released", "pressed", "unreadable", "disagrees", "none"]
+
+EstopContact = Literal["neither", "line", "line2", "both"]
+
+_EstopStatusPartly = TypedDict("_EstopStatusPartly", {"line2": str, "pressed_at": EstopContact}, total=False)
 
 
-class EstopStatus(TypedDict):
+class EstopStatus(_EstopStatusPartly):
     line: str
     state: EstopState
     simulated: bool

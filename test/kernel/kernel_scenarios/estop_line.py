@@ -2,13 +2,14 @@
 """Rows 11 to 14: the e-stop on a GPIO line."""
 
 import random
+import subprocess
 import time
 
 import netdev
 from catalogue import add, kernel_test
 from client import Streamer
 from gpio_sim import Edges
-from kernel_rig import ESTOP_US, LEVEL_US, HighVcanRig, SlcanRig, VcanRig, virtual
+from kernel_rig import ESTOP_US, LEVEL_US, HighVcanRig, SlcanRig, TwoContactsRig, VcanRig, virtual
 from scenario import Skip
 from scenarios.estop import reset
 
@@ -147,6 +148,84 @@ def row12_glitch(t):
     t.stopped_by(client, "estop_line")
     reset(t, client, 6.0)
     t.judge(rig)
+
+
+def told_at(t, rig, client, state, at):
+    """The e-stop is in that state, by those contacts."""
+    told = rig.wait_status(client, lambda s: (s["estop"]["state"], s["estop"]["pressed_at"]) == (state, at), 2)
+    t.check(told, f"{state} at {at} expected, it is {client.request('status')['estop']}")
+
+
+@kernel_test("two contacts on two lines: either stops, both must release, and both prove the button", "estop", 11, TwoContactsRig)
+def row11_two_lines(t):
+    rig, client = t.running()
+    for second_too in (False, True):
+        for first in (True, False):
+            t.arm(client)
+            stream = Streamer(client, 300, 300)
+            time.sleep(0.4)
+            (rig.press if first else lambda: rig.second(True))()
+            time.sleep(0.05)
+            told_at(t, rig, client, "pressed", "line" if first else "line2")
+            stream.stop()
+            t.stopped_by(client, "estop_line")
+            t.expect(client.request("reset"), "estop_pressed")
+            if second_too:
+                rig.second(True)
+                rig.chip.pull(False)
+                time.sleep(0.1)
+                told_at(t, rig, client, "pressed", "both")
+            rig.release()
+            rig.second(False)
+            reset(t, client, 6.0)
+            tried = client.request("status")["estop"]["tried_wall_us"]
+            t.check((tried is not None) == second_too, f"tried: {tried}, both were pressed: {second_too}")
+    t.judge(rig)
+
+
+@kernel_test("one of two contacts shorted: told, and no reset until both were pressed, then released", "estop", 13, TwoContactsRig)
+def row13_line_shorted(t):
+    rig, client = t.running()
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.4)
+    rig.press()
+    time.sleep(0.05)
+    stream.stop()
+    t.stopped_by(client, "estop_line")
+    told_at(t, rig, client, "disagrees", "line")
+    t.check("estop_disagrees" in client.request("status")["present"], "the cause is there")
+    rig.release()
+    for _ in range(3):
+        time.sleep(0.5)
+        t.expect(client.request("reset"), "cause_present")
+    rig.second(True)
+    time.sleep(0.1)
+    rig.second(False)
+    time.sleep(0.5)
+    t.expect(client.request("reset"), "cause_present")
+    t.rule(client.request("status")["state"] == "latched", "each contact alone mends nothing")
+    rig.chip.pull(False)
+    rig.second(True)
+    time.sleep(0.1)
+    told_at(t, rig, client, "disagrees", "both")
+    rig.release()
+    rig.second(False)
+    told_at(t, rig, client, "released", "neither")
+    reset(t, client, 6.0)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("one line under two names as both contacts: no start, and the keys are named", "estop", 29, TwoContactsRig)
+def row29_line_twice(t):
+    rig = t.rig()
+    rig.settings["estop"]["line2"] = f"{rig.chip.chip}:{rig.chip.OFFSET}"
+    rig.write_config()
+    done = subprocess.run(rig.gateway_command(), capture_output=True, text=True, timeout=10, check=False)
+    t.check(done.returncode == 78, f"exit code {done.returncode}")
+    t.check("line and line2 are the same line" in done.stderr, f"names the keys: {done.stderr}")
 
 
 @kernel_test("a chattering contact on release: reset waits for a quiet line", "estop", 13)

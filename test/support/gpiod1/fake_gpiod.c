@@ -75,6 +75,14 @@ const char *gpiod_chip_label(struct gpiod_chip *chip) {
     return ((void *)chip == (void *)lines[1]) ? fake_gpio_label() : "another-chip";
 }
 
+const char *gpiod_chip_name(struct gpiod_chip *chip) {
+    return ((void *)chip == (void *)lines[1]) ? FAKE_GPIO_CHIP : "gpiochip0";
+}
+
+unsigned gpiod_line_offset(struct gpiod_line *line) {
+    return (unsigned)((size_t)((char *)(void *)line - &lines[0][0]) % FAKE_GPIO_LINES);
+}
+
 void gpiod_line_close_chip(struct gpiod_line *line) {
     (void)line;
     fake_gpio.open--;

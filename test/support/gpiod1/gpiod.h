@@ -27,6 +27,8 @@ unsigned gpiod_chip_num_lines(struct gpiod_chip *chip);
 const char *gpiod_line_name(struct gpiod_line *line);
 struct gpiod_chip *gpiod_line_get_chip(struct gpiod_line *line);
 const char *gpiod_chip_label(struct gpiod_chip *chip);
+const char *gpiod_chip_name(struct gpiod_chip *chip);
+unsigned gpiod_line_offset(struct gpiod_line *line);
 void gpiod_line_close_chip(struct gpiod_line *line);
 int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags);
 int gpiod_line_request_rising_edge_events_flags(struct gpiod_line *line, const char *consumer, int flags);

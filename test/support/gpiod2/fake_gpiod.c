@@ -77,6 +77,10 @@ const char *gpiod_chip_info_get_label(struct gpiod_chip_info *info) {
     return ((void *)info == (void *)&one) ? fake_gpio_label() : "another-chip";
 }
 
+const char *gpiod_chip_info_get_name(struct gpiod_chip_info *info) {
+    return ((void *)info == (void *)&one) ? FAKE_GPIO_CHIP : "gpiochip0";
+}
+
 void gpiod_chip_info_free(struct gpiod_chip_info *info) {
     given -= (info != NULL) ? 1U : 0U;
 }

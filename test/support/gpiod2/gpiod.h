@@ -37,6 +37,7 @@ void gpiod_chip_close(struct gpiod_chip *chip);
 struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip);
 size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info);
 const char *gpiod_chip_info_get_label(struct gpiod_chip_info *info);
+const char *gpiod_chip_info_get_name(struct gpiod_chip_info *info);
 void gpiod_chip_info_free(struct gpiod_chip_info *info);
 struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset);
 const char *gpiod_line_info_get_name(struct gpiod_line_info *info);

@@ -4,6 +4,8 @@
 import os
 import random
 import socket
+import subprocess
+import tempfile
 import threading
 import time
 
@@ -112,6 +114,87 @@ def row13_pressed_at_start(t):
     time.sleep(0.3)
     t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
     t.judge(rig, moves=False)
+
+
+def two_contacts(t):
+    """A rig whose button has two contacts, which may differ for a second."""
+    t.second = tempfile.TemporaryDirectory(prefix="iwheel-second-")  # removed with the test
+    second = os.path.join(t.second.name, "button")
+    rig = t.rig(sim_args=("--estop2", second))
+    rig.settings["estop"] = {"line": rig.estop_line(), "line2": f"unix:{second}", "estop_discrepancy_ms": 1000}
+    rig.write_config()
+    rig.start_gateway()
+    return rig, rig.client()
+
+
+def press_contact(t, rig, client, number):
+    """Arms, drives, presses one contact alone. Stopped, and told which one it is."""
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.4)
+    t_us = now_us()
+    rig.sim.ask(f"contact {number} press")
+    rig.timeline.append(Event(t_us, "press", now_us()))
+    time.sleep(0.1)
+    stream.stop()
+    t.stopped_by(client, "estop_line")
+    told = client.request("status")["estop"]
+    at = "line" if number == 1 else "line2"
+    t.check(told["state"] == "pressed" and told["pressed_at"] == at, f"pressed at {at}: {told}")
+    t.expect(client.request("reset"), "estop_pressed")
+
+
+@scenario("two contacts: either stops at once, both must release", 8)
+def row11_two_contacts(t):
+    rig, client = two_contacts(t)
+    for number in (1, 2, 1, 2):
+        press_contact(t, rig, client, number)
+        rig.sim.ask(f"contact {3 - number} press")
+        time.sleep(0.1)
+        rig.sim.ask(f"contact {number} release")
+        time.sleep(0.1)
+        t.expect(client.request("reset"), "estop_pressed")
+        rig.sim.ask(f"contact {3 - number} release")
+        reset(t, client)
+        t.check(client.request("status")["estop"]["pressed_at"] == "neither", "both are released")
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@scenario("two contacts, one stuck: told, and no reset until both were pressed, then released", 15)
+def row13_contact_stuck(t):
+    rig, client = two_contacts(t)
+    for number in (1, 2):
+        press_contact(t, rig, client, number)
+        told = rig.wait_status(client, lambda s: s["estop"]["state"] == "disagrees", 3)
+        t.check(told and "estop_disagrees" in told["present"], f"told: {told and told['present']}")
+        rig.sim.ask(f"contact {number} release")
+        time.sleep(1.2)
+        t.expect(client.request("reset"), "cause_present")
+        rig.sim.ask(f"contact {3 - number} press")
+        time.sleep(0.1)
+        rig.sim.ask(f"contact {3 - number} release")
+        time.sleep(0.1)
+        t.expect(client.request("reset"), "cause_present")
+        t.rule(client.request("status")["state"] == "latched", "latched all the while")
+        rig.press()
+        time.sleep(0.1)
+        t.check(not client.request("reset")["ok"], "no reset while both are pressed")
+        rig.release()
+        reset(t, client)
+        t.check(client.request("status")["estop"]["state"] == "released", "mended")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@scenario("one line as both contacts is refused at start", 2)
+def row29_contact_twice(t):
+    rig = t.rig()
+    rig.settings["estop"] = {"line": rig.estop_line(), "line2": rig.estop_line()}
+    rig.write_config()
+    done = subprocess.run(rig.gateway_command(), capture_output=True, text=True, timeout=5, check=False)
+    t.check(done.returncode == 78, f"exit code {done.returncode}")
+    t.check("line and line2 are both" in done.stderr and "gateway.conf:" in done.stderr, f"names the keys: {done.stderr}")
 
 
 @scenario("reset says why not: pressed, moving, commanded, just happened", 6)

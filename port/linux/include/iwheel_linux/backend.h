@@ -54,7 +54,14 @@ typedef struct {
     /// otherwise is not read (EREMCHG), so it counts as pressed. Only for real lines.
     const char *chip;      ///< Label of its chip: numbers of chips change, labels do not.
     const char *chip_line; ///< Its own name.
+    /// The second contact of the same button; NULL or "none": it has one. No chip is expected of it.
+    const char *name2;
+    bool active_high2;       ///< As `active_high`.
+    uint16_t discrepancy_ms; ///< The contacts may say different for so long.
 } iw_estop_wish_t;
+
+/// Contacts of a button.
+#define IW_ESTOP_CONTACTS 2U
 
 /// The kernel's names have at most 31 characters.
 #define IW_ESTOP_NAME_SIZE 32U
@@ -63,6 +70,8 @@ typedef struct {
 typedef struct {
     char chip[IW_ESTOP_NAME_SIZE]; ///< Label of its chip.
     char line[IW_ESTOP_NAME_SIZE]; ///< Empty: it has no name of its own.
+    char node[IW_ESTOP_NAME_SIZE]; ///< Of its chip under /dev: no two chips have the same, and it may change.
+    unsigned offset;               ///< Of the line on its chip.
 } iw_estop_seen_t;
 
 /// Reads what the line of this name (as in iw_estop_wish_t) is called, also while another program has it. 0, or an

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// A bus and an e-stop input, opened and tended together: what a HAL for the core is made of. Whoever makes that HAL
-/// passes frames by the functions of backend.h.
+/// A bus and an e-stop input, opened and tended together, as one HAL for the core.
 ///
 /// A loss or an edge is reported once: asking a second time would take it from the core.
 #ifndef IWHEEL_LINUX_HAL_H
@@ -11,19 +10,28 @@
 
 /// A bus and an e-stop, opened. Its members are the port's own.
 typedef struct {
-    const iw_estop_ops_t *estop_ops; ///< The kind of the e-stop.
-    int estop_last;                  ///< The last answer given to the core; -1 before the first.
+    const iw_estop_ops_t *estop_ops;     ///< The kind of the e-stop, of both its contacts.
+    bool two_contacts;                   ///< It has a second one.
+    int estop_last;                      ///< The last answer given to the core; -1 before the first.
+    int contact_last[IW_ESTOP_CONTACTS]; ///< What each contact said then; the second says 0 if there is none.
+    iw_time_us_t now_us;                 ///< Of the last `tend`.
+    iw_estop_pair_t pair;                ///< What both say together.
     bool estop_quiet;       ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
     iw_backend_store_t bus; ///< State of the bus.
-    iw_backend_store_t estop; ///< State of the e-stop.
+    iw_backend_store_t estop;  ///< State of the e-stop.
+    iw_backend_store_t estop2; ///< Of its second contact.
 } iw_linux_hal_t;
 
 /// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP:
-/// this build has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
+/// this build has no backend for it; EXDEV: one contact of the e-stop is simulated and the other is not; ENOTUNIQ: both
+/// are the same line, under whatever names. Nothing stays open on failure. The names must outlive the HAL.
 int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
                       const char **out_culprit);
 /// Closes both.
 void iw_linux_hal_close(iw_linux_hal_t *self);
+
+/// The table of functions for the core. It is valid, as `self` is, until the HAL is closed; `self` must not move.
+iw_hal_t iw_linux_hal(iw_linux_hal_t *self);
 
 /// As `estop_pressed` of iw_hal_t.
 int iw_linux_hal_pressed(iw_linux_hal_t *self);
@@ -32,6 +40,8 @@ int iw_linux_hal_pressed(iw_linux_hal_t *self);
 int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
 /// The same of the e-stop; -1: there is nothing to watch.
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
+/// The same of its second contact.
+int iw_linux_hal_estop2_fd(const iw_linux_hal_t *self);
 
 /// What a wait for both descriptors has found readable.
 typedef struct {
@@ -52,10 +62,10 @@ iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self);
 /// What is known of the link to the bus; valid until the HAL is closed.
 const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self);
 
-/// What the kernel calls the e-stop's line. False if it cannot be read now, or has no such name.
-bool iw_linux_hal_estop_seen(const iw_linux_hal_t *self, iw_estop_seen_t *out_seen);
+/// What the kernel calls the line of a contact, 0 or 1. False if it cannot be read now, or has no such name.
+bool iw_linux_hal_estop_seen(const iw_linux_hal_t *self, unsigned contact, iw_estop_seen_t *out_seen);
 
-/// Why the e-stop cannot be read, as an errno; 0 while it can.
-int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self);
+/// Why a contact of the e-stop cannot be read, as an errno; 0 while it can.
+int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self, unsigned contact);
 
 #endif

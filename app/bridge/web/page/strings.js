@@ -90,7 +90,8 @@ const STRINGS = {
   state_arming: "arming",
   state_unknown: "unknown",
   last_stop: "Last stop: {sentence}",
-  estop_says: "{state}{simulated}, line {line}{tried}",
+  estop_says: "{state}{simulated}, line {line}{second}{tried}",
+  second_says: ", line2 {line2}; pressed at {pressed_at}",
   tried_says: "; button tried: {when}",
   simulated: " (SIMULATED)",
   never: "never",
@@ -152,6 +153,7 @@ const STRINGS = {
   },
   cures: {
     estop_line: "release the e-stop button (or mend its wire)",
+    estop_disagrees: "mend the e-stop's contact or wire, press and release its button",
     estop_software: "see that nobody is in the way",
     wheel_lost: "switch the wheels on; check their cable and the termination",
     wheel_rebooted: "find out why a wheel lost power; wait until both are heard",

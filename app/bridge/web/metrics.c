@@ -162,10 +162,12 @@ static void write_own(const web_own_t *own, FILE *out) {
 
 static void write_state(const iwc_message_t *state, FILE *out) {
     static const char *const states[] = {"listening", "armed", "stopping", "latched", NULL};
-    static const char *const lines[] = {"released", "pressed", "unreadable", "none", NULL};
+    static const char *const lines[] = {"released", "pressed", "unreadable", "disagrees", "none", NULL};
+    static const char *const contacts[] = {"neither", "line", "line2", "both", NULL};
     static const char *const buses[] = {"down", "bus_off", "passive", "active", NULL};
     write_words(state, "state", "iwheel_state", states, out);
     write_words(state, "estop.state", "iwheel_estop", lines, out);
+    write_words(state, "estop.pressed_at", "iwheel_estop_pressed_at", contacts, out);
     write_words(state, "bus.state", "iwheel_bus", buses, out);
     for (size_t i = 0; i < sizeof figures / sizeof figures[0]; i++) {
         write_figure(state, &figures[i], false, out);

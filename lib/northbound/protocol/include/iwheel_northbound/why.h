@@ -31,4 +31,7 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
 /// What to do about a cause, for refusals too.
 const char *iwn_why_cure(iw_cause_t cause);
 
+/// What follows it: the reset, where the cause latches. Apart, since most causes have it.
+const char *iwn_why_then(iw_cause_t cause);
+
 #endif

@@ -30,7 +30,7 @@ static unsigned hex_digits(uint32_t number) {
     return digits;
 }
 
-/// A cause in words, and what to do about it. In a clause stand for what is known of the stop: $w the wheels, $n the detail as
+/// A cause in words, and what to do about it before `then`. In a clause stand for what is known of the stop: $w the wheels, $n the detail as
 /// a number, $x the same as hexadecimal digits, $d what it says in words, $c the client, $r its reason, $b the bus, $e the
 /// e-stop.
 typedef struct {
@@ -41,12 +41,13 @@ typedef struct {
 static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_NONE] = {"none", "nothing to do"},
     // On our side.
-    [IW_CAUSE_ESTOP_LINE] = {"e-stop $e $d", "release the button, then: iwheelctl reset"},
-    [IW_CAUSE_LOOP_HUNG] = {"the gateway itself was held up for $n ms",
-                            "see what else runs on this machine, then: iwheelctl reset"},
+    [IW_CAUSE_ESTOP_LINE] = {"e-stop $e $d", "release the button"},
+    [IW_CAUSE_ESTOP_DISAGREES] = {"the two contacts of e-stop $e disagree",
+                                  "mend contact or wire, press and release the button"},
+    [IW_CAUSE_LOOP_HUNG] = {"the gateway itself was held up for $n ms", "see what else runs on this machine"},
     [IW_CAUSE_LOOP_LATE] = {"the gateway itself was held up for $n ms",
                             "see what else runs on this machine, then arm again"},
-    [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log, then: iwheelctl reset"},
+    [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log"},
     [IW_CAUSE_SHUTDOWN] = {"the gateway was told to end", "start it again to go on"},
     [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
                           "look for the crash in the log, then arm again"},
@@ -57,17 +58,14 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_CLIENT_GONE] = {"$c disconnected", "arm again to go on"},
     [IW_CAUSE_CLIENT_STOP] = {"$c said stop", "arm again to go on"},
     // In the machine: bus and wheels.
-    [IW_CAUSE_WHEEL_LOST] = {"$w not heard for $n ms", "check the wheel's power and cable, then: iwheelctl reset"},
-    [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power, then: iwheelctl reset"},
+    [IW_CAUSE_WHEEL_LOST] = {"$w not heard for $n ms", "check the wheel's power and cable"},
+    [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power"},
     [IW_CAUSE_SEND_STALLED] = {"setpoint not acknowledged on the bus for $n ms",
-                               "check that the wheels have power and the bus is terminated, then: iwheelctl reset"},
-    [IW_CAUSE_BUS_DOWN] = {"bus $b is $d", "bring the bus up, then: iwheelctl reset"},
-    [IW_CAUSE_SECOND_MASTER] = {"somebody else sent a setpoint, id $n (0x$x)",
-                                "switch the other sender off, then: iwheelctl reset"},
-    [IW_CAUSE_FEEDBACK_SIGN] = {"$w turns against its command at $n mm/s",
-                                "check invert in the configuration, then: iwheelctl reset"},
-    [IW_CAUSE_OVERSPEED] = {"$w turns faster than told, at $n mm/s",
-                            "check radius, gear ratio and slope, then: iwheelctl reset"},
+                               "check that the wheels have power and the bus is terminated"},
+    [IW_CAUSE_BUS_DOWN] = {"bus $b is $d", "bring the bus up"},
+    [IW_CAUSE_SECOND_MASTER] = {"somebody else sent a setpoint, id $n (0x$x)", "switch the other sender off"},
+    [IW_CAUSE_FEEDBACK_SIGN] = {"$w turns against its command at $n mm/s", "check invert in the configuration"},
+    [IW_CAUSE_OVERSPEED] = {"$w turns faster than told, at $n mm/s", "check radius, gear ratio and slope"},
     [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel, then arm again"},
     [IW_CAUSE_PAIR_DIVERGES] =
         {"$w does not follow its command: the machine left its path by $n mm, right against left",
@@ -166,9 +164,16 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
     add_doing(stop, &text);
     IWN_TEXT_JOIN(&text, "; ", manner(stop), " at ");
     add_time(stop->at_us, &text);
-    IWN_TEXT_JOIN(&text, "; ", iwn_why_cure(stop->cause));
+    IWN_TEXT_JOIN(&text, "; ", iwn_why_cure(stop->cause), iwn_why_then(stop->cause));
 }
 
 const char *iwn_why_cure(iw_cause_t cause) {
     return rows[((unsigned)cause < IW_CAUSES) ? cause : IW_CAUSE_INTERNAL].cure;
+}
+
+const char *iwn_why_then(iw_cause_t cause) {
+    const bool by_itself = cause == IW_CAUSE_NONE || cause == IW_CAUSE_ESTOP_SOFTWARE;
+    return (by_itself || ((unsigned)cause > IW_CAUSE_INTERNAL && (unsigned)cause < IW_CAUSES))
+               ? ""
+               : ", then: iwheelctl reset";
 }

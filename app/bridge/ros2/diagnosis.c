@@ -71,6 +71,15 @@ static void tell_estop(const ros_facts_t *facts, ros_status_t *status) {
     } else if (strcmp(state, "none") == 0) {
         say(status, ROS_WARN,
             "there is no e-stop line: no button of this machine stops the wheels; see [estop] line in gateway.conf");
+    } else if (strcmp(state, "disagrees") == 0) {
+        say(status, ROS_ERROR,
+            "the e-stop's two contacts disagree, pressed at %s: mend contact or wire, press and release the button, "
+            "then "
+            "reset and arm again",
+            facts->machine.pressed_at);
+    } else if (strcmp(state, "pressed") == 0 && strncmp(facts->machine.pressed_at, "line", 4U) == 0) {
+        say(status, ROS_ERROR, "the e-stop is pressed at its contact %s: release the button, reset, then arm again",
+            facts->machine.pressed_at);
     } else if (strcmp(state, "pressed") == 0) {
         say(status, ROS_ERROR, "the e-stop is pressed: release the button, reset (iwheelctl reset), then arm again");
     } else {

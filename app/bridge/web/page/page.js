@@ -208,7 +208,7 @@ function showState(state) {
   text("state", state.cause ? `${word} (${state.cause})` : word, state.state === "latched" ? "bad" : state.state === "listening" ? "" : "care");
   list("advice", advise(state));
   const { estop, bus, lease, budget } = state;
-  text("estop", fill(STRINGS.estop_says, { state: estop.state === "none" ? "NONE" : estop.state, simulated: estop.simulated ? STRINGS.simulated : "", line: estop.line, tried: tried(estop) }), estop.state === "released" ? "good" : "bad");
+  text("estop", fill(STRINGS.estop_says, { state: estop.state === "none" ? "NONE" : estop.state, simulated: estop.simulated ? STRINGS.simulated : "", line: estop.line, second: estop.line2 === undefined ? "" : fill(STRINGS.second_says, estop), tried: tried(estop) }), estop.state === "released" ? "good" : "bad");
   text("bus", fill(STRINGS.bus_says, bus), bus.state === "active" ? "good" : "bad");
   text("lease", lease.holder === null ? fill(STRINGS.lease_none, { whole: lease.lease_ms })
     : fill(STRINGS.lease_says, { ...lease, name: lease.name ?? STRINGS.unknown, left: lease.remaining_ms, whole: lease.lease_ms }), lease.holder === null ? "" : "care");

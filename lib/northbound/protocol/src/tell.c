@@ -136,6 +136,10 @@ static void write_estop(const iwn_estop_t *estop, iwn_out_t *json) {
     iwn_out_open(json, "estop", '{');
     iwn_out_text(json, "line", estop->line);
     iwn_out_text(json, "state", iwn_estop_name(estop->answer, estop->present));
+    if (estop->line2 != NULL) {
+        iwn_out_text(json, "line2", estop->line2);
+        iwn_out_text(json, "pressed_at", estop->pressed_at);
+    }
     iwn_out_bool(json, "simulated", estop->simulated);
     iwn_out_known(json, "tried_wall_us", estop->tried_us > 0, estop->tried_us);
     iwn_out_close(json, '}');

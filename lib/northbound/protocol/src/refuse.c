@@ -133,7 +133,7 @@ static void say_present(wording_t *self) {
         }
         SAY(self, iwn_cause_name((iw_cause_t)cause));
         number(self, " was seen ", ms_since(self, self->seen->seen_us[cause]), " ms ago; ");
-        SAY(self, iwn_why_cure((iw_cause_t)cause), ", and wait a second");
+        SAY(self, iwn_why_cure((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
     }
     number(self, "zeros are still being sent because the gateway died while armed; wait ",

@@ -16,6 +16,7 @@ const char *iwn_cause_name(iw_cause_t cause) {
     static const char *const names[IW_CAUSES] = {
         [IW_CAUSE_NONE] = "none",
         [IW_CAUSE_ESTOP_LINE] = "estop_line",
+        [IW_CAUSE_ESTOP_DISAGREES] = "estop_disagrees",
         [IW_CAUSE_ESTOP_SOFTWARE] = "estop_software",
         [IW_CAUSE_WHEEL_LOST] = "wheel_lost",
         [IW_CAUSE_WHEEL_REBOOTED] = "wheel_rebooted",

@@ -36,6 +36,7 @@ typedef struct {
     iwc_state_t now;
     int64_t wall_us;
     char estop[16];
+    char pressed_at[16];  ///< Of two contacts: neither, line, line2, both; empty: it has one.
     bool estop_tried;     ///< Its button was seen to work on this wiring.
     bool estop_simulated; ///< It is the button of a simulator.
     bool holding;         ///< Zeros are held until release or arm.

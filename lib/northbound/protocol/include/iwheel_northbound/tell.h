@@ -51,11 +51,13 @@ typedef struct {
 
 /// The e-stop's input.
 typedef struct {
-    const char *line; ///< As configured.
-    int answer;       ///< 0: released, 1: pressed, negative: unreadable.
-    bool present;     ///< False: there is none.
-    bool simulated;   ///< A simulator's button.
-    int64_t tried_us; ///< When its button was last seen pressed and released, by the wall clock; 0: never.
+    const char *line;       ///< As configured.
+    const char *line2;      ///< The same of its second contact; NULL: there is none.
+    const char *pressed_at; ///< Which contact is pressed or unreadable: neither, line, line2, both. Only with `line2`.
+    int answer;             ///< As `estop_pressed` of iw_hal_t.
+    bool present;           ///< False: there is none.
+    bool simulated;         ///< A simulator's button.
+    int64_t tried_us;       ///< When its button was last seen pressed and released, by the wall clock; 0: never.
 } iwn_estop_t;
 
 /// Everything that a snapshot of the core does not have.

@@ -73,7 +73,10 @@ const char *iwn_estop_name(int answer, bool present) {
     if (!present) {
         return "none";
     }
-    return (answer == 0) ? "released" : (answer > 0) ? "pressed" : "unreadable";
+    return (answer == 0)                    ? "released"
+           : (answer == IW_ESTOP_DISAGREES) ? "disagrees"
+           : (answer > 0)                   ? "pressed"
+                                            : "unreadable";
 }
 
 const char *iwn_sides_name(uint8_t sides) {

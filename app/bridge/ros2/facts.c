@@ -15,6 +15,7 @@ bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_mach
     out_machine->wall_us = iwc_integer(message, "wall_us").value;
     out_machine->lease_ms = iwc_integer(message, "lease.lease_ms").value;
     (void)iwc_text(message, "estop.state", out_machine->estop, sizeof out_machine->estop);
+    (void)iwc_text(message, "estop.pressed_at", out_machine->pressed_at, sizeof out_machine->pressed_at);
     out_machine->estop_tried = iwc_integer(message, "estop.tried_wall_us").known;
     out_machine->estop_simulated = iwc_truth(message, "estop.simulated").value != 0;
     out_machine->holding = iwc_truth(message, "holding").value != 0;
