@@ -25,7 +25,7 @@ PRODUCTION = ("core", "lib", "port", "app")
 # Libraries and programs: where each looks for headers of its own.
 COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
               "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": ()}
+              "app/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": (), "lib/sockets": ()}
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
 
 
@@ -175,7 +175,7 @@ def main(arguments):
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
     print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
-    findings = [*private, *parts, *fact_of_arrows("app/gateway", 40), *fact_of_arrows("app/ctl", 40), *fact_of_arrows(".", 40)]
+    findings = [*private, *parts, *fact_of_arrows("app/gateway", 45), *fact_of_arrows("app/ctl", 40), *fact_of_arrows(".", 40)]
     findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
     findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []

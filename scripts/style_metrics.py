@@ -16,7 +16,7 @@ import lizard
 GROUPS = {
     "core": (("core/src",), 60, 15, 10),
     "northbound": (("lib/northbound",), 60, 15, 10),
-    "ports and apps": (("port", "lib/client", "lib/config", "lib/inspect", "lib/recording", "app"), 80, 25, 15),
+    "ports and apps": (("port", "lib/client", "lib/config", "lib/inspect", "lib/recording", "lib/sockets", "app"), 80, 25, 15),
 }
 FILE_LINES = 400  # Without lines of comment alone: saying why must not cost anything.
 TEST_FILE_LINES = 600  # Tables of cases may be longer than code.

@@ -2,8 +2,8 @@
 
 #include "answers/dispatch.h"
 #include "box/box.h"
-#include "clients/clients.h"
 #include "daemon.h"
+#include "sockets/clients.h"
 
 #include "iwheel_linux/clock.h"
 

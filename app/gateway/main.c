@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "clients/clients.h"
 #include "daemon.h"
+#include "sockets/clients.h"
 #include "start/options.h"
 #include "start/report.h"
 

@@ -44,7 +44,7 @@ def output(*command):
 def sentences():
     """(file, text) of every string in the sources of the programs, its pieces put together."""
     text_of = r'"(?:[^"\\\n]|\\.)*"'
-    parts = ("lib/config", "lib/inspect", "lib/northbound", "lib/recording", "app/begin", "app/ctl", "app/gateway", "app/sim", "app/bridge/serial")
+    parts = ("lib/config", "lib/inspect", "lib/northbound", "lib/recording", "lib/sockets", "app/begin", "app/ctl", "app/gateway", "app/sim", "app/bridge/serial")
     for path in sorted(path for part in parts for path in glob.glob(os.path.join(ROOT, part, "**", "*.c"), recursive=True)):
         with open(path, encoding="utf-8") as file:
             source = re.sub(r"//[^\n]*|^#include.*$", "", file.read(), flags=re.MULTILINE)

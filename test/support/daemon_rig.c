@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "daemon_rig.h"
 
-#include "clients/clients.h"
 #include "daemon.h"
+#include "sockets/clients.h"
 
 #include "iwheel_linux/clock.h"
 #include "iwheel_northbound/json_in.h"

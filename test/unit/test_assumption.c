@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The ledger's items in words: the value in force, what somebody found beside it, what a contradiction costs.
-#include "words/assumption.h"
+#include "inspect/assumption.h"
 
 #include "iwheel_northbound/words.h"
 

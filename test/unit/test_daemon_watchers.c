@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
 #include "answers/dispatch.h"
-#include "clients/clients.h"
 #include "daemon_rig.h"
+#include "sockets/clients.h"
 #include "status/observe.h"
 
 #include "unity.h"

@@ -2,7 +2,7 @@
 #include "box/box.h"
 #include "config/gateway_config.h"
 #include "disk/box_files.h"
-#include "process/log.h"
+#include "sockets/log.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The northbound socket: in which folders it is made, what it replaces, and what it has touched afterwards.
-#include "clients/listener.h"
+#include "sockets/listener.h"
 
 #include "config/gateway_config.h"
-#include "process/log.h"
+#include "sockets/log.h"
 
 #include "unity.h"
 

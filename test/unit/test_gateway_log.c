@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the gateway writes for people.
 #include "config/gateway_config.h"
-#include "process/log.h"
+#include "sockets/log.h"
 #include "start/report.h"
 
 #include "unity.h"

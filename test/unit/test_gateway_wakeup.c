@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "process/wakeup.h"
+#include "sockets/wakeup.h"
 
 #include "iwheel_linux/clock.h"
 

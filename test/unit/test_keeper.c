@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The process that keeps what is known from one run to the next: what it reads, writes, sets aside and refuses to touch.
 #include "disk/keeper.h"
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include "unity.h"
 

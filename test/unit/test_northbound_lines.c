@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A connection of the northbound socket: bytes in, lines out.
-#include "clients/client.h"
-#include "process/log.h"
+#include "sockets/client.h"
+#include "sockets/log.h"
 
 #include "unity.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
-#include "clients/clients.h"
 #include "daemon.h"
+#include "sockets/clients.h"
 
 #include "iwheel_linux/clock.h"
 

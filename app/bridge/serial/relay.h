@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Between the clients' sockets and the board's line. The sockets are the gateway's own code (app/gateway/clients), so that whoever
+/// Between the clients' sockets and the board's line. The sockets are the gateway's own code (lib/sockets), so that whoever
 /// connects finds what it finds there; behind them each client is a channel of the line.
 ///
 /// What keeps an old command from becoming a new one:
@@ -20,10 +20,10 @@
 #include "queue.h"
 #include "settings.h"
 
-#include "clients/clients.h"
 #include "common/service.h"
-#include "process/log.h"
-#include "process/wakeup.h"
+#include "sockets/clients.h"
+#include "sockets/log.h"
+#include "sockets/wakeup.h"
 
 /// The loop comes round at least this often while there are clients, and says so to the board.
 #define RELAY_ALIVE_US 50000U

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What is assumed about the wheels, what is known, and the operator's word on it.
 #include "config/similar.h"
+#include "inspect/assumption.h"
 #include "talk/ctl.h"
 #include "talk/words.h"
 #include "text/text.h"
-#include "words/assumption.h"
 
 #include "iwheel_northbound/words.h"
 

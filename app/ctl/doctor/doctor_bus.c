@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What the gateway tells, and what is heard on the bus.
 #include "doctor.h"
+#include "inspect/assumption.h"
 #include "status/advice.h"
 #include "text/text.h"
-#include "words/assumption.h"
 
 #include "iwheel_northbound/words.h"
 

@@ -2,8 +2,8 @@
 #include "dispatch.h"
 
 #include "box/box.h"
-#include "clients/clients.h"
 #include "ledger/knowledge.h"
+#include "sockets/clients.h"
 #include "status/observe.h"
 #include "wheels/wheels.h"
 

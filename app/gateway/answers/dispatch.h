@@ -3,7 +3,7 @@
 #ifndef GATEWAY_DISPATCH_H
 #define GATEWAY_DISPATCH_H
 
-#include "clients/client.h"
+#include "sockets/client.h"
 
 #include "iwheel/snapshot.h"
 #include "iwheel_northbound/request.h"

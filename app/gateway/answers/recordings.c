@@ -2,7 +2,7 @@
 #include "dispatch.h"
 
 #include "box/box.h"
-#include "clients/clients.h"
+#include "sockets/clients.h"
 
 #include <stdio.h>
 #include <string.h>

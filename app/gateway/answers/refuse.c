@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "dispatch.h"
 
-#include "clients/clients.h"
 #include "ledger/knowledge.h"
+#include "sockets/clients.h"
 #include "status/observe.h"
 #include "wheels/wheels.h"
 

@@ -2,7 +2,7 @@
 #include "box.h"
 
 #include "disk/box_files.h"
-#include "process/log.h"
+#include "sockets/log.h"
 
 #include "iwheel_northbound/words.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "box_files.h"
 
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include "iwheel_northbound/json_out.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "keeper.h"
 
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -3,7 +3,7 @@
 #ifndef GATEWAY_RECORDING_H
 #define GATEWAY_RECORDING_H
 
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include "iwheel_northbound/request.h"
 #include "iwheel_northbound/why.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "process/log.h"
+#include "sockets/log.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"

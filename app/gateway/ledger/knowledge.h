@@ -10,7 +10,7 @@
 
 #include "disk/keeper.h"
 #include "memory.h"
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/json_out.h"

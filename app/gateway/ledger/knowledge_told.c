@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "clients/clients.h"
-#include "process/log.h"
+#include "sockets/clients.h"
+#include "sockets/log.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"

@@ -10,7 +10,7 @@
 #define GATEWAY_MEMORY_H
 
 #include "button.h"
-#include "words/assumption.h"
+#include "inspect/assumption.h"
 
 #include "iwheel/force_offset.h"
 

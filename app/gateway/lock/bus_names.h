@@ -13,7 +13,7 @@
 #ifndef GATEWAY_BUS_NAMES_H
 #define GATEWAY_BUS_NAMES_H
 
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 /// Longest name with its terminator: that of a socket's address.
 #define GW_BUS_NAME_SIZE 108U

@@ -2,7 +2,7 @@
 #include "report.h"
 
 #include "config/gateway_config.h"
-#include "process/owners.h"
+#include "sockets/owners.h"
 
 #include <errno.h>
 #include <fcntl.h>

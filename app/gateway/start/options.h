@@ -4,7 +4,7 @@
 #define GATEWAY_OPTIONS_H
 
 #include "config/gateway_config.h"
-#include "process/log.h"
+#include "sockets/log.h"
 
 typedef enum { GW_RUN = 0, GW_CHECK, GW_PRINT_CONFIG, GW_VERSION, GW_HELP } gw_action_t;
 

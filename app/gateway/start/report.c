@@ -3,7 +3,7 @@
 
 #include "angles.h"
 #include "config/gateway_config.h"
-#include "process/log.h"
+#include "sockets/log.h"
 
 #include <inttypes.h>
 #include <string.h>

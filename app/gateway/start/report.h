@@ -3,7 +3,7 @@
 #ifndef GATEWAY_REPORT_H
 #define GATEWAY_REPORT_H
 
-#include "clients/listener.h"
+#include "sockets/listener.h"
 
 #include "inspect.h"
 

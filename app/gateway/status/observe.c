@@ -3,10 +3,10 @@
 
 #include "box/box.h"
 #include "bus/bus_facts.h"
-#include "clients/clients.h"
 #include "ledger/knowledge.h"
-#include "process/log.h"
-#include "process/owners.h"
+#include "sockets/clients.h"
+#include "sockets/log.h"
+#include "sockets/owners.h"
 #include "wheels/wheels.h"
 
 #include "inspect.h"

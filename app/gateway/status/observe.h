@@ -5,7 +5,7 @@
 #ifndef GATEWAY_OBSERVE_H
 #define GATEWAY_OBSERVE_H
 
-#include "clients/client.h"
+#include "sockets/client.h"
 
 #include "iwheel/snapshot.h"
 #include "iwheel_linux/bus_link.h"

@@ -2,9 +2,9 @@
 #include "observe.h"
 
 #include "bus/bus_facts.h"
-#include "clients/clients.h"
 #include "inspect.h"
 #include "ledger/knowledge.h"
+#include "sockets/clients.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"

@@ -5,8 +5,8 @@
 ///     bench_status anew ROUNDS    something has, each time
 ///
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
-#include "clients/clients.h"
 #include "daemon_rig.h"
+#include "sockets/clients.h"
 #include "status/observe.h"
 
 #include "unity.h"

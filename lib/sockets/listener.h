@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// A northbound socket, the one to drive by or the one to watch by: made safely, accepted from without ever spinning, removed at the end.
 ///
-/// Its folder must belong to somebody who may run a gateway (process/owners.h), and nobody else may write there; one like
+/// Its folder must belong to somebody who may run a gateway (owners.h), and nobody else may write there; one like
 /// /tmp is used with a warning. It is opened once, and the socket is made, changed and removed in it by name, never by a
 /// path that somebody could turn elsewhere meanwhile. A name that is taken is replaced only if it is a socket on which
 /// nobody answers, or a stranger's. Accepting needs a descriptor: one
@@ -10,7 +10,7 @@
 #ifndef GATEWAY_LISTENER_H
 #define GATEWAY_LISTENER_H
 
-#include "process/owners.h"
+#include "owners.h"
 
 #include "iwheel/types.h"
 

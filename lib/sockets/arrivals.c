@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "slots.h"
 
-#include "process/log.h"
+#include "log.h"
 
 #include "iwheel_linux/clock.h"
 

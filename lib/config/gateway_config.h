@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The gateway's configuration file: read, checked as a whole, printed back.
 ///
-/// Link `iwheel_gateway_config` (`add_subdirectory(config)` in app/gateway) and include "config/gateway_config.h".
+/// Link `iwheel_gateway_config` (lib/config) and include "config/gateway_config.h".
 ///
 /// A file that is wrong anywhere changes nothing: every error is told with file, line and cure (the first 20 of them), and
 /// the caller's structure is left alone. A key that is not given has its default. Used at start only: it reads a file and

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "listener.h"
 
-#include "process/log.h"
+#include "log.h"
 
 #include <errno.h>
 #include <fcntl.h>
