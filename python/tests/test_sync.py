@@ -570,6 +570,7 @@ class Reading(RigCase):
             self.assertEqual(caught.exception.error, "latched")
             self.wait_until(lambda: self.reset_worked(gateway), 4)
             self.assertEqual(gateway.status()["state"], "listening")
+            self.assertEqual(gateway.release(), "listening")  # Without a hold it changes nothing.
 
     @staticmethod
     def reset_worked(gateway):
