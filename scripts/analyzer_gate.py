@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""gcc -fanalyzer on every file of core, ports, app and client that BUILD_DIR compiles, as it is compiled there; any finding fails.
+"""gcc -fanalyzer on every file of core, ports, lib and app that BUILD_DIR compiles, as it is compiled there; any finding fails.
 
 usage: analyzer_gate.py [--jobs N] [--root DIR] BUILD_DIR...
 

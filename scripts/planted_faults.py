@@ -471,6 +471,7 @@ CASES = [
     (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/keeper.h"\n#include "box/box.h"'), True),
     (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
     (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "ledger/memory.h"'), True),
+    (arch, "python3", "the same by its way", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'), True),
     (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
     (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
     (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),

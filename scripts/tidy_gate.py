@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""clang-tidy on every file of core, port/linux, app and client that BUILD_DIR (preset clang) compiles; any finding fails.
+"""clang-tidy on every file of core, port/linux, lib and app that BUILD_DIR (preset clang) compiles; any finding fails.
 
 usage: tidy_gate.py BUILD_DIR [JOBS]
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Configuration files that a table describes: read, checked as a whole, printed back.
 ///
-/// Link `iwheel_settings` and include "settings/settings.h". A program says its keys once (`settings_form_t`); reading, range checks,
+/// Link `iwheel_settings` and include "config/settings.h". A program says its keys once (`settings_form_t`); reading, range checks,
 /// messages and printing need no code per key. Every error is told as `FILE:LINE: what is wrong; what to do`, the first 20 of
 /// them. Used at start only: it reads a file and writes to a stream, so it may block.
 #ifndef IWHEEL_SETTINGS_H

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Messages for people, on stderr. Never waits: what stderr does not take at once is dropped and counted, and so is
 /// what comes faster than people read (40 lines at once, then 5 a second). The next line that passes tells how many
-/// were dropped. Lines are plain (plain.h), whatever stands in their arguments.
+/// were dropped. Lines are plain (iwheel_northbound/text.h), whatever stands in their arguments.
 #ifndef GATEWAY_LOG_H
 #define GATEWAY_LOG_H
 

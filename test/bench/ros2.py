@@ -48,7 +48,7 @@ def command(send):
 
 
 def by_client(rig, build):
-    library = ctypes.CDLL(os.path.join(build, "client", "c", "libiwheel-client.so"))
+    library = ctypes.CDLL(os.path.join(build, "lib", "client", "libiwheel-client.so"))
     library.iwc_new.restype = ctypes.c_void_p
     gateway = ctypes.c_void_p(library.iwc_new())
     assert library.iwc_connect(gateway, rig.path("gateway.sock").encode(), 1000) == 0

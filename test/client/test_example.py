@@ -27,7 +27,7 @@ RAMP_MS = 200  # From 200 mm/s at 1500 mm/s2, and as much again for a busy machi
 
 class Example(RigCase):
     def start(self, seconds):
-        child = subprocess.Popen([os.path.join(BUILD, "client", "c", "drive_20"), str(seconds)], stderr=subprocess.PIPE, text=True,
+        child = subprocess.Popen([os.path.join(BUILD, "lib", "client", "drive_20"), str(seconds)], stderr=subprocess.PIPE, text=True,
                                  env={**os.environ, "IWHEEL_SOCKET": self.socket})
         self.addCleanup(child.stderr.close)
         self.addCleanup(child.wait)
@@ -97,8 +97,8 @@ class Example(RigCase):
     @unittest.skipUnless(shutil.which("c++"), "no C++ compiler (apt-get install g++)")
     def test_program_in_cpp_drives_and_stops(self):
         program = self.rig.path("client")
-        library = os.path.join(BUILD, "client", "c", "libiwheel-client.a")
-        subprocess.run(["c++", "-std=c++11", "-I", os.path.join(ROOT, "client", "c", "include"),
+        library = os.path.join(BUILD, "lib", "client", "libiwheel-client.a")
+        subprocess.run(["c++", "-std=c++11", "-I", os.path.join(ROOT, "lib", "client", "include"),
                         os.path.join(ROOT, "test", "package", "client.cpp"), library, *SANITIZED, "-o", program], check=True)
         done = subprocess.run([program], capture_output=True, text=True, timeout=10, env={**os.environ, "IWHEEL_SOCKET": self.socket})
         self.assertEqual((0, ""), (done.returncode, done.stderr))

@@ -39,7 +39,7 @@ def judge(work, applied, folder, image, scenario):
     source = {"listen": "none"}.get(image, image)
     (folder / "images").mkdir()
     talk = GATEWAY_FILES if image == "gateway" else ALONE_FILES
-    libraries = [work / f"stm32f103/{name}/libiwheel_{name}.a" for name in ("northbound", "core")]
+    libraries = [work / "stm32f103" / name for name in ("lib/northbound/protocol/libiwheel_northbound.a", "core/libiwheel_core.a")]
     must([*flags, *(folder / name for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")), *libraries,
           "--specs=nano.specs", "-nostartfiles", f"-L{folder}", f"-T{folder / 'boards/stm32f103/memory.ld'}", "-Wl,--gc-sections",
           "-o", folder / f"images/stm32f103-{image}.elf"])

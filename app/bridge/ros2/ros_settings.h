@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The bridge's configuration file, read as the gateway's (settings/settings.h): every error with file, line and cure.
+/// The bridge's configuration file, read as the gateway's (config/settings.h): every error with file, line and cure.
 #ifndef ROS2_ROS_SETTINGS_H
 #define ROS2_ROS_SETTINGS_H
 

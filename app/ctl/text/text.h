@@ -13,7 +13,7 @@
 /// Long enough for every cell.
 #define TEXT_CELL 48U
 
-/// Writes `text` without what moves a terminal (plain.h): names and reasons come from other people's programs.
+/// Writes `text` without what moves a terminal (iwheel_northbound/text.h): names and reasons come from other people's programs.
 void text_safe(const char *text, FILE *out);
 
 /// The same into a buffer; what does not fit is left out.
