@@ -37,7 +37,11 @@ int iw_estop_pair_see(iw_estop_pair_t *self, iw_time_us_t now_us, int first, int
     } else if (self->differ_us == IW_NEVER) {
         self->differ_us = now_us;
     }
-    self->disagrees = self->disagrees || has_differed(self, now_us);
+    // A press that shows the fault again proves nothing.
+    if (has_differed(self, now_us)) {
+        self->disagrees = true;
+        self->proven = false;
+    }
     follow(self, one, both);
     if (self->disagrees) {
         return IW_ESTOP_DISAGREES;

@@ -78,6 +78,8 @@ static void test_pair_whose_release_is_late_disagrees_again(void) {
     (void)hold(1, 0, 300);
     (void)hold(1, 1, 300);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(1, 0, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(0, 0, 1000));
+    (void)hold(1, 1, 300);
     TEST_ASSERT_EQUAL_INT(0, hold(0, 0, 1));
 }
 
