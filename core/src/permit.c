@@ -266,6 +266,10 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
         self->hold_us = now_us;
     }
     if (iw_permit_holding(self)) {
+        // Released, the zeros for a wheel that turns have all their time.
+        if (!time_is_enough(self)) {
+            self->hold_us = now_us;
+        }
         return;
     }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);

@@ -103,6 +103,21 @@ static void test_permit_keep_released_early_ends_as_without_it(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
+static void test_permit_keep_released_late_gives_a_wheel_that_turns_its_time(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(120000));
+    release();
+    permit_rig_wait(&rig, MS(54999));
+    TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_wait(&rig, MS(1));
+    TEST_ASSERT_TRUE(iw_permit_ending(&rig.permit, rig.now_us));
+    permit_rig_wait(&rig, MS(4999));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
+    permit_rig_wait(&rig, MS(1));
+    assert_silent(IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+}
+
 static void test_permit_keep_release_is_refused_while_somebody_drives_or_arms(void) {
     static const permit_situation_t refused[] = {PERMIT_ARMING, PERMIT_ARMED, PERMIT_STOPPING};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
@@ -285,6 +300,7 @@ int main(void) {
     RUN_TEST(test_permit_keep_is_not_there_unless_configured);
     RUN_TEST(test_permit_keep_ends_by_release);
     RUN_TEST(test_permit_keep_released_early_ends_as_without_it);
+    RUN_TEST(test_permit_keep_released_late_gives_a_wheel_that_turns_its_time);
     RUN_TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms);
     RUN_TEST(test_permit_keep_release_in_silence_changes_nothing);
     RUN_TEST(test_permit_keep_latch_out_of_silence_is_silent);
