@@ -160,6 +160,34 @@ static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
     TEST_ASSERT_FALSE(is_warned_of("was never seen to work on this wiring"));
 }
 
+static const iw_estop_seen_t *see_line(const void *self) {
+    static const iw_estop_seen_t line = {.chip = "chip", .line = "ESTOP"};
+    (void)self;
+    return &line;
+}
+
+/// The file may come after the first look: what it says is compared with the wiring all the same, and is not newer than what was seen.
+static void test_memory_button_of_another_wiring_is_void_however_late_the_file(void) {
+    static iw_estop_ops_t ops;
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    ops = *wheels->hal.estop_ops;
+    ops.seen = see_line;
+    wheels->hal.estop_ops = &ops;
+    daemon_rig_run(50);
+    stored.tried = (gw_tried_t){.wall_us = 1700000000000000,
+                                .contact = {{.active_high = true, .line = "OTHER", .seen = *see_line(NULL)}}};
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(wheels->estop_untried);
+    TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
+    (void)strcpy(stored.tried.contact[0].line, "ESTOP");
+    tell_stored();
+    stored.tried.wall_us = 1600000000000000;
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
+}
+
 /// A battery beyond its threshold is told and warned of, and stops nothing.
 static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
@@ -432,6 +460,7 @@ int main(void) {
     RUN_TEST(test_memory_contradiction_stays_one);
     RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
     RUN_TEST(test_memory_button_that_was_tried_before_is_not_warned_of);
+    RUN_TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file);
     RUN_TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop);
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
     RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);

@@ -162,7 +162,10 @@ static void merge(gw_knowledge_t *self, const gw_known_t *stored) {
     }
     merge_offset(self, IW_LEFT, &stored->offset[IW_LEFT]);
     merge_offset(self, IW_RIGHT, &stored->offset[IW_RIGHT]);
-    self->known.tried = stored->tried;
+    if (self->known.tried.wall_us == 0) { // What was seen since the start is newer.
+        self->known.tried = stored->tried;
+        self->button.looked = false;
+    }
 }
 
 /// The first news: the file, or why there is none.
