@@ -109,6 +109,9 @@ enum { GW_TAG_SIGNAL = 0, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER, GW_TAG_BUS, GW
 /// Lines of one client that are carried out in one cycle.
 #define GW_LINES_PER_CYCLE 4U
 
+/// Lines that may be stops, of one client that is being closed.
+#define GW_LAST_LINES 16U
+
 /// Connections accepted in one cycle by each socket, and in no more than GW_ROUND_US.
 #define GW_ACCEPTS_PER_CYCLE 8U
 

@@ -16,14 +16,27 @@ const gw_part_t gw_parts[GW_PARTS] = {
     [GW_STOP] = {GW_DRIVERS_MAX + GW_WATCHERS_MAX, GW_RIGHTS *GW_STOP_SLOTS},
 };
 
+/// A line of anything else is not worth reading any more.
+static bool may_stop(const char *line, size_t length) {
+    return memmem(line, length, "stop", 4U) != NULL || memmem(line, length, "disarm", 6U) != NULL;
+}
+
 /// What it had said already and nobody has looked at: of that the stops are carried out still.
 static void hear_out(gw_clients_t *self, gw_client_t *client) {
-    const char *line;
-    size_t length;
-    while ((line = gw_client_line(client, &length)) != NULL) {
-        self->servant.carry_out(self->servant.context, client, line, length);
-        gw_client_drop_line(client, length);
+    const char *line = client->in;
+    size_t left = client->in_length;
+    unsigned heard = 0;
+    const char *end;
+    while (heard < GW_LAST_LINES && (end = (const char *)memchr(line, '\n', left)) != NULL) {
+        const size_t length = (size_t)(end - line);
+        if (may_stop(line, length)) {
+            self->servant.carry_out(self->servant.context, client, line, length);
+            heard++;
+        }
+        left -= length + 1U;
+        line = end + 1;
     }
+    client->in_length = 0;
 }
 
 void gw_service_finish(gw_clients_t *self, gw_client_t *client) {

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 # They ask the system for nothing; or what they ask is the same in every run.
-PURE = """__ctype_b_loc __errno_location abort bcmp bsearch getenv getopt_long ini_parse_stream longjmp _setjmp memchr memcmp memcpy memmove memset mmap munmap qsort
+PURE = """__ctype_b_loc __errno_location abort bcmp bsearch getenv getopt_long ini_parse_stream longjmp _setjmp memchr memcmp memcpy memmem memmove memset mmap munmap qsort
     optarg opterr optind setenv sigaddset sigemptyset snprintf strchr strcmp strcspn strerror strlen strncmp strpbrk strrchr strsignal strspn strstr strtod strtol
     strtoul strtoull unsetenv vsnprintf"""
 # To a stream of the test's own or in memory; stderr is nowhere.
