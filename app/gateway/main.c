@@ -37,7 +37,10 @@ static int start_core(gw_daemon_t *daemon) {
         return EX_CONFIG;
     }
     gw_bus_facts_follow(&daemon->facts, &daemon->wheels, false);
-    if (restarted) {
+    if (restarted && config->hold) {
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "the gateway before this one died while the wheels were armed: sending zeros until: iwheelctl release");
+    } else if (restarted) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
                config->zero_hold_ms);
