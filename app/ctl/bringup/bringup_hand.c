@@ -38,6 +38,17 @@ static look_t look(bringup_t *self) {
     return seen;
 }
 
+/// The first one at which both are heard; a moment's silence is none.
+static look_t first_look(bringup_t *self) {
+    const struct timespec pause = {0, LOOK_NS};
+    look_t seen = look(self);
+    for (unsigned i = 0; i < SILENT_US / (LOOK_NS / 1000L) && !seen.heard; i++) {
+        (void)nanosleep(&pause, NULL);
+        seen = look(self);
+    }
+    return seen;
+}
+
 /// From one look at which both were heard to the next.
 static void add(hand_t *hand, const look_t *before, const look_t *now, int64_t us) {
     hand->heard = hand->heard && us <= SILENT_US;
@@ -76,7 +87,7 @@ void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
     if (!trial_wait_ready(self)) {
         bringup_fail(self);
     }
-    const look_t first = look(self);
+    const look_t first = first_look(self);
     memset(out_hand, 0, sizeof(*out_hand));
     out_hand->heard = first.heard;
     talk_forget();
