@@ -10,7 +10,10 @@ void oracle_contacts(oracle_t *self, iw_time_us_t now_us, const int said[2], int
     }
     if (readable && pressed == 1U) {
         self->apart_us = self->apart ? self->apart_us : now_us;
-        self->quarrel = self->quarrel || now_us - self->apart_us > ORACLE_CONTACTS_US;
+        if (now_us - self->apart_us > ORACLE_CONTACTS_US) {
+            self->quarrel = true;
+            self->both_pressed = false;
+        }
     }
     self->apart = readable && pressed == 1U;
     if (!readable) {
