@@ -4,10 +4,8 @@
 #include "magnitude.h"
 
 void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us) {
-    self->differ_us = IW_NEVER;
-    self->limit_us = limit_us;
-    self->disagrees = false;
-    self->proven = false;
+    const iw_estop_pair_t pair = {.differ_us = IW_NEVER, .limit_us = limit_us};
+    *self = pair;
 }
 
 static bool has_differed(const iw_estop_pair_t *self, iw_time_us_t now_us) {
@@ -16,11 +14,10 @@ static bool has_differed(const iw_estop_pair_t *self, iw_time_us_t now_us) {
 
 /// Only a press that both have seen, and its end, shows that both contacts work again.
 static void follow(iw_estop_pair_t *self, bool one, bool both) {
-    if (self->disagrees && both) {
+    if (both) {
         self->proven = true;
     } else if (self->proven && !one) {
         self->disagrees = false;
-        self->proven = false;
     }
 }
 

@@ -76,8 +76,10 @@ typedef struct {
     iw_time_us_t latched_us;
     iw_time_us_t held_us; ///< In LATCHED: zeros are held since then, at the latest a period later.
     iw_time_us_t path_at_us;
-    int64_t path_nm;        ///< How far the pair has left its path, without any lag: right minus left, leaking.
-    iw_time_us_t turn_us;   ///< When both wheels were handed a setpoint.
+    int64_t path_nm;      ///< How far the pair has left its path, without any lag: right minus left, leaking.
+    iw_time_us_t turn_us; ///< When both wheels were handed a setpoint.
+    iw_time_us_t
+        unsettled_us; ///< A hold without end went on, and a wheel turned: the zeros that follow have their time from then on.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
     bool rolling_fault;
