@@ -70,6 +70,16 @@ iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us) {
     return contested ? CONTESTED_US : (iw_time_us_t)self->config->hold_max_s * 1000U * MS;
 }
 
+/// The end of zeros counts from here, or from when a hold without end last saw a wheel turn.
+iw_time_us_t oracle_zeros_from(const oracle_t *self, iw_time_us_t from_us) {
+    return (self->unsettled_us > from_us) ? self->unsettled_us : from_us;
+}
+
+static bool zeros_are_over(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t from_us, iw_time_us_t slack_us) {
+    const iw_time_us_t since_us = oracle_zeros_from(self, from_us);
+    return oracle_elapsed(now_us, since_us, oracle_hold_max_us(self, since_us) + slack_us);
+}
+
 static void lose_permission(oracle_t *self) {
     self->armed = false;
     self->fresh = false;
@@ -333,9 +343,7 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
         oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent ||
-         (!self->kept &&
-          oracle_elapsed(now_us, self->held_us, oracle_hold_max_us(self, self->held_us) + oracle_us(100))))) {
+        (self->latched_silent || (!self->kept && zeros_are_over(self, now_us, self->held_us, oracle_us(100))))) {
         oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -534,8 +542,8 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     }
     // A request before the first step after a stall finds the state of before it.
     if (state == IW_STATE_STOPPING && !self->kept && now_us - self->released_us > oracle_us(1000) &&
-        oracle_elapsed(now_us, self->stopped_us, oracle_hold_max_us(self, self->stopped_us) + oracle_us(1300)) &&
-        now_us - self->late_us > oracle_us(1000) && now_us - self->step_us < GAP_US) {
+        zeros_are_over(self, now_us, self->stopped_us, oracle_us(1300)) && now_us - self->late_us > oracle_us(1000) &&
+        now_us - self->step_us < GAP_US) {
         oracle_break(self, now_us, 507, "STOPPING without end");
     }
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {

@@ -40,6 +40,7 @@ void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
 
 /// The longest time of zeros that began then.
 iw_time_us_t oracle_hold_max_us(const oracle_t *self, iw_time_us_t from_us);
+iw_time_us_t oracle_zeros_from(const oracle_t *self, iw_time_us_t from_us);
 
 /// Both wheels were heard, and stood for that long.
 bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us);

@@ -220,7 +220,7 @@ static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
     const bool silent = self->silent_us != IW_NEVER && self->silent_us > self->latched_us;
     const bool ramped = self->held_us != self->latched_us;
     self->unsettled_us = (oracle_holds(self) && !oracle_rested(self, now_us, SETTLED_US)) ? now_us : self->unsettled_us;
-    const iw_time_us_t since_us = (self->unsettled_us > self->held_us) ? self->unsettled_us : self->held_us;
+    const iw_time_us_t since_us = oracle_zeros_from(self, self->held_us);
     const iw_time_us_t zeros_us = since_us + (ramped ? oracle_us(self->config->period_ms) + SLOW_ECHO_US : 0U);
     const bool held = now_us > zeros_us && oracle_elapsed(now_us, zeros_us, oracle_us(self->config->zero_hold_ms));
     const bool ended =
