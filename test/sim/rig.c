@@ -509,10 +509,10 @@ void rig_stats_add(rig_stats_t *sum, const rig_stats_t *stats) {
 
 const char *rig_cause_name(unsigned cause) {
     static const char *const names[IW_CAUSES] = {
-        "none",         "e-stop line",    "software e-stop", "bus down",      "second master",
-        "send stalled", "wheel rebooted", "wheel lost",      "feedback sign", "overspeed",
-        "loop hung",    "internal",       "loop late",       "wheel blocked", "pair diverges",
-        "lease lost",   "client gone",    "client stop",     "shutdown",      "restart",
+        "none",         "e-stop line",    "e-stop disagrees", "software e-stop", "bus down",   "second master",
+        "send stalled", "wheel rebooted", "wheel lost",       "feedback sign",   "overspeed",  "loop hung",
+        "internal",     "loop late",      "wheel blocked",    "pair diverges",   "lease lost", "client gone",
+        "client stop",  "shutdown",       "restart",
     };
     return names[cause];
 }
