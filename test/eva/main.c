@@ -16,6 +16,7 @@
 static iw_gateway_t gateway;
 static iw_motion_evidence_t evidence;
 static iw_time_us_t now_us;
+static iw_estop_pair_t contacts;
 
 static bool any_bool(void) {
     return Frama_C_interval(0, 1) != 0;
@@ -84,7 +85,8 @@ static int purge(void *context) {
 
 static int estop_pressed(void *context) {
     (void)context;
-    return any_i32();
+    (void)iw_estop_pair_next_us(&contacts);
+    return any_bool() ? iw_estop_pair_see(&contacts, now_us, any_i32(), any_i32()) : any_i32();
 }
 
 static const iw_hal_t hal = {send_frames, receive_frame, bus_state, purge, estop_pressed, NULL};
@@ -296,6 +298,7 @@ int main(void) {
     any_config(&config);
     (void)iw_config_stop_budget(&config);
     now_us = any_time();
+    iw_estop_pair_init(&contacts, any_u32());
     if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
         return 1;
     }
