@@ -93,18 +93,22 @@ static gw_client_t *older(gw_client_t *known, gw_client_t *other) {
     return (known == NULL || other->close_us < known->close_us) ? other : known;
 }
 
+static void look_at_taken(places_t *seen, gw_client_t *place, uid_t uid) {
+    const bool own = place->uid == uid;
+    seen->held += own ? 1U : 0U;
+    if (!place->said && !place->closing) {
+        seen->oldest = older(seen->oldest, place);
+        seen->own = own ? older(seen->own, place) : seen->own;
+    }
+}
+
 static places_t look_over(gw_client_t *first, uid_t uid) {
     places_t seen = {.held = 0};
     for (gw_client_t *place = first; place < &first[GW_STOP_PLACES]; place++) {
         if (place->id == IW_CLIENT_NONE) {
             seen.free_one = place;
-            continue;
-        }
-        const bool own = place->uid == uid;
-        seen.held += own ? 1U : 0U;
-        if (!place->said && !place->closing) {
-            seen.oldest = older(seen.oldest, place);
-            seen.own = own ? older(seen.own, place) : seen.own;
+        } else {
+            look_at_taken(&seen, place, uid);
         }
     }
     return seen;

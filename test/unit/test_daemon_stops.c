@@ -257,28 +257,41 @@ static void test_stop_behind_another_line_is_carried_out(void) {
 }
 
 /// It asks for more than it reads, and its stop comes with the request whose answer finds no room any more.
-static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
-    take_all_places();
-    begin_driving();
-    const gw_client_t *greedy = &daemon_rig.daemon->clients.client[1];
+static void ask_too_much_and_stop(int fd, const gw_client_t *greedy) {
     for (unsigned i = 0; i < 5000U && greedy->out_end - greedy->out_start < sizeof greedy->out / 2U; i++) {
-        say(crowd[0], "{\"cmd\":\"status\"}\n");
-        daemon_rig_drive(client, 300, 300, 1);
+        say(fd, "{\"cmd\":\"status\"}\n");
+        say(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n");
+        daemon_rig_run(1);
+        (void)((fd != client) ? hear(client) : NULL);
     }
     TEST_ASSERT_GREATER_THAN_size_t(sizeof greedy->out / 2U, greedy->out_end - greedy->out_start);
     for (unsigned i = 0; i < 100U; i++) {
         (void)snprintf(&text[i * 17U], sizeof text - i * 17U, "{\"cmd\":\"status\"}\n");
     }
     (void)strcat(text, "{\"cmd\":\"stop\"}\n");
-    say(crowd[0], text);
+    say(fd, text);
+}
+
+static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
+    take_all_places();
+    begin_driving();
+    ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
     assert_slower("given up");
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
+}
+
+/// It has stopped before it is gone.
+static void test_stop_of_a_holder_that_is_given_up_is_its_own(void) {
+    begin_driving();
+    ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
+    assert_slower("given up");
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
 }
 
 static void test_stop_place_answers_one_line_and_all_stops(void) {
     take_all_places();
     const int fd = knock(GW_DRIVE);
-    say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"status\"}\n");
+    say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
     daemon_rig_run(20);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"id\":1,\"ok\":true"), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"id\":2,\"ok\":true"), text);
@@ -376,6 +389,7 @@ int main(void) {
     RUN_TEST(test_stop_behind_another_line_is_carried_out);
     RUN_TEST(test_stop_place_answers_one_line_and_all_stops);
     RUN_TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out);
+    RUN_TEST(test_stop_of_a_holder_that_is_given_up_is_its_own);
     RUN_TEST(test_stop_place_of_the_silent_is_free_after_200_ms);
     RUN_TEST(test_stop_places_of_one_user_are_half_of_them);
     RUN_TEST(test_stop_in_a_place_names_who_asked_for_it);
