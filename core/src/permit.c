@@ -284,7 +284,7 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
 }
 
 bool iw_permit_ending(const iw_permit_t *self, iw_time_us_t now_us) {
-    return is_holding(self->phase) && !time_is_enough(self) &&
+    return is_holding(self->phase) && !iw_permit_holding(self) && !time_is_enough(self) &&
            iw_age_us(self->hold_us, now_us) >= longest_us(self) - IW_PERMIT_ENDING_US;
 }
 
