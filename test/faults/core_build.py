@@ -219,7 +219,7 @@ class Judges:
         found = self.failing(core, sorted(self.tests, key=lambda name: (name in SLOW, not any(part in name for part in first), name)))
         return found and (found[1] or f"unit_{found[0]} {found[2].how}")
 
-    def sim(self, core, hours=4):
+    def sim(self, core, hours=5):
         """What the swarm finds, or None."""
         done = self.run(core, "test_sim", "--quick", "--hours", hours)
         if done.status == 0:

@@ -277,9 +277,10 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
             return true;
         }
     }
-    return refuse(out_refusal, IWN_UNKNOWN_CMD,
-                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm "
-                  "recordings recording config");
+    return refuse(
+        out_refusal, IWN_UNKNOWN_CMD,
+        "cmd must be one of hello status watch arm drive twist stop disarm estop reset release tare why confirm "
+        "recordings recording config");
 }
 
 static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
