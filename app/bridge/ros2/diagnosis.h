@@ -29,10 +29,10 @@ typedef struct {
 
 typedef struct {
     ros_level_t level;
-    const char *name;
-    char message[ROS_SENTENCE_SIZE + 100U];
-    ros_value_t values[ROS_VALUES_MAX];
     unsigned value_count;
+    const char *name;
+    ros_value_t values[ROS_VALUES_MAX];
+    char message[ROS_SENTENCE_SIZE + 100U];
 } ros_status_t;
 
 void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status);
