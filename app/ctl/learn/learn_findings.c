@@ -34,19 +34,22 @@ const learn_finding_t *learn_find(const learn_findings_t *self, const char *item
 
 bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding, const char **out_section,
                     const char **out_key) {
-    static const char *const keys[] = {"setpoint_type", "current_role", "setpoint_dlc", "force_unit"};
-    if (strcmp(finding->item, "wheel_lag_ms") == 0) {
-        *out_section = "limits";
-        *out_key = finding->item;
-        return true;
-    }
+    // Without a type that moves the wheels nobody knows what the rest of a setpoint meant.
+    static const struct {
+        const char *item;
+        const char *section; ///< NULL: that of its side.
+        bool needs_type;
+    } keys[] = {{"setpoint_type", "wheels", true},
+                {"current_role", "wheels", true},
+                {"setpoint_dlc", "wheels", true},
+                {"force_unit", NULL, false},
+                {"wheel_lag_ms", "limits", false}};
     const learn_finding_t *type = learn_find(self, "setpoint_type", LEARN_BOTH);
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (finding->value[0] != '\0' && strcmp(finding->item, keys[i]) == 0) {
-            *out_section = (finding->side == LEARN_BOTH) ? "wheels" : text_side(finding->side);
-            *out_key = keys[i];
-            // Without a type that moves the wheels nobody knows what the rest of a setpoint meant.
-            return finding->side != LEARN_BOTH || (type != NULL && type->mark == '+');
+        if (finding->value[0] != '\0' && strcmp(finding->item, keys[i].item) == 0) {
+            *out_section = (keys[i].section != NULL) ? keys[i].section : text_side(finding->side);
+            *out_key = keys[i].item;
+            return !keys[i].needs_type || (type != NULL && type->mark == '+');
         }
     }
     return false;
