@@ -16,24 +16,23 @@ void gw_daemon_compose(gw_daemon_t *self) {
     wheels->health.limits = (gw_health_limits_t){config->health.battery_low_dV, config->health.temperature_high_degC};
     self->knowledge.wheels = wheels;
     self->knowledge.log = &self->log;
-    self->knowledge.clients = clients;
+    self->knowledge.server = &self->answers.server;
     self->knowledge.configured = (gw_configured_t){&config->core, config->core.track_mm};
     self->knowledge.button = (gw_button_t){.contact = {{config->estop.line, config->estop.active_high},
                                                        {config->estop.line2, config->estop.active2_high}}};
     self->knowledge.bus = config->bus.interface;
-    self->status = (gw_status_t){
-        .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};
-    self->answers = (gw_answers_t){.wheels = wheels,
-                                   .knowledge = &self->knowledge,
-                                   .box = &self->box,
-                                   .status = &self->status,
-                                   .clients = clients,
-                                   .socket = config->northbound.socket,
-                                   .group = config->northbound.group,
-                                   .max_age_ms = config->northbound.max_age_ms};
-    clients->servant = gw_dispatch_servant(&self->answers);
+    self->answers.wheels = wheels;
+    self->answers.knowledge = &self->knowledge;
+    self->answers.box = &self->box;
+    self->answers.log = &self->log;
+    self->answers.clients = clients;
+    self->answers.socket = config->northbound.socket;
+    self->answers.group = config->northbound.group;
+    self->answers.server.bus = wheels->bus.name;
+    self->answers.server.max_age_ms = config->northbound.max_age_ms;
+    clients->servant = gw_answers_servant(&self->answers);
     clients->log = &self->log;
     clients->most[GW_DRIVE] = config->northbound.max_clients;
     clients->most[GW_WATCH] = config->northbound.max_watchers;
-    gw_observe_begin(&self->status);
+    gw_answers_begin(&self->answers);
 }

@@ -4,7 +4,7 @@
 ///
 /// One cycle of the loop (loop.c), always in this order:
 ///
-///     wait -> signals -> who drives, if nothing else is due -> bus and e-stop (core step) -> what changed (status/)
+///     wait -> signals -> who drives, if nothing else is due -> bus and e-stop (core step) -> what changed (answers/)
 ///          -> clients (answers/)
 ///          -> step again if they asked for something -> new clients -> flush -> what is kept (ledger/) -> watchdog
 ///
@@ -12,7 +12,7 @@
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
 
-#include "answers/dispatch.h"
+#include "answers/answers.h"
 #include "box/box.h"
 #include "bus/bus_facts.h"
 #include "config/gateway_config.h"
@@ -22,7 +22,6 @@
 #include "sockets/clients.h"
 #include "sockets/log.h"
 #include "sockets/wakeup.h"
-#include "status/observe.h"
 #include "wheels/wheels.h"
 
 typedef struct gw_daemon {
@@ -36,7 +35,6 @@ typedef struct gw_daemon {
     gw_bus_facts_t facts;
     gw_knowledge_t knowledge;
     gw_clients_t clients;
-    gw_status_t status;
     gw_answers_t answers;
     iw_time_us_t suspended_us; ///< Of the machine, as last looked at.
     iw_time_us_t clocks_us;    ///< When both clocks are read next, though nothing is late.

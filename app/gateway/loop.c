@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 
-#include "answers/dispatch.h"
+#include "answers/answers.h"
 #include "box/box.h"
 #include "daemon.h"
 #include "sockets/clients.h"
@@ -185,12 +185,12 @@ static void read_clock(gw_daemon_t *daemon) {
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
     iw_linux_hal_tend(&wheels->hal, wheels->now_us);
-    gw_bus_facts_follow(&daemon->facts, wheels, daemon->status.observed.left_behind);
+    gw_bus_facts_follow(&daemon->facts, wheels, daemon->answers.server.told.left_behind);
     const iw_snapshot_t seen = gw_wheels_step(wheels);
     mark_if_sending(daemon, &seen);
     iw_motion_evidence_look(&wheels->evidence, &wheels->core, &seen);
-    gw_observe(&daemon->status, &seen);
-    gw_dispatch_arming(&daemon->answers, &seen);
+    gw_answers_observe(&daemon->answers, &seen);
+    gw_answers_arming(&daemon->answers, &seen);
     plan_look(daemon, &seen);
     daemon->holder = seen.holder;
 }
@@ -204,13 +204,13 @@ static bool looks(const gw_daemon_t *daemon) {
 }
 
 /// When there is something to do though nothing comes; 0: at once.
-static iw_time_us_t next_us(const gw_daemon_t *daemon) {
+static iw_time_us_t next_us(gw_daemon_t *daemon) {
     if (daemon->wheels.requested || gw_service_is_busy(&daemon->clients)) {
         return 0;
     }
     iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
-    next_us = earlier(next_us, gw_observe_next_us(&daemon->clients));
-    next_us = earlier(next_us, gw_observe_frames_us(&daemon->status));
+    next_us = earlier(next_us, iwn_server_next_us(&daemon->answers.server));
+    next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
     next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
     return looks(daemon) ? earlier(next_us, daemon->look_us) : next_us;
 }
@@ -221,7 +221,7 @@ static void heed_bus(gw_daemon_t *daemon) {
     daemon->frames_us = (wheels->tape.tapped > 0U) ? wheels->now_us : daemon->frames_us;
     const bool may_wait = daemon->frames_may_wait && wheels->now_us < daemon->frames_us + FRAMES_GONE_US &&
                           wheels->tape.tapped < GW_FRAMES &&
-                          gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;
+                          iwn_server_watching(&daemon->answers.server, IWN_TOPIC_FRAME) == 0U;
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
     if (may_wait != daemon->frames_wait &&
         epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
@@ -263,7 +263,7 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     if (daemon->wheels.now_us >= daemon->box_look_us) {
         daemon->box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
         gw_record_take(&daemon->box, &daemon->log);
-        if (!gw_recordings_take(&daemon->box, &daemon->clients)) {
+        if (!gw_recordings_take(&daemon->answers)) {
             gw_log(&daemon->log, GW_LOG_WARNING,
                    "the process that reads recordings has ended (was it killed?); it is started again with the next "
                    "request");
@@ -302,8 +302,8 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     }
     listen_to_writer(daemon);
     heed_bus(daemon);
-    gw_observe_frames(&daemon->status);
-    gw_observe_periodic(&daemon->status);
+    gw_answers_frames(&daemon->answers);
+    gw_answers_periodic(&daemon->answers);
     gw_service_flush(&daemon->clients, daemon->holder);
     gw_knowledge_tend(&daemon->knowledge);
     give_way(daemon);

@@ -38,12 +38,12 @@ static bool admit(gw_clients_t *self, gw_client_t *client, const newcomer_t *new
     client->uid = newcomer->peer.uid;
     client->right = right;
     client->interest = interest.events;
-    client->rate_hz = IWN_RATE_DEFAULT_HZ;
     client->drained = true;
     client->caught_up_us = self->now_us;
     self->count[right]++;
     self->open[right] |= UINT64_C(1) << (slot - gw_parts[right].first);
     gw_log(self->log, GW_LOG_DEBUG, "client %u (pid %d) connected", (unsigned)client->id, client->pid);
+    self->servant.welcome(self->servant.context, client);
     return true;
 }
 
@@ -164,13 +164,6 @@ static void pause_listening(gw_clients_t *self, gw_listener_t *listener, iw_time
     listen_to_newcomers(self, listener, false);
 }
 
-static void welcome(gw_clients_t *self, gw_client_t *client, const newcomer_t *newcomer, gw_listener_t *listener) {
-    listener->full_told = false;
-    if (admit(self, client, newcomer, listener->wish.right)) {
-        self->servant.welcome(self->servant.context, client);
-    }
-}
-
 /// Takes one newcomer. False: there is none, or none for now.
 static bool accept_one(gw_clients_t *self, gw_listener_t *listener) {
     newcomer_t newcomer = {.peer = {0}};
@@ -188,7 +181,8 @@ static bool accept_one(gw_clients_t *self, gw_listener_t *listener) {
     (void)getsockopt(newcomer.fd, SOL_SOCKET, SO_PEERCRED, &newcomer.peer, &length);
     gw_client_t *client = (result == GW_ACCEPT_ONE) ? free_slot(self, listener->wish.right) : NULL;
     if (client != NULL) {
-        welcome(self, client, &newcomer, listener);
+        listener->full_told = false;
+        (void)admit(self, client, &newcomer, listener->wish.right);
     } else {
         hear_stop(self, &newcomer, listener->wish.right, result == GW_ACCEPT_ONE);
     }

@@ -4,7 +4,6 @@
 #include "iwheel_northbound/json_out.h"
 
 #include <errno.h>
-#include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -137,13 +136,5 @@ void gw_client_finish(gw_client_t *self, iw_time_us_t now_us) {
     if (!self->closing) {
         self->closing = true;
         self->close_us = now_us + GW_CLOSING_US;
-    }
-}
-
-void gw_client_describe(const gw_client_t *self, char *out_text, size_t size) {
-    if (self->name[0] != '\0') {
-        (void)snprintf(out_text, size, "\"%s\" (client %u, pid %d)", self->name, (unsigned)self->id, self->pid);
-    } else {
-        (void)snprintf(out_text, size, "client %u (pid %d)", (unsigned)self->id, self->pid);
     }
 }

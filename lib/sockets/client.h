@@ -38,24 +38,16 @@ typedef struct gw_client {
     bool failed;  ///< Cannot be written to any more.
     bool said;    ///< Beyond the maximum: its one line was carried out.
     bool arming;  ///< An arm waits for its reply; later lines wait behind it.
-    iwn_id_t arm_id;
     bool reading; ///< A question about recordings has no answer yet; later lines do not wait for it.
-    iwn_id_t read_id;
-    uint8_t topics;
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
-    uint32_t rate_hz;
     bool drained;              ///< The last read took all there was.
     iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
     iw_time_us_t stopped_us;   ///< Somebody else has stopped the wheels then; 0: nobody has.
-    iw_time_us_t next_us;      ///< When the next periodic event is due.
     iw_time_us_t line_us;      ///< Of a watcher: its next line is carried out no earlier.
-    bool due;                  ///< A periodic event is due in this cycle.
     iw_time_us_t close_us;     ///< While closing, and beyond the maximum: no later than this.
     size_t in_length;
     size_t out_start;
     size_t out_end;
-    char name[IWN_NAME_MAX + 1U];     ///< As given with arm; empty: none.
-    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Of its lease, drawn at each arm that is granted; empty: there was none.
     char in[IWN_LINE_MAX + 1U];
     char out[GW_OUT_SIZE];
 } gw_client_t;
@@ -96,9 +88,5 @@ bool gw_client_flushed(const gw_client_t *self);
 
 /// Nothing more is read; it is closed when it has taken what is queued.
 void gw_client_finish(gw_client_t *self, iw_time_us_t now_us);
-
-/// "joystick" (client 3, pid 4711), for messages.
-void gw_client_describe(const gw_client_t *self, char *out_text, size_t size);
-#define GW_CLIENT_TEXT_SIZE 112U
 
 #endif

@@ -31,7 +31,7 @@ _Static_assert(GW_DRIVERS_MAX == 64U && GW_WATCHERS_MAX == 64U, "a word has a bi
 
 /// What is done for a client beside reading and sending. Each is called with `context`.
 typedef struct gw_servant {
-    void (*welcome)(void *context, gw_client_t *client);
+    void (*welcome)(void *context, gw_client_t *client); ///< It is connected; who has come only to stop, too.
     /// Of a connection that is being closed only what stops.
     void (*carry_out)(void *context, gw_client_t *client, const char *line, size_t length);
     void (*leave)(void *context, gw_client_t *client); ///< It can hold no lease any more.
@@ -76,24 +76,8 @@ static inline uint32_t gw_clients_from(const gw_clients_t *self, uint32_t slot) 
     return GW_CLIENTS_MAX;
 }
 
-/// How many watch it.
-uint32_t gw_clients_watching(const gw_clients_t *self, iwn_topic_t topic);
-
 /// `by` stops the wheels, in this cycle: what others have sent before is not to undo it.
 void gw_clients_note_stop(gw_clients_t *self, const gw_client_t *by);
-
-/// An event, with its name.
-iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name);
-
-/// Closes it and sends it to all who watch its topic. Whoever reads too slowly loses it; one that does not fit `line` is sent to
-/// nobody.
-void gw_clients_send_event(gw_clients_t *self, iwn_out_t *json, iwn_topic_t topic);
-
-/// A reply that says yes, open for its fields.
-iwn_out_t gw_clients_begin_reply(gw_clients_t *self, const iwn_id_t *id);
-
-/// Closes it and sends it.
-void gw_clients_send_reply(gw_client_t *client, iwn_out_t *json);
 
 /// A reply that says no.
 void gw_clients_refuse(gw_clients_t *self, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal);

@@ -51,7 +51,6 @@ void gw_service_release(gw_clients_t *self, gw_client_t *client) {
     gw_log(self->log, GW_LOG_DEBUG, "client %u (pid %d) closed", (unsigned)client->id, client->pid);
     (void)close(client->fd);
     client->id = IW_CLIENT_NONE;
-    client->topics = 0;
     self->count[client->right]--;
     self->open[client->right] &= ~(UINT64_C(1) << ((uint32_t)(client - self->client) - gw_parts[client->right].first));
 }

@@ -4,6 +4,7 @@
 
 #include "unity.h"
 
+#include "iwheel_server/target.h"
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -213,7 +214,7 @@ static void test_status_tells_of_each_wheel_its_own_zero(void) {
     daemon->knowledge.known.offset[IW_LEFT].samples = 11;
     daemon->knowledge.known.offset[IW_RIGHT].samples = 22;
     const iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
-    const iwn_surroundings_t around = gw_snapshot_around(&daemon->status, &seen);
+    const iwn_surroundings_t around = iwn_target_around(&daemon->answers.server, &seen);
     TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].samples);
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].samples);
 }
@@ -279,7 +280,7 @@ static void test_purge_by_the_port_is_told_once_in_the_log(void) {
 
 static void test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link(void) {
     daemon_rig.link = (iw_bus_link_t){.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
-    daemon_rig.daemon->status.observed.left_behind = true;
+    daemon_rig.daemon->answers.server.told.left_behind = true;
     gw_bus_facts_follow(&daemon_rig.daemon->facts, &daemon_rig.daemon->wheels, true);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
     const char *warnings = strstr(reply, "\"warnings\":[");

@@ -3,7 +3,7 @@
 #include "daemon_rig.h"
 #include "inspect/assumption.h"
 #include "sockets/clients.h"
-#include "status/observe.h"
+#include "answers/answers.h"
 
 #include "unity.h"
 
@@ -87,7 +87,7 @@ static void tell_stored(void) {
     news = GW_KEEPER_READ;
     daemon_rig.daemon->knowledge.answered = false;
     daemon_rig.daemon->knowledge.start_us = daemon_rig.now_us;
-    daemon_rig_run(5);
+    daemon_rig_run(20);
     TEST_ASSERT_TRUE(daemon_rig.daemon->knowledge.answered);
     TEST_ASSERT_FALSE(set_aside);
 }
@@ -256,8 +256,9 @@ static gw_ledger_written_t *written(void) {
 }
 
 static const char *write_status(char out_line[GW_REPLY_MAX]) {
-    iwn_out_t json = gw_clients_begin_event(&daemon_rig.daemon->clients, "state");
-    gw_snapshot_write(&daemon_rig.daemon->status, &json);
+    iwn_server_t *const server = &daemon_rig.daemon->answers.server;
+    iwn_out_t json = iwn_server_begin_event(server, "state");
+    iwn_server_write_status(server, iwn_server_look(server), &json);
     iwn_out_close(&json, '}');
     const size_t end = iwn_out_finish(&json);
     TEST_ASSERT_GREATER_THAN_size_t(1, end);
@@ -395,13 +396,10 @@ static void test_status_after_a_change_of_the_configuration_is_as_written_anew(v
 }
 
 static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(void) {
-    iw_side_t refused;
     daemon_rig_run(3000);
     expect_new_status("three seconds later");
-    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, gw_knowledge_tare(&daemon_rig.daemon->knowledge, IW_SIDES_RIGHT, &refused));
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
     expect_new_status("right wheel tared");
-    observe();
-    expect_new_status("tare noted");
     store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     tell_stored();
@@ -439,8 +437,9 @@ static void test_status_that_does_not_fit_keeps_nothing(void) {
     char line[64];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
+    iwn_server_t *const server = &daemon_rig.daemon->answers.server;
     written()->length = 0;
-    gw_snapshot_write(&daemon_rig.daemon->status, &json);
+    iwn_server_write_status(server, iwn_server_look(server), &json);
     TEST_ASSERT_TRUE(json.overflow);
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }

@@ -434,7 +434,7 @@ static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
 static void test_start_with_healthy_wheels_logs_no_fault(void) {
     daemon_rig_crash();
     daemon_rig_start();
-    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->status.observed.present); // The first look finds no telemetry yet.
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->answers.server.told.present); // The first look finds no telemetry yet.
     daemon_rig_keep_log();
     daemon_rig_run(2000);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());
@@ -447,7 +447,7 @@ static void test_start_without_wheels_logs_the_fault_after_a_second(void) {
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
     daemon_rig_crash();
     daemon_rig_start();
-    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->status.observed.present);
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->answers.server.told.present);
     daemon_rig_keep_log();
     daemon_rig_run(900);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());

@@ -113,7 +113,7 @@ static void test_one_person_request_ahead_of_the_clock_is_refused(void) {
 }
 
 static void test_one_person_limit_of_the_age_is_configured(void) {
-    daemon_rig.daemon->answers.max_age_ms = 200;
+    daemon_rig.daemon->answers.server.max_age_ms = 200;
     assert_reply(aged("arm", 250), "more than 200 ms");
     assert_reply(aged("arm", 150), "\"ok\":true");
 }
@@ -159,7 +159,7 @@ static void test_one_person_reset_from_before_a_second_estop_is_late(void) {
     latch();
     const iw_time_us_t pressed_us = daemon_rig.now_us;
     (void)daemon_rig_ask(other, "{\"cmd\":\"estop\"}");
-    daemon_rig.daemon->answers.max_age_ms = 2000;
+    daemon_rig.daemon->answers.server.max_age_ms = 2000;
     daemon_rig_run(1200); // The cause is no longer present.
     (void)snprintf(line_, sizeof line_, "{\"cmd\":\"reset\",\"stop\":%u,\"t_us\":%llu}", stop_number(),
                    (unsigned long long)pressed_us - 1000U);

@@ -228,7 +228,7 @@ static void test_telemetry_leaves_in_the_cycle_in_which_it_is_due(void) {
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // Else each frame wakes it.
     daemon_rig_run(1000);
     for (unsigned event = 0; event < 5U; event++) {
-        const iw_time_us_t due_us = daemon_rig.daemon->clients.client[0].next_us;
+        const iw_time_us_t due_us = daemon_rig.daemon->answers.served[0].client.next_us;
         while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Of before.
         }
         while (daemon_rig.now_us <= due_us) {
@@ -295,7 +295,7 @@ static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
         clients->client[i].reading = true;
     }
     (void)close(pair[1]);
-    TEST_ASSERT_FALSE(gw_recordings_take(&daemon_rig.daemon->box, clients));
+    TEST_ASSERT_FALSE(gw_recordings_take(&daemon_rig.daemon->answers));
     for (unsigned i = 0; i < 4U; i++) {
         TEST_ASSERT_FALSE(clients->client[i].reading);
     }
@@ -344,8 +344,8 @@ static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     seen.still_moving++;
-    gw_observe(&daemon->status, &seen);
-    gw_observe(&daemon->status, &seen);
+    gw_answers_observe(&daemon->answers, &seen);
+    gw_answers_observe(&daemon->answers, &seen);
     gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
@@ -362,8 +362,8 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     seen.rolling = rolling;
     seen.rolling_fault = is_fault;
-    gw_observe(&daemon->status, &seen);
-    gw_observe(&daemon->status, &seen);
+    gw_answers_observe(&daemon->answers, &seen);
+    gw_answers_observe(&daemon->answers, &seen);
     gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(size > 0) ? size : 0] = '\0';
@@ -379,8 +379,8 @@ static void test_end_of_zeros_is_told_before_it_comes(void) {
     iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     seen.zeros_ending = true;
-    gw_observe(&daemon->status, &seen);
-    TEST_ASSERT_TRUE(daemon->status.observed.zeros_ending);
+    gw_answers_observe(&daemon->answers, &seen);
+    TEST_ASSERT_TRUE(daemon->answers.server.told.zeros_ending);
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
 }
 

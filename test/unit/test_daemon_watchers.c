@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
-#include "answers/dispatch.h"
+#include "answers/answers.h"
 #include "daemon_rig.h"
 #include "sockets/clients.h"
-#include "status/observe.h"
+#include "answers/answers.h"
 
 #include "unity.h"
 
@@ -307,7 +307,7 @@ static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
     }
     const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
-    TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= GW_ESTOP_AGAIN_US + MS(20));
+    TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= IWN_ESTOP_AGAIN_US + MS(20));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
     TEST_ASSERT_LESS_OR_EQUAL_UINT(stops + 2U, seen.stop->number);
     assert_has(daemon_rig_ask(driver, "{\"cmd\":\"reset\"}"), "\"cause_present\"");
@@ -439,8 +439,9 @@ static void test_round_of_sending_ends_when_its_time_is_up(void) {
         (void)recv(crowd[i], text, sizeof text, MSG_DONTWAIT);
     }
     gw_clients_t *clients = &daemon_rig.daemon->clients;
-    iwn_out_t json = gw_clients_begin_event(clients, "state");
-    gw_clients_send_event(clients, &json, IWN_TOPIC_STATE);
+    iwn_server_t *server = &daemon_rig.daemon->answers.server;
+    iwn_out_t json = iwn_server_begin_event(server, "state");
+    iwn_server_send_event(server, IWN_TOPIC_STATE, &json);
     daemon_rig.look_takes_us = 100U;
     gw_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;

@@ -1,82 +1,82 @@
 // SPDX-License-Identifier: MIT
-#include "dispatch.h"
+#include "answers.h"
 
 #include "box/box.h"
-#include "sockets/clients.h"
 
 #include <stdio.h>
 #include <string.h>
 
-static void refuse(gw_clients_t *clients, gw_client_t *client, const iwn_id_t *id, iwn_error_t error,
-                   const char *words) {
-    iwn_refusal_t refusal = {.error = error};
-    (void)snprintf(refusal.message, sizeof refusal.message, "%s", words);
-    gw_clients_refuse(clients, client, id, &refusal);
+static void refuse(gw_answers_t *self, iwn_client_t *client, const iwn_id_t *id, iwn_error_t error, const char *words) {
+    iwn_refusal_t *refusal = &self->server.refusal;
+    refusal->error = error;
+    (void)snprintf(refusal->message, sizeof refusal->message, "%.*s", (int)sizeof refusal->message - 1, words);
+    iwn_server_refuse(&self->server, client, id);
 }
 
-void gw_recordings_ask(const gw_call_t *call) {
-    gw_client_t *client = call->client;
-    gw_box_t *box = call->answers->box;
-    const iwn_request_t *request = call->request;
+void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
+    gw_client_t *connection = gw_answers_connection(self, client);
+    const iwn_request_t *request = &self->server.request;
     const char *why = NULL;
     gw_box_question_t question = {
         .client = client->id, .list = request->cmd == IWN_CMD_RECORDINGS, .offset = request->offset};
     memcpy(question.name, request->file, sizeof question.name);
-    if (client->reading) {
+    if (connection->reading) {
         why = "the recording asked for before is still being read; wait for that reply, then ask again";
-    } else if (box->wish.blackbox_s == 0U) {
+    } else if (self->box->wish.blackbox_s == 0U) {
         why = "nothing is recorded: [record] blackbox_s is 0; set it, then restart the gateway";
-    } else if (!gw_box_ask(box, &question)) {
+    } else if (!gw_box_ask(self->box, &question)) {
         why = "the process that reads recordings is gone or too far behind; ask again after 10 s";
     }
     if (why != NULL) {
-        refuse(call->answers->clients, client, &request->id, IWN_DENIED, why);
+        refuse(self, client, &request->id, IWN_DENIED, why);
     } else {
-        client->reading = true;
-        client->read_id = request->id;
+        connection->reading = true;
+        gw_answers_served(self, connection)->read_id = request->id;
     }
 }
 
 /// Its question is answered. A client that has ended is looked at again: it was kept for this only.
-static void settle(gw_client_t *client) {
-    client->reading = false;
-    if (client->ended) {
-        client->readable = true;
+static void settle(gw_client_t *connection) {
+    connection->reading = false;
+    if (connection->ended) {
+        connection->readable = true;
     }
 }
 
-static void pass_on(gw_clients_t *clients, const gw_box_answer_t *answer) {
-    gw_client_t *client = gw_clients_find(clients, answer->client);
-    if (client == NULL || !client->reading) {
+static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
+    gw_client_t *connection = gw_clients_find(self->clients, answer->client);
+    if (connection == NULL || !connection->reading) {
         return; // It did not wait for it.
     }
-    settle(client);
+    gw_served_t *served = gw_answers_served(self, connection);
+    settle(connection);
     if (answer->error != IWN_OK) {
-        refuse(clients, client, &client->read_id, answer->error, answer->text);
+        refuse(self, &served->client, &served->read_id, answer->error, answer->text);
         return;
     }
-    iwn_out_t json = gw_clients_begin_reply(clients, &client->read_id);
+    iwn_out_t json = iwn_server_begin_reply(&self->server, &served->read_id);
     iwn_out_span(&json, iwn_span(NULL), (iwn_span_t){answer->text, answer->length});
-    gw_clients_send_reply(client, &json);
+    iwn_server_send_reply(&self->server, &served->client, &json);
 }
 
-static void give_up(gw_clients_t *clients) {
+static void give_up(gw_answers_t *self) {
+    gw_clients_t *clients = self->clients;
     for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
-        gw_client_t *client = &clients->client[i];
-        if (client->reading) {
-            settle(client);
-            refuse(clients, client, &client->read_id, IWN_DENIED,
+        gw_client_t *connection = &clients->client[i];
+        if (connection->reading) {
+            settle(connection);
+            refuse(self, &self->served[i].client, &self->served[i].read_id, IWN_DENIED,
                    "the process that reads recordings has ended; ask again after 10 s");
         }
     }
 }
 
-bool gw_recordings_take(gw_box_t *box, gw_clients_t *clients) {
-    const gw_child_news_t news = gw_box_hear(box);
+bool gw_recordings_take(gw_answers_t *self) {
+    const gw_child_news_t news = gw_box_hear(self->box);
     if (news == GW_CHILD_SAID) {
-        pass_on(clients, &box->answer);
+        pass_on(self, &self->box->answer);
     } else if (news == GW_CHILD_ENDED) {
-        give_up(clients);
+        give_up(self);
     }
     return news != GW_CHILD_ENDED;
 }

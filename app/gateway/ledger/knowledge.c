@@ -282,19 +282,6 @@ bool gw_knowledge_confirm(gw_knowledge_t *self, iw_ledger_item_t item, const gw_
     return true;
 }
 
-iw_tare_t gw_knowledge_tare(gw_knowledge_t *self, uint8_t sides, iw_side_t *out_refused) {
-    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
-    const iw_force_quality_t quality[IW_SIDES] = {iw_force_measure(seen.wheel[IW_LEFT].force),
-                                                  iw_force_measure(seen.wheel[IW_RIGHT].force)};
-    const iw_tare_t result = iw_gateway_tare(&self->wheels->core, self->wheels->now_us, sides, out_refused);
-    for (unsigned side = 0; side < IW_SIDES; side++) {
-        if (result == IW_TARE_OK && (sides & (1U << side)) != 0U) {
-            self->tare[side] = quality[side];
-        }
-    }
-    return result;
-}
-
 void gw_knowledge_describe_contradiction(const gw_knowledge_t *self, iw_ledger_item_t item, char *out_text,
                                          size_t size) {
     char evidence[GW_EVIDENCE_SIZE];

@@ -16,7 +16,7 @@
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/request.h"
 
-struct gw_clients;
+struct iwn_server;
 struct gw_log;
 struct gw_wheels;
 
@@ -58,8 +58,8 @@ typedef struct {
 
 typedef struct gw_knowledge {
     struct gw_wheels *wheels; ///< Of which it is known.
-    struct gw_log *log;       ///< Told what is learnt, and the clients.
-    struct gw_clients *clients;
+    struct gw_log *log;       ///< Told what is learnt.
+    struct iwn_server *server; ///< By which clients are told.
     gw_configured_t configured;
     const char *bus;
     gw_known_t known;
@@ -96,10 +96,6 @@ void gw_knowledge_tend(gw_knowledge_t *self);
 /// why.
 bool gw_knowledge_confirm(gw_knowledge_t *self, iw_ledger_item_t item, const gw_word_t *word,
                           iwn_refusal_t *out_refusal);
-
-/// Tares these wheels (bits of IW_SIDES_), all or none, and remembers the windows they were measured in. `*out_refused`:
-/// which one refused.
-iw_tare_t gw_knowledge_tare(gw_knowledge_t *self, uint8_t sides, iw_side_t *out_refused);
 
 /// "track is contradicted: ...; twist is refused", of an item that is.
 void gw_knowledge_describe_contradiction(const gw_knowledge_t *self, iw_ledger_item_t item, char *out_text,

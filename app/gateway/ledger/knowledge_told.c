@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "sockets/clients.h"
 #include "sockets/log.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"
+#include "iwheel_server/server.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,11 +28,11 @@ void gw_knowledge_tell_item(gw_knowledge_t *self, iw_ledger_item_t item) {
     gw_log(self->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
            iwn_ledger_item_name(item), value, iwn_ledger_state_name(entry->state), iwn_evidence_name(entry->evidence),
            evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");
-    iwn_out_t json = gw_clients_begin_event(self->clients, "ledger");
+    iwn_out_t json = iwn_server_begin_event(self->server, "ledger");
     iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
     iwn_out_text(&json, "item", iwn_ledger_item_name(item));
     gw_knowledge_write_item(self, item, &json);
-    gw_clients_send_event(self->clients, &json, IWN_TOPIC_STATE);
+    iwn_server_send_event(self->server, IWN_TOPIC_STATE, &json);
 }
 
 /// "12.300 N, stored (wheel)", or "none".
@@ -59,14 +59,14 @@ void gw_knowledge_tell_offset(gw_knowledge_t *self, iw_side_t side, const gw_tol
     describe(before, was, sizeof was);
     gw_log(self->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
            was);
-    iwn_out_t json = gw_clients_begin_event(self->clients, "offset");
+    iwn_out_t json = iwn_server_begin_event(self->server, "offset");
     iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
     iwn_out_text(&json, "side", side_name(side));
     iwn_out_known(&json, "offset_mN", known, now->offset_mN);
     iwn_out_text(&json, "provenance", iwn_offset_word(now->provenance, now->offset_us));
     iwn_out_known(&json, "before_mN", knew, before->offset_mN);
     iwn_out_text(&json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
-    gw_clients_send_event(self->clients, &json, IWN_TOPIC_FORCE);
+    iwn_server_send_event(self->server, IWN_TOPIC_FORCE, &json);
 }
 
 void gw_knowledge_tell_memory(gw_knowledge_t *self) {

@@ -7,7 +7,7 @@
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
 #include "daemon_rig.h"
 #include "sockets/clients.h"
-#include "status/observe.h"
+#include "answers/answers.h"
 
 #include "unity.h"
 
@@ -27,8 +27,8 @@ void tearDown(void) {
 }
 
 static size_t write_event(gw_daemon_t *daemon) {
-    iwn_out_t json = gw_clients_begin_event(&daemon->clients, "state");
-    gw_snapshot_write(&daemon->status, &json);
+    iwn_out_t json = iwn_server_begin_event(&daemon->answers.server, "state");
+    iwn_server_write_status(&daemon->answers.server, iwn_server_look(&daemon->answers.server), &json);
     iwn_out_close(&json, '}');
     return iwn_out_finish(&json);
 }

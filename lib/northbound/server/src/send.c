@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Lines to clients, and the queries about them.
+#include "iwheel_server/target.h"
+
+#include <string.h>
+
+void iwn_server_welcome(iwn_server_t *self, iwn_client_t *client, iw_client_t id, bool watches_only) {
+    (void)self;
+    memset(client, 0, sizeof *client);
+    client->id = id;
+    client->watches_only = watches_only;
+    client->rate_hz = IWN_RATE_DEFAULT_HZ;
+}
+
+const iw_snapshot_t *iwn_server_look(iwn_server_t *self) {
+    iw_gateway_snapshot(self->core, self->now_us, &self->seen);
+    return &self->seen;
+}
+
+iwn_client_t *iwn_server_find(iwn_server_t *self, iw_client_t id) {
+    iwn_client_t *client = (id == IW_CLIENT_NONE) ? NULL : iwn_target_next(self, NULL);
+    while (client != NULL && client->id != id) {
+        client = iwn_target_next(self, client);
+    }
+    return client;
+}
+
+static bool watches(const iwn_client_t *client, iwn_topic_t topic) {
+    return (client->topics & (1U << topic)) != 0U;
+}
+
+uint32_t iwn_server_watching(iwn_server_t *self, iwn_topic_t topic) {
+    uint32_t count = 0;
+    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
+        count += watches(client, topic) ? 1U : 0U;
+    }
+    return count;
+}
+
+iwn_out_t iwn_server_begin_reply(iwn_server_t *self, const iwn_id_t *id) {
+    size_t size = 0;
+    char *const line = iwn_target_line(self, &size);
+    return iwn_tell_reply(line, size, id, true);
+}
+
+void iwn_server_send_reply(iwn_server_t *self, iwn_client_t *client, iwn_out_t *json) {
+    iwn_out_close(json, '}');
+    iwn_target_reply(self, client, json->data, iwn_out_finish(json));
+}
+
+void iwn_server_refuse(iwn_server_t *self, iwn_client_t *client, const iwn_id_t *id) {
+    size_t size = 0;
+    char *const line = iwn_target_line(self, &size);
+    iwn_target_reply(self, client, line, iwn_tell_refusal(line, size, id, &self->refusal));
+}
+
+iwn_out_t iwn_server_begin_event(iwn_server_t *self, const char *name) {
+    size_t size = 0;
+    char *const line = iwn_target_line(self, &size);
+    return iwn_tell_event(line, size, name);
+}
+
+void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *json) {
+    iwn_out_close(json, '}');
+    const size_t length = iwn_out_finish(json);
+    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
+        if (watches(client, topic)) {
+            iwn_target_event(self, client, json->data, length);
+        }
+    }
+}
+
+void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
+    const iwn_hello_t hello = {self->version, self->bus, iw_gateway_state(self->core), client->id, client->watches_only};
+    iwn_out_t json = iwn_server_begin_event(self, "hello");
+    iwn_tell_hello(&hello, &json);
+    iwn_out_int(&json, "t_us", (int64_t)self->now_us);
+    iwn_server_send_reply(self, client, &json); // A client waits for it before it says anything: it is not to be dropped.
+}
+
+void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
+    const iwn_surroundings_t around = iwn_target_around(self, seen);
+    iwn_tell_machine(seen, &around, json);
+    iwn_target_write_learnt(self, seen, json);
+    iwn_tell_rest(seen, &around, json);
+}
+
+static bool is_periodic(const iwn_client_t *client) {
+    return (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
+}
+
+/// The topics of periodic events that are due.
+static uint8_t find_due(iwn_server_t *self) {
+    uint8_t topics = 0;
+    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
+        client->due = is_periodic(client) && self->now_us >= client->next_us;
+        if (client->due) {
+            // On a grid that all clients share, so that an event is written once for many; and no burst after a stall.
+            const iw_time_us_t period_us = 1000000U / client->rate_hz;
+            client->next_us = self->now_us - self->now_us % period_us + period_us;
+            topics |= client->topics;
+        }
+    }
+    return topics;
+}
+
+/// Written once, for all who are due and watch it.
+static void send_force(iwn_server_t *self, const iw_snapshot_t *seen) {
+    const iwn_surroundings_t around = iwn_target_around(self, seen);
+    iwn_out_t json = iwn_server_begin_event(self, "force");
+    iwn_tell_force(seen, &around, &json);
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
+    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
+        if (client->due && watches(client, IWN_TOPIC_FORCE)) {
+            iwn_target_event(self, client, json.data, length);
+        }
+    }
+}
+
+void iwn_server_periodic(iwn_server_t *self) {
+    const uint8_t topics = find_due(self);
+    if ((topics & (1U << IWN_TOPIC_STATE)) != 0U) {
+        iwn_target_state(self, iwn_server_look(self), true);
+    }
+    if ((topics & (1U << IWN_TOPIC_FORCE)) != 0U) {
+        send_force(self, iwn_server_look(self));
+    }
+}
+
+iw_time_us_t iwn_server_next_us(iwn_server_t *self) {
+    iw_time_us_t next_us = IW_NEVER;
+    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
+        if (is_periodic(client) && client->next_us < next_us) {
+            next_us = client->next_us;
+        }
+    }
+    return next_us;
+}
