@@ -8,7 +8,7 @@ from pathlib import Path
 
 from table import ROOT, Broken
 
-TARGET, PORT = ROOT / "test/target", ROOT / "port/stm32_stub"
+TARGET, PORT, APPLICATION = ROOT / "test/target", ROOT / "port/stm32_stub", ROOT / "app/board"
 DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
 IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "startup.c", "watchdog.c")
 ALONE_FILES = ("commander.c", "console.c", "report.c")
@@ -29,7 +29,9 @@ def judge(work, applied, folder, image, scenario):
     """What the scenario finds, or None. `work`: the builds of test/target/run."""
     work = Path(work).resolve()
     shutil.copytree(PORT, folder)
-    (folder / Path(applied.file).relative_to(PORT.relative_to(ROOT))).write_text(applied.text)
+    shutil.copytree(APPLICATION, folder, dirs_exist_ok=True)
+    home = next(place for place in (PORT, APPLICATION) if (ROOT / applied.file).is_relative_to(place))
+    (folder / (ROOT / applied.file).relative_to(home)).write_text(applied.text)
     flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections",
              "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
              f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A board without a board: the image `gateway`'s own code for its host (port/stm32_stub), with the same core, on this machine's
+// A board without a board: the image `gateway`'s own code for its host (app/board), with the same core, on this machine's
 // clock, with the simulator's wheels and with descriptor 0 for its serial line.
 //
 //     serial_board CONFIGURATION BUS ESTOP [restarted]
