@@ -3,9 +3,9 @@
 #include "host.h"
 
 static bool stage(iw_host_t *self, iwn_text_t *why) {
-    const iwn_request_t *const request = &self->request;
+    const iwn_request_t *const request = &self->server.request;
     if (request->value[0] == '\0') {
-        IWN_TEXT_JOIN(why, "key needs a value; without both all keys are read");
+        iwn_text_add(why, "key needs a value; without both all keys are read");
         return false;
     }
     if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
@@ -17,7 +17,7 @@ static bool stage(iw_host_t *self, iwn_text_t *why) {
 
 /// True if what was asked for is done, or there was nothing to do. `*out_error` else.
 static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
-    const iwn_request_t *const request = &self->request;
+    const iwn_request_t *const request = &self->server.request;
     *out_error = IWN_BAD_VALUE;
     if (request->key[0] != '\0' || request->value[0] != '\0') {
         return stage(self, why);
@@ -27,7 +27,7 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
     }
     if (!request->commit) {
         self->has_staged = false;
-        self->staged = self->place.settings;
+        self->staged = self->settings;
         return true;
     }
     if (!iw_settings_check(&self->staged, why)) {
@@ -35,31 +35,31 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
     }
     *out_error = IWN_DENIED;
     if (!iw_host_is_silent(self)) {
-        IWN_TEXT_JOIN(
+        iwn_text_add(
             why,
             "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
         return false;
     }
     *out_error = IWN_INTERNAL;
     if (!iw_host_keep(&self->staged)) {
-        IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
-                           "on, and try again");
+        iwn_text_add(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
+                          "on, and try again");
         return false;
     }
     self->has_staged = false;
-    self->restart_us = self->now_us + IW_HOST_RESTART_US;
+    self->restart_us = self->server.now_us + IW_HOST_RESTART_US;
     return true;
 }
 
-void iw_answer_config(iw_host_t *self, iw_host_client_t *client) {
-    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
-    if (!configure(self, &why, &self->refusal.error)) {
-        iw_host_send_refusal(self, client, &self->request.id);
+void iw_host_config(iw_host_t *self, iwn_client_t *client) {
+    iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
+    if (!configure(self, &why, &self->server.refusal.error)) {
+        iwn_server_refuse(&self->server, client, &self->server.request.id);
         return;
     }
-    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
+    iwn_out_t json = iwn_server_begin_reply(&self->server, &self->server.request.id);
     iw_settings_write(&self->staged, &json);
     iwn_out_bool(&json, "staged", self->has_staged);
     iwn_out_bool(&json, "restarts", self->restart_us != 0U);
-    iw_host_send_reply(self, client, &json);
+    iwn_server_send_reply(&self->server, client, &json);
 }

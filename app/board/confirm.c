@@ -31,48 +31,48 @@ static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_
 }
 
 static bool has_failed(iw_host_t *self, iwn_error_t error, const char *text) {
-    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
-    self->refusal.error = error;
-    IWN_TEXT_JOIN(&why, text);
+    iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
+    self->server.refusal.error = error;
+    iwn_text_add(&why, text);
     return false;
 }
 
-/// False, with `self->refusal`, if the request's value is none of the item's.
+/// False, with `self->server.refusal`, if the request's value is none of the item's.
 static bool compare(iw_host_t *self, bool *out_same) {
-    const iwn_request_t *const request = &self->request;
+    const iwn_request_t *const request = &self->server.request;
     const char *const key = iw_learnt_key(request->item);
     const bool is_told = request->value[0] != '\0';
     char value[IW_SETTINGS_TEXT];
-    iw_settings_t found = self->place.settings;
-    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    iw_settings_t found = self->settings;
+    iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
     *out_same = true;
-    self->refusal.error = IWN_BAD_VALUE;
+    self->server.refusal.error = IWN_BAD_VALUE;
     if (key == NULL) {
         *out_same = !is_told || strcmp(request->value, "yes") == 0;
         return *out_same || strcmp(request->value, "no") == 0 ||
                has_failed(self, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
-    if (!iw_settings_value(&self->place.settings, key, value)) {
+    if (!iw_settings_value(&self->settings, key, value)) {
         return has_failed(self, IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
     if (is_told && !iw_settings_set(&found, key, request->value, &why)) {
         return false;
     }
-    *out_same = is_same(request->item, &found, &self->place.settings);
+    *out_same = is_same(request->item, &found, &self->settings);
     return true;
 }
 
 void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
-    const iw_ledger_entry_t *const entry = &iw_host_look(self)->assumed[item];
+    const iw_ledger_entry_t *const entry = &iwn_server_look(&self->server)->assumed[item];
     const char *const key = iw_learnt_key(item);
     char plain[IW_SETTINGS_TEXT] = "yes";
     char whose[IW_SETTINGS_TEXT];
     char value[2U * IW_SETTINGS_TEXT + 16U];
     iwn_text_t text = iwn_text_begin(value, sizeof value);
-    const bool is_set = key == NULL || iw_settings_value(&self->place.settings, key, plain);
-    IWN_TEXT_JOIN(&text, plain);
-    if (item == IW_LEDGER_GEAR_RATIO && iw_settings_value(&self->place.settings, "wheels.rpm_of", whose)) {
+    const bool is_set = key == NULL || iw_settings_value(&self->settings, key, plain);
+    iwn_text_add(&text, plain);
+    if (item == IW_LEDGER_GEAR_RATIO && iw_settings_value(&self->settings, "wheels.rpm_of", whose)) {
         IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon says it.
     }
     iwn_out_text(json, "item", iwn_ledger_item_name(item));
@@ -87,15 +87,15 @@ void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json)
     iwn_out_null(json, "disabled");
 }
 
-void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client) {
+void iw_host_confirm(iw_host_t *self, iwn_client_t *client) {
     bool same;
     if (!compare(self, &same)) {
-        iw_host_send_refusal(self, client, &self->request.id);
+        iwn_server_refuse(&self->server, client, &self->server.request.id);
         return;
     }
     const iw_ledger_entry_t entry = {same ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(self->place.gateway, self->request.item, &entry);
-    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
-    iw_host_write_item(self, self->request.item, &json);
-    iw_host_send_reply(self, client, &json);
+    iw_gateway_know(self->server.core, self->server.request.item, &entry);
+    iwn_out_t json = iwn_server_begin_reply(&self->server, &self->server.request.id);
+    iw_host_write_item(self, self->server.request.item, &json);
+    iwn_server_send_reply(&self->server, client, &json);
 }

@@ -21,8 +21,7 @@
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
-#include "iwheel_northbound/refuse.h"
-#include "iwheel_northbound/tell.h"
+#include "iwheel_server/server.h"
 
 /// The longest line to the host, with its newline: told by the event link.
 #define IW_HOST_LINE_BYTES 4480U
@@ -43,19 +42,13 @@
 
 /// A client of the relay's.
 typedef struct {
-    iw_client_t id; ///< IW_CLIENT_NONE: closed.
-    bool watches_only;
-    bool arming;      ///< An arm of its was granted and waits for its TX confirmation.
-    bool owed_status; ///< It asked for a snapshot, and
-    bool owed_state;  ///< its subscription is due one; the line was taken.
-    bool has_seq;     ///< `seq` is one.
-    uint8_t topics;   ///< Bit per iwn_topic_t.
-    uint32_t rate_hz; ///< Of state and force.
-    uint32_t lost;    ///< Lines dropped and not told yet.
-    uint64_t seq;     ///< Of its newest command.
+    iwn_client_t served; ///< Must be the first member; its id is IW_CLIENT_NONE while the channel is closed.
+    bool owed_status;    ///< It asked for a snapshot, and
+    bool owed_state;     ///< its subscription is due one; the line was taken.
+    bool has_seq;        ///< `seq` is one.
+    uint32_t lost;       ///< Lines dropped and not told yet.
+    uint64_t seq;        ///< Of its newest command.
     iw_time_us_t opened_us;
-    iw_time_us_t next_us; ///< When state and force are due.
-    char name[IWN_NAME_MAX + 1U];
 } iw_host_client_t;
 
 /// Whether what is learnt of the wheels is kept, as the daemon tells it.
@@ -65,26 +58,13 @@ typedef enum {
     IW_MEMORY_FAILED,
 } iw_memory_t;
 
-/// What was last told to those who watch.
+/// What watchers were told last of what is learnt of the wheels.
 typedef struct {
     iw_time_us_t offset_us[IW_SIDES]; ///< Of the zero in force, and the two after it.
     int32_t offset_mN[IW_SIDES];
     uint8_t provenance[IW_SIDES]; ///< iw_offset_provenance_t.
-    iw_state_t state;
-    iw_bus_state_t bus;
-    iw_client_t holder;
-    uint32_t present;
-    uint32_t stop_number;
-    uint32_t still_moving;
     uint32_t assumed_changes;
     uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
-    bool left_behind;
-    bool zeros_ending;
-    bool rolling;
-    bool rolling_fault;
-    bool estop_high;
-    bool started;
-    char holder_name[IWN_NAME_MAX + 1U];
 } iw_host_told_t;
 
 /// Where the image runs.
@@ -100,38 +80,35 @@ typedef struct {
     uint64_t boot;          ///< Another one at every start.
 } iw_host_place_t;
 
+/// Small members first, as in the server.
 typedef struct {
-    iw_host_place_t place;
-    iw_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
-    iw_pending_t pending;                       ///< Answers of theirs that wait.
-    iwn_receiver_t receiver;
-    char in[IWN_LINE_BOARD_MAX];
-    iw_time_us_t now_us;
-    iw_time_us_t heard_us;   ///< When the last good line came.
-    iw_time_us_t linked_us;  ///< When the last `link` was written.
-    iw_time_us_t stamped_us; ///< When any line was.
-    iw_time_us_t error_us;   ///< When the last line_error was written.
-    uint32_t errors;         ///< Bad lines since the start.
-    uint32_t errors_told;    ///< Of them, those that a line_error has counted.
+    const iwn_quote_t *quote; ///< Of the request that is being carried out; NULL: it has none.
+    uint64_t boot;            ///< Of this start.
+    iw_time_us_t heard_us;    ///< When the last good line came.
+    iw_time_us_t linked_us;   ///< When the last `link` was written.
+    iw_time_us_t stamped_us;  ///< When any line was.
+    iw_time_us_t error_us;    ///< When the last line_error was written.
+    iw_time_us_t learn_us;    ///< Nothing that was learnt is written before.
+    iw_time_us_t restart_us;  ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
+    uint32_t errors;          ///< Bad lines since the start.
+    uint32_t errors_told;     ///< Of them, those that a line_error has counted.
+    uint32_t bitrate_hz;      ///< Of the bus.
+    uint32_t sample_point_permille;
     iw_client_t last_id;
     uint32_t lease_us;
     iwn_line_verdict_t fault; ///< Of the last bad line.
     uint8_t next_owed;        ///< Whose turn it is to have the long line, so that nobody keeps it.
-    bool estop_high;          ///< The level of the e-stop's pin.
     bool has_staged;          ///< `staged` is something.
     iw_memory_t memory;
-    iw_host_told_t told;
-    iw_snapshot_t seen; ///< Of iw_host_look: too large for the stack.
-    iwn_request_t request;
-    iwn_refusal_t refusal;
-    iwn_stop_note_t stop;
-    iw_time_us_t stopped_us, estopped_us; ///< When a client last asked; 0: never.
-    iw_client_t stopped_by, estopped_by;
-    char estop_reason[IWN_REASON_MAX + 1U];
-    iw_settings_t staged;            ///< By `config`; in force after a commit and the start that follows it.
     iw_learnt_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
-    iw_time_us_t learn_us;           ///< Nothing that was learnt is written before.
-    iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
+    iw_host_told_t told;
+    iwn_server_t server;
+    iw_settings_t settings;                     ///< In force.
+    iw_settings_t staged;                       ///< By `config`; in force after a commit and the start that follows it.
+    iw_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
+    iwn_receiver_t receiver;
+    iw_pending_t pending; ///< Answers of clients that wait.
+    char in[IWN_LINE_BOARD_MAX];
     union {
         iwn_work_t work;                   ///< While a request is read, ...
         char texts[4][IWN_NAME_MAX + 32U]; ///< then names for a sentence, ...
@@ -153,17 +130,6 @@ iw_time_us_t iw_host_tell(iw_host_t *self, const iw_snapshot_t *seen, bool estop
 
 // For the files of this part.
 
-/// A line for that client: its JSON is begun as iwn_tell_reply and iwn_tell_event do it, and ended by one of the two
-/// below.
-iwn_out_t iw_host_begin_reply(iw_host_t *self, const iwn_id_t *id);
-iwn_out_t iw_host_begin_event(iw_host_t *self, const char *name);
-void iw_host_send_reply(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json);
-/// To all who watch the topic.
-void iw_host_send_event(iw_host_t *self, iwn_topic_t topic, iwn_out_t *json);
-/// To one.
-void iw_host_send_event_to(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json);
-void iw_host_send_refusal(iw_host_t *self, iw_host_client_t *client, const iwn_id_t *id);
-
 /// How many lines it has missed, if there is room to say so.
 void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client);
 /// Who speaks here, on the link, whatever client there is.
@@ -174,13 +140,10 @@ void iw_host_tell_fault(iw_host_t *self);
 /// Writes a snapshot into the line that is lent, if it is free: as reply with `id`, or as event `state` (NULL).
 void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
 
-/// Of this moment, until the next call.
-const iw_snapshot_t *iw_host_look(iw_host_t *self);
-iwn_surroundings_t iw_host_around(const iw_host_t *self, const iw_snapshot_t *seen);
-iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
-
-/// `"joystick" (client 3)`, into one of `self->scratch.texts`.
-const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
+/// The host whose server this is.
+static inline iw_host_t *iw_host_of(iwn_server_t *server) {
+    return (iw_host_t *)(void *)((char *)server - offsetof(iw_host_t, server));
+}
 
 /// By the image: keeps a configuration for the next start. False: it could not, and the one of before stays.
 bool iw_host_keep(const iw_settings_t *settings);
@@ -195,19 +158,16 @@ bool iw_host_is_silent(const iw_host_t *self);
 /// True once the board is to begin anew.
 bool iw_host_wants_restart(const iw_host_t *self);
 
-/// Carries out `self->request`. `quote` is NULL if the line had none.
-void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);
+/// Carries out `config`.
+void iw_host_config(iw_host_t *self, iwn_client_t *client);
 /// Carries out `confirm`: the operator's word on an assumption, for this run.
-void iw_answer_config(iw_host_t *self, iw_host_client_t *client);
-void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client);
+void iw_host_confirm(iw_host_t *self, iwn_client_t *client);
 /// Of the ledger, into an object that is open.
 void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);
-/// Answers an arm that was granted and then failed or succeeded.
-void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen);
-/// Refuses `self->request` for the core's reason.
-void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal);
 
-/// Tells what has changed since the last call.
-void iw_observe(iw_host_t *self, const iw_snapshot_t *seen);
+/// Tells watchers what has changed since the last call.
+void iw_host_observe(iw_host_t *self, const iw_snapshot_t *seen);
+/// Of that, what is learnt of the wheels since the last call.
+void iw_host_tell_learnt(iw_host_t *self, const iw_snapshot_t *seen);
 
 #endif

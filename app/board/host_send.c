@@ -4,6 +4,8 @@
 
 #include "serial.h"
 
+#include "iwheel_server/target.h"
+
 #include <string.h>
 
 #define CHANNEL_LINK 0U
@@ -20,16 +22,10 @@ static uint8_t channel_of(const iw_host_t *self, const iw_host_client_t *client)
     return (uint8_t)(client - self->client + 1);
 }
 
-static iwn_out_t room_for(iw_host_t *self) {
-    iwn_out_t out;
-    iwn_out_init(&out, &self->scratch.small[IWN_LINE_PREFIX], IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX);
-    return out;
-}
-
 /// Puts channel and stamp right before the JSON at `json`, and the CRC behind it. Where the line begins; its length, 0
 /// if it does not fit.
 static const char *frame(iw_host_t *self, uint8_t channel, char *json, size_t length, size_t *out_length) {
-    const iwn_line_t line = {.t_us = self->now_us, .channel = channel, .stamped = true};
+    const iwn_line_t line = {.t_us = self->server.now_us, .channel = channel, .stamped = true};
     char prefix[IWN_LINE_PREFIX];
     const size_t before = iwn_line_begin(&line, prefix, sizeof prefix);
     char *const begin = json - before;
@@ -45,7 +41,7 @@ static bool put(iw_host_t *self, uint8_t channel, size_t length, size_t reserve)
     if (whole == 0U || whole + reserve > iw_serial_room()) {
         return false;
     }
-    self->stamped_us = self->now_us;
+    self->stamped_us = self->server.now_us;
     return iw_serial_write(line, whole);
 }
 
@@ -56,56 +52,32 @@ static size_t finish(iwn_out_t *json) {
     return (length > 0U) ? length - 1U : 0U;
 }
 
-iwn_out_t iw_host_begin_reply(iw_host_t *self, const iwn_id_t *id) {
-    const iwn_out_t out = room_for(self);
-    return iwn_tell_reply(out.data, out.size, id, true);
+char *iwn_target_line(iwn_server_t *server, size_t *out_size) {
+    *out_size = IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
+    return &iw_host_of(server)->scratch.small[IWN_LINE_PREFIX];
 }
 
-iwn_out_t iw_host_begin_event(iw_host_t *self, const char *name) {
-    const iwn_out_t out = room_for(self);
-    return iwn_tell_event(out.data, out.size, name);
-}
-
-void iw_host_send_reply(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json) {
-    const size_t length = finish(json);
-    if (length == 0U || !put(self, channel_of(self, client), length, 0U)) {
-        client->lost++;
+void iwn_target_reply(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
+    iw_host_client_t *const whose = (iw_host_client_t *)client;
+    (void)line;
+    if (length == 0U || !put(iw_host_of(server), channel_of(iw_host_of(server), whose), length - 1U, 0U)) {
+        whose->lost++;
     }
 }
 
-void iw_host_send_refusal(iw_host_t *self, iw_host_client_t *client, const iwn_id_t *id) {
-    const iwn_out_t out = room_for(self);
-    const size_t length = iwn_tell_refusal(out.data, out.size, id, &self->refusal);
-    if (length == 0U || !put(self, channel_of(self, client), length - 1U, 0U)) {
-        client->lost++;
-    }
-}
-
-/// With the number of those that were dropped before it, once there is room again. `text` keeps the event meanwhile.
-static void send_event(iw_host_t *self, iw_host_client_t *client, size_t length) {
-    if (client->lost > 0U || !put(self, channel_of(self, client), length, IW_HOST_REPLY_ROOM)) {
-        client->lost++;
-    }
-}
-
-void iw_host_send_event_to(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json) {
-    const size_t length = finish(json);
-    send_event(self, client, length);
-}
-
-void iw_host_send_event(iw_host_t *self, iwn_topic_t topic, iwn_out_t *json) {
-    const size_t length = finish(json);
-    for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
-        iw_host_client_t *const client = &self->client[i];
-        if (client->id != IW_CLIENT_NONE && (client->topics & (1U << topic)) != 0U) {
-            send_event(self, client, length);
-        }
+/// With the number of those that were dropped before it, once there is room again.
+void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
+    iw_host_t *const self = iw_host_of(server);
+    iw_host_client_t *const whose = (iw_host_client_t *)client;
+    (void)line;
+    if (length == 0U || whose->lost > 0U || !put(self, channel_of(self, whose), length - 1U, IW_HOST_REPLY_ROOM)) {
+        whose->lost++;
     }
 }
 
 /// Before anything else is told to it: how much it has missed.
 void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client) {
-    iwn_out_t json = iw_host_begin_event(self, "lost");
+    iwn_out_t json = iwn_server_begin_event(&self->server, "lost");
     iwn_out_int(&json, "count", client->lost);
     const size_t length = finish(&json);
     if (put(self, channel_of(self, client), length, IW_HOST_REPLY_ROOM)) {
@@ -125,29 +97,34 @@ static void write_memory(const iw_host_t *self, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
+static void write_ledger(const iw_snapshot_t *seen, iwn_out_t *json) {
+    iwn_out_open(json, "ledger", '{');
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        iwn_out_open(json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
+        // No more of it: while a snapshot is written, the e-stop waits.
+        iwn_out_text(json, "state", iwn_ledger_state_name(seen->assumed[item].state));
+        iwn_out_text(json, "evidence", iwn_evidence_name(seen->assumed[item].evidence));
+        iwn_out_close(json, '}');
+    }
+    iwn_out_close(json, '}');
+}
+
+void iwn_target_write_learnt(iwn_server_t *server, const iw_snapshot_t *seen, iwn_out_t *json) {
+    write_ledger(seen, json);
+    write_memory(iw_host_of(server), json);
+    iwn_out_null(json, "gaps");
+}
+
 void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
-    const iwn_surroundings_t around = iw_host_around(self, seen);
     char *const data = &self->big[IWN_LINE_PREFIX];
     const size_t size = sizeof self->big - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
     iwn_out_t json = (id != NULL) ? iwn_tell_reply(data, size, id, true) : iwn_tell_event(data, size, "state");
-    iwn_tell_machine(seen, &around, &json);
-    iwn_out_open(&json, "ledger", '{');
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        iwn_out_open(&json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
-        // No more of it: while a snapshot is written, the e-stop waits.
-        iwn_out_text(&json, "state", iwn_ledger_state_name(seen->assumed[item].state));
-        iwn_out_text(&json, "evidence", iwn_evidence_name(seen->assumed[item].evidence));
-        iwn_out_close(&json, '}');
-    }
-    iwn_out_close(&json, '}');
-    write_memory(self, &json);
-    iwn_out_null(&json, "gaps");
-    iwn_tell_rest(seen, &around, &json);
+    iwn_server_write_status(&self->server, seen, &json);
     size_t whole = 0;
     const size_t length = finish(&json);
     const char *const line = (length > 0U) ? frame(self, channel_of(self, client), data, length, &whole) : NULL;
     if (whole > 0U && iw_serial_lend(line, whole)) {
-        self->stamped_us = self->now_us;
+        self->stamped_us = self->server.now_us;
     } else {
         client->lost++;
     }
@@ -156,23 +133,23 @@ void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_sna
 /// Who speaks here: on the link, whatever client there is.
 void iw_host_tell_link(iw_host_t *self) {
     char boot[IWN_LINE_BOOT + 1U];
-    iwn_out_t json = iw_host_begin_event(self, "link");
-    iwn_out_text(&json, "boot", boot_text(self->place.boot, boot));
-    iwn_out_text(&json, "version", self->place.version);
+    iwn_out_t json = iwn_server_begin_event(&self->server, "link");
+    iwn_out_text(&json, "boot", boot_text(self->boot, boot));
+    iwn_out_text(&json, "version", self->server.version);
     iwn_out_int(&json, "line_bytes", IW_HOST_LINE_BYTES);
     iwn_out_int(&json, "channels", IWN_LINE_CHANNELS);
     iwn_out_int(&json, "silent_ms", IWN_LINE_SILENT_MS);
     if (put(self, CHANNEL_LINK, finish(&json), 0U)) {
-        self->linked_us = self->now_us;
+        self->linked_us = self->server.now_us;
     }
 }
 
 void iw_host_tell_fault(iw_host_t *self) {
-    if (self->errors == self->errors_told || self->now_us - self->error_us < IW_HOST_ERROR_US) {
+    if (self->errors == self->errors_told || self->server.now_us - self->error_us < IW_HOST_ERROR_US) {
         return;
     }
-    self->error_us = self->now_us;
-    iwn_out_t json = iw_host_begin_event(self, "line_error");
+    self->error_us = self->server.now_us;
+    iwn_out_t json = iwn_server_begin_event(&self->server, "line_error");
     iwn_out_text(&json, "reason", iwn_line_verdict_name(self->fault));
     iwn_out_int(&json, "count", self->errors - self->errors_told);
     if (put(self, CHANNEL_LINK, finish(&json), IW_HOST_REPLY_ROOM)) {

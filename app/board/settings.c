@@ -182,7 +182,7 @@ static bool refuse_number(const row_t *row, iwn_text_t *why) {
     IWN_TEXT_JOIN(why, section_of(row), ".", row->key,
                   (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
     iwn_text_int(why, range.min);
-    IWN_TEXT_JOIN(why, " to ");
+    iwn_text_add(why, " to ");
     iwn_text_int(why, range.max);
     return false;
 }
@@ -239,23 +239,23 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
     case IW_CONFIG_OK:
         return true;
     case IW_CONFIG_STOP_BUDGET:
-        IWN_TEXT_JOIN(
-            why, "lease_ms + period_ms + max_speed_mm_s / decel_mm_s2 exceeds 1000 ms, after which the wheels stop "
-                 "by themselves: lower one of the first three, or raise decel_mm_s2");
+        iwn_text_add(why,
+                     "lease_ms + period_ms + max_speed_mm_s / decel_mm_s2 exceeds 1000 ms, after which the wheels stop "
+                     "by themselves: lower one of the first three, or raise decel_mm_s2");
         return false;
     case IW_CONFIG_REST_SPEED:
-        IWN_TEXT_JOIN(why, "rest_rpm is more than 60 mm/s at a wheel of this radius and gear: set it to ");
+        iwn_text_add(why, "rest_rpm is more than 60 mm/s at a wheel of this radius and gear: set it to ");
         iwn_text_int(why, iw_config_rest(&config).standard);
-        IWN_TEXT_JOIN(why, " first");
+        iwn_text_add(why, " first");
         return false;
     case IW_CONFIG_MIN_CURRENT:
-        IWN_TEXT_JOIN(why, "min_current_mA must not be more than max_current_mA");
+        iwn_text_add(why, "min_current_mA must not be more than max_current_mA");
         return false;
     case IW_CONFIG_GEAR_RATIO:
-        IWN_TEXT_JOIN(why, "gear_ratio must lie within 1 and 100");
+        iwn_text_add(why, "gear_ratio must lie within 1 and 100");
         return false;
     default:
-        IWN_TEXT_JOIN(why, "a value is outside its range; set it anew");
+        iwn_text_add(why, "a value is outside its range; set it anew");
         return false;
     }
 }
@@ -263,18 +263,18 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
 static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[IW_SETTINGS_TEXT]) {
     iwn_text_t text = iwn_text_begin(out_text, IW_SETTINGS_TEXT);
     if (row->kind == SWITCH) {
-        IWN_TEXT_JOIN(&text, words[row->words][is_on(self, row->at) ? 1 : 0]);
+        iwn_text_add(&text, words[row->words][is_on(self, row->at) ? 1 : 0]);
         return true;
     }
     const uint16_t value = self->value[row->at];
     if (row->kind == WORDS) {
         const unsigned word = (unsigned)value - IW_ROLE_LIMIT;
-        IWN_TEXT_JOIN(&text, (word < 2U) ? words[row->words][word] : "");
+        iwn_text_add(&text, (word < 2U) ? words[row->words][word] : "");
         return word < 2U;
     }
     iwn_text_int(&text, value);
     if (row->kind == GEAR && self->value[row->at + 1U] != 1U) {
-        IWN_TEXT_JOIN(&text, "/");
+        iwn_text_add(&text, "/");
         iwn_text_int(&text, self->value[row->at + 1U]);
     }
     return row->kind != BYTE || value != UNSET;

@@ -31,16 +31,16 @@ typedef struct gw_client {
     gw_right_t right;
     uint32_t interest; ///< What epoll was told to watch.
     bool readable;     ///< epoll says so, in this cycle.
-    bool leaving; ///< The other side will send nothing more, though lines of it may be waiting: it can hold no lease.
-    bool hung_up; ///< It reads nothing more either.
-    bool ended;   ///< End of file: complete lines before it still count.
-    bool closing; ///< Nothing more is read.
-    bool failed;  ///< Cannot be written to any more.
-    bool said;    ///< Beyond the maximum: its one line was carried out.
-    bool arming;  ///< An arm waits for its reply; later lines wait behind it.
-    bool reading; ///< A question about recordings has no answer yet; later lines do not wait for it.
+    bool leaving;  ///< The other side will send nothing more, though lines of it may be waiting: it can hold no lease.
+    bool hung_up;  ///< It reads nothing more either.
+    bool ended;    ///< End of file: complete lines before it still count.
+    bool closing;  ///< Nothing more is read.
+    bool failed;   ///< Cannot be written to any more.
+    bool said;     ///< Beyond the maximum: its one line was carried out.
+    bool arming;   ///< An arm waits for its reply; later lines wait behind it.
+    bool reading;  ///< A question about recordings has no answer yet; later lines do not wait for it.
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
-    bool drained;              ///< The last read took all there was.
+    bool drained;  ///< The last read took all there was.
     iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
     iw_time_us_t stopped_us;   ///< Somebody else has stopped the wheels then; 0: nobody has.
     iw_time_us_t line_us;      ///< Of a watcher: its next line is carried out no earlier.

@@ -12,14 +12,14 @@ static void run_with_noise(unsigned span_ms, const char *noise) {
 
 static void assert_channel_ends_with(const char *noise) {
     run_with_noise(IWN_LINE_SILENT_MS + 50U, noise);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(IW_CLIENT_NONE, host.client[0].id, noise);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(IW_CLIENT_NONE, host.client[0].served.id, noise);
 }
 
 static void test_channel_opened_again_has_no_lease(void) {
-    const iw_client_t before = host.client[0].id;
+    const iw_client_t before = host.client[0].served.id;
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);
-    TEST_ASSERT_NOT_EQUAL_UINT(before, host.client[0].id);
+    TEST_ASSERT_NOT_EQUAL_UINT(before, host.client[0].served.id);
     TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, gateway_rig_look(&rig).holder);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
     assert_answer("{\"cmd\":\"hello\",\"id\":3}", "\"name\":\"iwheel-gateway\"");
@@ -37,13 +37,12 @@ static void test_channel_of_a_relay_that_is_alive_stays(void) {
     char line[IWN_LINE_BOARD_MAX];
     line[framed(0, "{\"cmd\":\"alive\"}", line)] = '\0';
     run_with_noise(2U * IWN_LINE_SILENT_MS, line);
-    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].id);
+    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].served.id);
 }
 
 /// The gateway starts with another lease; its relay connects.
 static void start_with_lease(uint16_t lease_ms) {
     iw_config_t config = rig.config;
-    iw_host_place_t place = host.place;
     config.lease_ms = lease_ms;
     place.settings = iw_settings_from(&config);
     memset(&host, 0, sizeof host);
@@ -110,8 +109,8 @@ static void test_channel_closed_leaves_the_others(void) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
     say(0, "{\"cmd\":\"close\",\"channel\":2}");
     run_ms(20);
-    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].id);
-    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, host.client[1].id);
+    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].served.id);
+    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, host.client[1].served.id);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
+#include "answers/answers.h"
 #include "daemon_rig.h"
 #include "inspect/assumption.h"
 #include "sockets/clients.h"
-#include "answers/answers.h"
 
 #include "unity.h"
 

@@ -434,7 +434,8 @@ static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
 static void test_start_with_healthy_wheels_logs_no_fault(void) {
     daemon_rig_crash();
     daemon_rig_start();
-    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->answers.server.told.present); // The first look finds no telemetry yet.
+    TEST_ASSERT_EQUAL_UINT32(0,
+                             daemon_rig.daemon->answers.server.told.present); // The first look finds no telemetry yet.
     daemon_rig_keep_log();
     daemon_rig_run(2000);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());

@@ -3,7 +3,6 @@
 #include "answers/answers.h"
 #include "daemon_rig.h"
 #include "sockets/clients.h"
-#include "answers/answers.h"
 
 #include "unity.h"
 

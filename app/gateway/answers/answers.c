@@ -68,9 +68,10 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
         return refuse(server, IWN_DENIED, "the gateway is shutting down; wait until it is started again");
     }
     if (gw_client_waited_through_stop(gw_answers_connection(self, client))) {
-        return refuse(server, IWN_STALE_COMMAND,
-                      "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send "
-                      "it anew");
+        return refuse(
+            server, IWN_STALE_COMMAND,
+            "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send "
+            "it anew");
     }
     return !arms || gw_grant_draw_key(self->key) ||
            refuse(server, IWN_INTERNAL,
@@ -79,14 +80,16 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
 
 bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const char *key) {
     return gw_grant_is_same_key(key, ((const gw_served_t *)client)->key) ||
-           refuse(server, IWN_NOT_HOLDER,
-                  "the key is not the one that the reply to the last arm gave; arm, and drive with the key of its reply");
+           refuse(
+               server, IWN_NOT_HOLDER,
+               "the key is not the one that the reply to the last arm gave; arm, and drive with the key of its reply");
 }
 
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
     const gw_answers_t *self = gw_answers_of(server);
     const iw_time_us_t armed_us = gw_wheels_look(self->wheels).armed_us;
-    *out_sent_us = gw_client_sent_us(gw_answers_connection(self, client), server->now_us, armed_us); // It may have waited.
+    *out_sent_us =
+        gw_client_sent_us(gw_answers_connection(self, client), server->now_us, armed_us); // It may have waited.
     return true;
 }
 
@@ -155,7 +158,8 @@ void iwn_target_write_terms(iwn_server_t *server, const iwn_client_t *client, iw
     iwn_out_text(json, "key", ((const gw_served_t *)client)->key);
 }
 
-void iwn_target_tared(iwn_server_t *server, const iwn_client_t *client, iw_side_t side, const iw_force_quality_t *window) {
+void iwn_target_tared(iwn_server_t *server, const iwn_client_t *client, iw_side_t side,
+                      const iw_force_quality_t *window) {
     gw_answers_t *self = gw_answers_of(server);
     const blackbox_entry_t entry = {.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)IW_TARE_OK};
     self->knowledge->tare[side] = *window;
@@ -189,8 +193,9 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
         gw_recordings_ask(self, client);
         break;
     default: // A file that an administrator writes is not to be changed by whoever may drive.
-        (void)refuse(server, IWN_DENIED, "this gateway's configuration is a file: change it, look at it with "
-                                         "iwheel-gateway --check -c FILE, and start the gateway again");
+        (void)refuse(server, IWN_DENIED,
+                     "this gateway's configuration is a file: change it, look at it with "
+                     "iwheel-gateway --check -c FILE, and start the gateway again");
         iwn_server_refuse(server, client, &server->request.id);
         break;
     }

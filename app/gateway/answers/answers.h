@@ -24,8 +24,8 @@ struct gw_wheels;
 /// What the server knows of a connection, and what the daemon adds. It belongs to the connection in the same slot.
 typedef struct {
     iwn_client_t client;
-    iwn_id_t arm_id;  ///< Of the arm that waits for its answer.
-    iwn_id_t read_id; ///< Of the question about recordings that waits for its answer.
+    iwn_id_t arm_id;                  ///< Of the arm that waits for its answer.
+    iwn_id_t read_id;                 ///< Of the question about recordings that waits for its answer.
     char key[IWN_LEASE_KEY_MAX + 1U]; ///< Of its lease, drawn at each arm that is granted; empty: there was none.
 } gw_served_t;
 
@@ -58,8 +58,8 @@ typedef struct gw_answers {
     const char *group;
     gw_stopper_t stopped_by;
     gw_stopper_t estopped_by;
-    iw_link_purge_t purge;  ///< As told to the log.
-    iw_time_us_t frames_us; ///< Frames that are told together wait until then.
+    iw_link_purge_t purge;                 ///< As told to the log.
+    iw_time_us_t frames_us;                ///< Frames that are told together wait until then.
     char key[IWN_LEASE_KEY_MAX + 1U];      ///< Drawn for the arm that is being carried out.
     char holder_text[GW_CLIENT_TEXT_SIZE]; ///< Of the lease, as shown to others.
     char text[GW_CLIENT_TEXT_SIZE];        ///< Of iwn_target_name.

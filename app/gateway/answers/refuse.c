@@ -87,7 +87,8 @@ void iwn_target_say_right(iwn_server_t *server) {
     char *message = server->refusal.message;
     const size_t size = sizeof server->refusal.message;
     if (strcmp(self->group, "none") == 0) {
-        (void)snprintf(message, size, "this socket is for watching, stop and estop; who may drive uses %s", self->socket);
+        (void)snprintf(message, size, "this socket is for watching, stop and estop; who may drive uses %s",
+                       self->socket);
     } else {
         (void)snprintf(message, size,
                        "this socket is for watching, stop and estop; who may drive uses %s and is in group %s (sudo "

@@ -12,10 +12,9 @@
 
 static iwn_holder_t holder_of(gw_answers_t *self, iw_client_t id) {
     const iwn_client_t *client = iwn_server_find(&self->server, id);
-    return (client != NULL) ? (iwn_holder_t){.client = id,
-                                             .name = client->name,
-                                             .pid = gw_answers_connection(self, client)->pid}
-                            : (iwn_holder_t){.client = IW_CLIENT_NONE};
+    return (client != NULL)
+               ? (iwn_holder_t){.client = id, .name = client->name, .pid = gw_answers_connection(self, client)->pid}
+               : (iwn_holder_t){.client = IW_CLIENT_NONE};
 }
 
 static iwn_bus_t bus_of(const gw_wheels_t *wheels) {

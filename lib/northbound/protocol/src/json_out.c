@@ -3,6 +3,11 @@
 
 #include "iwheel_northbound/text.h"
 
+// One copy of each function that takes a name: for programs compiled for size.
+#ifdef __OPTIMIZE_SIZE__
+#include "iwheel_northbound/json_out_inline.h"
+#endif
+
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
 /// A byte of a word of the machine, in all of its bytes.
 #define IN_EACH(byte) ((size_t)-1 / 255U * (byte))
@@ -107,12 +112,12 @@ static size_t put_character(iwn_out_t *self, const char *text) {
     iwn_text_t written = iwn_text_begin(escape, sizeof escape);
     const uint32_t code_point = iwn_plain_read(text, &bytes);
     if (code_point == '"' || code_point == '\\') {
-        IWN_TEXT_JOIN(&written, "\\");
+        iwn_text_add(&written, "\\");
         iwn_text_span(&written, text, 1U);
     } else if (iwn_plain_is(code_point)) {
         iwn_text_span(&written, text, bytes);
     } else {
-        IWN_TEXT_JOIN(&written, "\\u");
+        iwn_text_add(&written, "\\u");
         iwn_text_hex(&written, (code_point == IWN_PLAIN_BROKEN) ? 0xFFFDU : code_point, 4U);
     }
     put(self, escape, written.length);

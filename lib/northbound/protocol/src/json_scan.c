@@ -45,11 +45,11 @@ static bool fail_with(iwn_scan_t *self, const char *what, const char *more, cons
     } else if (length == 0U) {
         IWN_TEXT_JOIN(self->fault, what, more, nowhere);
     } else if (!is_printable(self->token, length)) {
-        IWN_TEXT_JOIN(self->fault, "unreadable");
+        iwn_text_add(self->fault, "unreadable");
     } else {
         IWN_TEXT_JOIN(self->fault, what, more, " near '");
         iwn_text_span(self->fault, self->token, length);
-        IWN_TEXT_JOIN(self->fault, "'");
+        iwn_text_add(self->fault, "'");
     }
     return false;
 }
@@ -114,13 +114,13 @@ static bool is_low(uint32_t unit) {
 static bool fail_unit(iwn_scan_t *self, uint32_t unit, const char *second) {
     char units[sizeof "\\uD800\\uD800'"];
     iwn_text_t text = iwn_text_begin(units, sizeof units);
-    IWN_TEXT_JOIN(&text, "\\u");
+    iwn_text_add(&text, "\\u");
     iwn_text_hex(&text, unit, 4U);
     if (second != NULL) {
-        IWN_TEXT_JOIN(&text, "\\u");
+        iwn_text_add(&text, "\\u");
         iwn_text_hex(&text, read_hex4(second), 4U);
     }
-    IWN_TEXT_JOIN(&text, "'");
+    iwn_text_add(&text, "'");
     return fail_with(self, "invalid Unicode '", units, "");
 }
 

@@ -208,9 +208,9 @@ size_t iwn_quote_write(const iwn_quote_t *quote, const char *json, size_t length
     iwn_text_t text = iwn_text_begin(out, size);
     IWN_TEXT_JOIN(&text, "{\"boot\":\"", quote->boot, "\",\"seq\":");
     iwn_text_span(&text, digits, write_number(quote->seq, digits));
-    IWN_TEXT_JOIN(&text, ",\"t_us\":");
+    iwn_text_add(&text, ",\"t_us\":");
     iwn_text_span(&text, digits, write_number(quote->t_us, digits));
-    IWN_TEXT_JOIN(&text, ",");
+    iwn_text_add(&text, ",");
     iwn_text_span(&text, &json[1], length - 1U);
     return text.length;
 }

@@ -13,22 +13,29 @@ typedef struct {
 
 #define SAY(self, ...) IWN_TEXT_JOIN(&(self)->text, __VA_ARGS__)
 
-static void number(wording_t *self, const char *before, int64_t value, const char *after) {
-    SAY(self, before);
+/// A number of a request may be any.
+static void big_number(wording_t *self, int64_t value, const char *after) {
     iwn_text_int(&self->text, value);
-    SAY(self, after);
+    iwn_text_add(&self->text, after);
 }
 
-static int64_t ms_since(const wording_t *self, iw_time_us_t then_us) {
-    return (then_us < self->seen->at_us) ? (int64_t)((self->seen->at_us - then_us) / IW_US_PER_MS) : 0;
+static void number(wording_t *self, const char *before, int32_t value, const char *after) {
+    iwn_text_add(&self->text, before);
+    big_number(self, value, after);
+}
+
+/// At most INT32_MAX, 24 days.
+static int32_t ms_since(const wording_t *self, iw_time_us_t then_us) {
+    const iw_time_us_t ms = (then_us < self->seen->at_us) ? (self->seen->at_us - then_us) / IW_US_PER_MS : 0U;
+    return (ms < INT32_MAX) ? (int32_t)ms : INT32_MAX;
 }
 
 static void say_holder(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
     const bool over = seen->arming || seen->lease_until_us <= seen->at_us;
-    SAY(self, self->context->holder);
+    iwn_text_add(&self->text, self->context->holder);
     number(self, " holds the lease for another ",
-           over ? 0 : (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS),
+           over ? 0 : (int32_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS),
            " ms at least; let it stop first, or, with the wheels at rest, arm with takeover");
 }
 
@@ -36,20 +43,20 @@ static void say_not_armed(wording_t *self) {
     const iw_stop_t *stop = self->seen->stop;
     const char *by = self->context->stopped_by;
     if (self->context->shutting_down) {
-        SAY(self, "not armed: the gateway is shutting down");
+        iwn_text_add(&self->text, "not armed: the gateway is shutting down");
         return;
     }
     SAY(self, "not armed (", iwn_state_name(self->seen->state), ")");
     if (stop->number == 0U) {
-        SAY(self, "; arm first");
+        iwn_text_add(&self->text, "; arm first");
         return;
     }
     number(self, "; the last stop was ", ms_since(self, stop->at_us), " ms ago: ");
-    SAY(self, iwn_cause_name(stop->cause));
+    iwn_text_add(&self->text, iwn_cause_name(stop->cause));
     if (stop->cause == IW_CAUSE_CLIENT_STOP && by != NULL) {
         SAY(self, ", asked for by ", by);
     }
-    SAY(self, ". Arm first");
+    iwn_text_add(&self->text, ". Arm first");
 }
 
 static void say_estop(wording_t *self) {
@@ -67,12 +74,12 @@ static void say_lost(wording_t *self) {
         }
         SAY(self, "the ", (side == IW_LEFT) ? "left" : "right");
         if (wheel->speed_us == IW_NEVER) {
-            SAY(self, " wheel was never heard; ");
+            iwn_text_add(&self->text, " wheel was never heard; ");
         } else {
             number(self, " wheel was last heard ", ms_since(self, wheel->speed_us), " ms ago; ");
         }
     }
-    SAY(self, "check its power, cable and termination");
+    iwn_text_add(&self->text, "check its power, cable and termination");
 }
 
 static void say_not_at_rest(wording_t *self) {
@@ -93,18 +100,19 @@ static void say_stalled(wording_t *self) {
         number(self, "a setpoint has been waiting for ", ms_since(self, waiting_us),
                " ms to be acknowledged on the bus");
     }
-    SAY(self, "; check that the wheels have power and the bus is terminated");
+    iwn_text_add(&self->text, "; check that the wheels have power and the bus is terminated");
     if (waiting_us != IW_NEVER && more != NULL) {
-        SAY(self, more);
+        iwn_text_add(&self->text, more);
     }
 }
 
 static void say_stale(wording_t *self) {
     if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
-        SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
+        iwn_text_add(&self->text,
+                     "this command was sent before arm was answered; wait for that answer, then command anew");
         return;
     }
-    SAY(self, self->context->stale_client);
+    iwn_text_add(&self->text, self->context->stale_client);
     number(self, " sent a nonzero drive command ", ms_since(self, self->seen->stale_us), " ms ago");
     number(self, "; let go of the stick, wait ", IW_STALE_COMMAND_US / IW_US_PER_MS, " ms, try again");
 }
@@ -131,7 +139,7 @@ static void say_present(wording_t *self) {
             say_estopped(self);
             return;
         }
-        SAY(self, iwn_cause_name((iw_cause_t)cause));
+        iwn_text_add(&self->text, iwn_cause_name((iw_cause_t)cause));
         number(self, " was seen ", ms_since(self, self->seen->seen_us[cause]), " ms ago; ");
         SAY(self, iwn_why_cure((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
@@ -143,12 +151,13 @@ static void say_present(wording_t *self) {
 static void say_out_of_range(wording_t *self) {
     const iwn_request_t *request = self->request;
     if (request->cmd == IWN_CMD_TWIST) {
-        number(self, "", request->v_mm_s, " mm/s with ");
-        number(self, "", request->yaw_mrad_s, " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied");
+        big_number(self, request->v_mm_s, " mm/s with ");
+        big_number(self, request->yaw_mrad_s, " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied");
         return;
     }
-    number(self, "left ", request->left_mm_s, " mm/s, right ");
-    number(self, "", request->right_mm_s, " mm/s: allowed are -32768..32767 mm/s and ");
+    iwn_text_add(&self->text, "left ");
+    big_number(self, request->left_mm_s, " mm/s, right ");
+    big_number(self, request->right_mm_s, " mm/s: allowed are -32768..32767 mm/s and ");
     SAY(self, (self->seen->config->current_role == IW_ROLE_SETPOINT) ? "-2000..2000" : "0..2000",
         " mA; nothing was applied");
 }
@@ -166,7 +175,7 @@ static void say_bus_down(wording_t *self) {
 }
 
 static void say_timing(wording_t *self) {
-    SAY(self, self->context->timing);
+    iwn_text_add(&self->text, self->context->timing);
 }
 
 static void say_missing(wording_t *self) {
@@ -180,11 +189,11 @@ static void say_stop(wording_t *self) {
 }
 
 static void say_listen_only(wording_t *self) {
-    SAY(self, self->context->listen_only);
+    iwn_text_add(&self->text, self->context->listen_only);
 }
 
 static void say_contradicted(wording_t *self) {
-    SAY(self, self->context->contradiction);
+    iwn_text_add(&self->text, self->context->contradiction);
 }
 
 void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
@@ -207,16 +216,16 @@ void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_
     if ((unsigned)refusal < IW_REFUSALS && say[refusal] != NULL) {
         say[refusal](&wording);
     } else {
-        number(&wording, "refused for a reason that has no name (", (int64_t)refusal, "); report this");
+        number(&wording, "refused for a reason that has no name (", (int32_t)refusal, "); report this");
     }
 }
 
 static bool refuse_late(iwn_refusal_t *out_refusal, const char *before, int64_t value, const char *after) {
     iwn_text_t text = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = IWN_STALE_COMMAND;
-    IWN_TEXT_JOIN(&text, before);
+    iwn_text_add(&text, before);
     iwn_text_int(&text, value);
-    IWN_TEXT_JOIN(&text, after);
+    iwn_text_add(&text, after);
     return true;
 }
 

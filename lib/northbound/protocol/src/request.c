@@ -67,7 +67,7 @@ static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *co
 static bool refuse_but(iwn_refusal_t *out_refusal, iwn_error_t error, const char *text, const char *(*word)(unsigned)) {
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = error;
-    IWN_TEXT_JOIN(&message, text);
+    iwn_text_add(&message, text);
     for (unsigned i = 0; word(i) != NULL; i++) {
         IWN_TEXT_JOIN(&message, " ", word(i));
     }
@@ -272,12 +272,12 @@ static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_re
         const char character = (char)c;
         if (c < 0x20U || c > 0x7EU) {
             message.length = begin;
-            IWN_TEXT_JOIN(&message, "?");
+            iwn_text_add(&message, "?");
             break;
         }
         iwn_text_span(&message, &character, (message.length < begin + 64U) ? 1U : 0U);
     }
-    IWN_TEXT_JOIN(&message, "\"; leave it out");
+    iwn_text_add(&message, "\"; leave it out");
     return false;
 }
 
@@ -326,9 +326,9 @@ static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_jso
     char digits[NUMBER_SIZE];
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = IWN_BAD_JSON;
-    IWN_TEXT_JOIN(&message, "not one JSON object on one line: ");
+    iwn_text_add(&message, "not one JSON object on one line: ");
     if (iwn_json_check(line, length, work, out_root, &message)) {
-        IWN_TEXT_JOIN(&message, "it is not an object");
+        iwn_text_add(&message, "it is not an object");
         return iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
     }
     return is_too_deep(line, length)

@@ -39,13 +39,13 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *j
     } else {
         iwn_out_null(json, "at_rest");
     }
-    iwn_out_known(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
-    iwn_out_known(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
-    iwn_out_known(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
-    iwn_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
-    iwn_out_known(json, "commanded_mA", following, wanted.current_mA);
-    iwn_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
-    iwn_out_known(json, "applied_mA", sending, applied.current_mA);
+    iwn_out_known32(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
+    iwn_out_known32(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known32(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
+    iwn_out_known32(json, "commanded_mm_s", following, wanted.speed_mm_s);
+    iwn_out_known32(json, "commanded_mA", following, wanted.current_mA);
+    iwn_out_known32(json, "applied_mm_s", sending, applied.speed_mm_s);
+    iwn_out_known32(json, "applied_mA", sending, applied.current_mA);
     iwn_tell_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
 }
 
@@ -57,9 +57,9 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
     const bool fresh = is_fresh(seen->at_us, wheel->status_us);
     const bool warm = fresh && status->temperature_degC <= IW_TEMPERATURE_MAX_degC;
     const bool cpu = fresh && status->cpu_percent <= 100U;
-    iwn_out_known(json, "battery_dV", fresh, status->battery_dV);
-    iwn_out_known(json, "temperature_degC", warm, status->temperature_degC);
-    iwn_out_known(json, "cpu_percent", cpu, status->cpu_percent);
+    iwn_out_known32(json, "battery_dV", fresh, status->battery_dV);
+    iwn_out_known32(json, "temperature_degC", warm, status->temperature_degC);
+    iwn_out_known32(json, "cpu_percent", cpu, status->cpu_percent);
     iwn_out_known(json, "ticks", ever, wheel->ticks);
     iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
     iwn_tell_age("status_age_ms", seen->at_us, wheel->status_us, json);
@@ -93,10 +93,10 @@ static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
     const bool fresh = is_fresh(seen->at_us, seen->pose_us) && !contradicted(seen, IW_LEDGER_POSE_BYTE_ORDER);
     iwn_out_open(json, "pose", '{');
-    iwn_out_known(json, "x_mm", fresh, pose->x_mm);
-    iwn_out_known(json, "y_mm", fresh, pose->y_mm);
-    iwn_out_known(json, "z_mm", fresh, pose->z_mm);
-    iwn_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
+    iwn_out_known32(json, "x_mm", fresh, pose->x_mm);
+    iwn_out_known32(json, "y_mm", fresh, pose->y_mm);
+    iwn_out_known32(json, "z_mm", fresh, pose->z_mm);
+    iwn_out_known32(json, "psi_mrad", fresh, pose->psi_mrad);
     iwn_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
     iwn_tell_age("age_ms", seen->at_us, seen->pose_us, json);
     iwn_out_close(json, '}');
@@ -112,7 +112,7 @@ static void write_lease(const iw_snapshot_t *seen, const iwn_holder_t *holder, i
     iwn_out_open(json, "lease", '{');
     iwn_out_known(json, "holder", held, holder->client);
     iwn_out_text(json, "name", (held && has_text(holder->name)) ? holder->name : NULL);
-    iwn_out_known(json, "pid", held && holder->pid > 0, holder->pid);
+    iwn_out_known32(json, "pid", held && holder->pid > 0, holder->pid);
     iwn_out_known(json, "remaining_ms", running,
                   running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
     iwn_out_int(json, "lease_ms", seen->config->lease_ms);
@@ -245,8 +245,8 @@ void iwn_tell_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *
     iwn_out_bool(json, "latched", any && stop->latched);
     iwn_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
     iwn_out_text(json, "client_name", has_text(note->client_name) ? note->client_name : NULL);
-    iwn_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
-    iwn_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
+    iwn_out_known32(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
+    iwn_out_known32(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);
     iwn_out_known(json, "wall_us", any && note->wall_us != IWN_WALL_UNKNOWN, note->wall_us);
     iwn_tell_age("age_ms", now_us, any ? stop->at_us : IW_NEVER, json);

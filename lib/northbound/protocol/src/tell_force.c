@@ -74,10 +74,10 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
     const bool offset = force->provenance != IW_OFFSET_NONE;
     const iwn_zero_note_t *noted = &around->zero[side];
     const zero_t zero = describe_zero(seen, around, side);
-    iwn_out_known(json, "force_raw", heard, force->raw);
-    iwn_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
-    iwn_out_known(json, "force_offset_mN", offset, force->offset_mN);
-    iwn_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    iwn_out_known32(json, "force_raw", heard, force->raw);
+    iwn_out_known32(json, "force_raw_mN", heard, iw_force_raw_mN(force));
+    iwn_out_known32(json, "force_offset_mN", offset, force->offset_mN);
+    iwn_out_known32(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
     iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
     iwn_tell_age("force_age_ms", seen->at_us, force->raw_us, json);
     iwn_out_text(json, "offset_provenance", zero.word);
@@ -87,8 +87,8 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
     iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
     iwn_out_known(json, "offset_samples", zero.measured, zero.samples);
     iwn_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
-    iwn_out_known(json, "offset_drift_mN", zero.measured, zero.drift_mN);
-    iwn_out_known(json, "wheel_offset_mN", force->wheel_offset_heard, (int64_t)force->wheel_offset_dN * 100);
+    iwn_out_known32(json, "offset_drift_mN", zero.measured, zero.drift_mN);
+    iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_heard, (int32_t)force->wheel_offset_dN * 100);
     iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
 }
 
@@ -101,10 +101,10 @@ void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around,
         const bool heard = is_heard(force, seen->at_us);
         const zero_t zero = describe_zero(seen, around, side);
         iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
-        iwn_out_known(json, "raw", heard, force->raw);
-        iwn_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
-        iwn_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
-        iwn_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+        iwn_out_known32(json, "raw", heard, force->raw);
+        iwn_out_known32(json, "raw_mN", heard, iw_force_raw_mN(force));
+        iwn_out_known32(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+        iwn_out_known32(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
         iwn_out_text(json, "validity", iwn_force_validity_name(validity));
         iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
         iwn_tell_age("age_ms", seen->at_us, force->raw_us, json);

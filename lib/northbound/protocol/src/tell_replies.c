@@ -97,6 +97,6 @@ void iwn_tell_tare(const iw_force_t *force, const iw_force_quality_t *window, co
     iwn_out_int(json, "samples", window->samples);
     iwn_out_int(json, "deviation_mN", window->deviation_mN);
     iwn_out_int(json, "drift_mN", window->drift_mN);
-    iwn_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
+    iwn_out_known32(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
     iwn_out_text(json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
 }

@@ -90,7 +90,7 @@ static size_t escape(uint32_t code_point, char out_escape[ESCAPE_SIZE]) {
         return 1;
     }
     iwn_text_t text = iwn_text_begin(out_escape, ESCAPE_SIZE);
-    IWN_TEXT_JOIN(&text, "\\u");
+    iwn_text_add(&text, "\\u");
     iwn_text_hex(&text, (code_point == IWN_PLAIN_BROKEN) ? 0xFFFDU : code_point, 4U);
     return text.length;
 }
@@ -127,8 +127,10 @@ size_t iwn_utf8(uint32_t code_point, char out_bytes[4]) {
     return length;
 }
 
-/// 32 bits: a controller divides 64 bits by a function of a hundred instructions.
+/// 32 bits: a controller divides 64 bits by a function of a hundred instructions. Two digits at a time by a table, or one at a time in a
+/// program compiled for size.
 static char *digits_32(uint32_t number, char *end) {
+#ifndef __OPTIMIZE_SIZE__
     static const char pairs[] =
         "00010203040506070809101112131415161718192021222324252627282930313233343536373839404142434445464748495051525354"
         "555657585960616263646566676869707172737475767778798081828384858687888990919293949596979899";
@@ -139,12 +141,11 @@ static char *digits_32(uint32_t number, char *end) {
         memcpy(end, &pairs[2U * pair], 2U);
         number = rest;
     }
-    if (number >= 10U) {
-        end -= 2;
-        memcpy(end, &pairs[2U * (size_t)number], 2U);
-        return end;
-    }
-    *--end = (char)('0' + number);
+#endif
+    do {
+        *--end = (char)('0' + number % 10U);
+        number /= 10U;
+    } while (number > 0U);
     return end;
 }
 
@@ -180,6 +181,10 @@ void iwn_text_span(iwn_text_t *self, const char *text, size_t length) {
     self->data[self->length] = '\0';
 }
 
+void iwn_text_add(iwn_text_t *self, const char *text) {
+    iwn_text_span(self, text, strlen(text));
+}
+
 void iwn_text_int(iwn_text_t *self, int64_t number) {
     char digits[IWN_DIGITS_MAX];
     const char *const end = digits + sizeof digits;
@@ -196,6 +201,6 @@ void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits) {
 
 void iwn_text_join(iwn_text_t *self, const char *const *texts) {
     for (; *texts != NULL; texts++) {
-        iwn_text_span(self, *texts, strlen(*texts));
+        iwn_text_add(self, *texts);
     }
 }

@@ -17,7 +17,7 @@ static const char *reboot_evidence(uint32_t detail) {
 
 static void add_number(iwn_text_t *text, int64_t number, const char *unit) {
     iwn_text_int(text, number);
-    IWN_TEXT_JOIN(text, unit);
+    iwn_text_add(text, unit);
 }
 
 /// How many it takes.
@@ -103,7 +103,7 @@ static void add_part(char part, const iw_stop_t *stop, const iwn_why_context_t *
     } else if (part == 'x') {
         iwn_text_hex(text, stop->detail, hex_digits(stop->detail));
     } else if (part != 'r') {
-        IWN_TEXT_JOIN(text, word_for(part, stop, context));
+        iwn_text_add(text, word_for(part, stop, context));
     } else if (context->reason != NULL && context->reason[0] != '\0') {
         IWN_TEXT_JOIN(text, " (\"", context->reason, "\")");
     }
@@ -138,7 +138,7 @@ static const char *manner(const iw_stop_t *stop) {
 /// What was going on.
 static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
     if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
-        IWN_TEXT_JOIN(text, (stop->from == IW_STATE_ARMED) ? " while driving " : " while stopping from ");
+        iwn_text_add(text, (stop->from == IW_STATE_ARMED) ? " while driving " : " while stopping from ");
         add_number(text, stop->applied.wheel[IW_LEFT].speed_mm_s, "/");
         add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
     } else if (stop->cause != IW_CAUSE_RESTART) { // Then nobody here knows.
@@ -157,7 +157,7 @@ static void add_time(iw_time_us_t at_us, iwn_text_t *text) {
 void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, char *out_sentence, size_t size) {
     iwn_text_t text = iwn_text_begin(out_sentence, size);
     if (stop->number == 0U) {
-        IWN_TEXT_JOIN(&text, "no stop since the gateway started");
+        iwn_text_add(&text, "no stop since the gateway started");
         return;
     }
     add_clause(stop, context, &text);

@@ -7,8 +7,8 @@ static int32_t saturate(int64_t value) {
     return (value > INT32_MAX) ? INT32_MAX : (value < INT32_MIN) ? INT32_MIN : (int32_t)value;
 }
 
-static iw_refusal_t judge(iwn_server_t *self, const iwn_client_t *client, iw_time_us_t sent_us, const iw_drive_t *wanted,
-                          iw_applied_t *out_applied) {
+static iw_refusal_t judge(iwn_server_t *self, const iwn_client_t *client, iw_time_us_t sent_us,
+                          const iw_drive_t *wanted, iw_applied_t *out_applied) {
     const iw_refusal_t refusal = iw_gateway_drive(self->core, sent_us, client->id, wanted, out_applied);
     iwn_target_driven(self, client, wanted, sent_us, refusal);
     return refusal;

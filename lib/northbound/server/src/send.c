@@ -71,11 +71,13 @@ void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *jso
 }
 
 void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
-    const iwn_hello_t hello = {self->version, self->bus, iw_gateway_state(self->core), client->id, client->watches_only};
+    const iwn_hello_t hello = {self->version, self->bus, iw_gateway_state(self->core), client->id,
+                               client->watches_only};
     iwn_out_t json = iwn_server_begin_event(self, "hello");
     iwn_tell_hello(&hello, &json);
     iwn_out_int(&json, "t_us", (int64_t)self->now_us);
-    iwn_server_send_reply(self, client, &json); // A client waits for it before it says anything: it is not to be dropped.
+    iwn_server_send_reply(self, client,
+                          &json); // A client waits for it before it says anything: it is not to be dropped.
 }
 
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {

@@ -6,8 +6,8 @@
 /// be used. Texts are escaped: what moves a terminal (text.h) stands as `\uXXXX`, and what is no UTF-8 as U+FFFD. Names are words of
 /// ours, in which nothing is to be escaped. No heap, no stdio.
 ///
-/// Each element is written as a whole, in one or two copies. The functions that take a name are inline so that the compiler
-/// knows how long a literal one is.
+/// Each element is written as a whole, in one or two copies. The functions that take a name are inline, so that the compiler
+/// knows how long a literal one is, unless the program is compiled for size.
 #ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
 #define IWHEEL_NORTHBOUND_JSON_OUT_H
 
@@ -60,38 +60,35 @@ static inline iwn_span_t iwn_span(const char *text) {
     return (iwn_span_t){text, (text != NULL) ? strlen(text) : 0U};
 }
 
+#ifdef __OPTIMIZE_SIZE__
+#define IWN_OUT_INLINE
+#else
+#define IWN_OUT_INLINE static inline
+#endif
+
 /// `bracket` is '{' or '['; close with the matching '}' or ']'.
-static inline void iwn_out_open(iwn_out_t *self, const char *name, char bracket) {
-    iwn_out_bracket(self, iwn_span(name), bracket);
-}
+IWN_OUT_INLINE void iwn_out_open(iwn_out_t *self, const char *name, char bracket);
 
 /// A whole number.
-static inline void iwn_out_int(iwn_out_t *self, const char *name, int64_t value) {
-    iwn_out_number(self, iwn_span(name), value);
-}
+IWN_OUT_INLINE void iwn_out_int(iwn_out_t *self, const char *name, int64_t value);
 
 /// `true` or `false`.
-static inline void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
-    iwn_out_span(self, iwn_span(name), value ? iwn_span("true") : iwn_span("false"));
-}
+IWN_OUT_INLINE void iwn_out_bool(iwn_out_t *self, const char *name, bool value);
 
 /// `null`.
-static inline void iwn_out_null(iwn_out_t *self, const char *name) {
-    iwn_out_span(self, iwn_span(name), iwn_span("null"));
-}
+IWN_OUT_INLINE void iwn_out_null(iwn_out_t *self, const char *name);
+
+/// `null` unless known. For numbers of 32 bits: without a 64-bit value each argument is in a register.
+IWN_OUT_INLINE void iwn_out_known32(iwn_out_t *self, const char *name, bool known, int32_t value);
 
 /// `null` unless known.
-static inline void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value) {
-    if (known) {
-        iwn_out_int(self, name, value);
-    } else {
-        iwn_out_null(self, name);
-    }
-}
+IWN_OUT_INLINE void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value);
 
 /// A NULL text is `null`.
-static inline void iwn_out_text(iwn_out_t *self, const char *name, const char *text) {
-    iwn_out_string(self, iwn_span(name), text);
-}
+IWN_OUT_INLINE void iwn_out_text(iwn_out_t *self, const char *name, const char *text);
+
+#ifndef __OPTIMIZE_SIZE__
+#include "iwheel_northbound/json_out_inline.h"
+#endif
 
 #endif

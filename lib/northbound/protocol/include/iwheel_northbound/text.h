@@ -52,6 +52,8 @@ typedef struct {
 iwn_text_t iwn_text_begin(char *data, size_t size);
 /// Adds `length` bytes.
 void iwn_text_span(iwn_text_t *self, const char *text, size_t length);
+/// Adds a whole text.
+void iwn_text_add(iwn_text_t *self, const char *text);
 /// Adds decimal digits.
 void iwn_text_int(iwn_text_t *self, int64_t number);
 /// So many hexadecimal digits, upper case.

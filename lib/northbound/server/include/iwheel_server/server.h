@@ -26,13 +26,13 @@
 
 /// One client, as far as the protocol knows it.
 typedef struct {
-    iw_client_t id;           ///< Never used again for another connection.
-    bool watches_only;        ///< It may watch, stop and e-stop.
-    bool arming;              ///< An arm of it was granted and is not answered yet.
-    bool due;                 ///< A periodic event is due in this cycle.
-    uint8_t topics;           ///< What it watches: a bit for each iwn_topic_t.
-    uint32_t rate_hz;         ///< Of the periodic events.
-    iw_time_us_t next_us;     ///< When the next of them is due.
+    iw_client_t id;               ///< Never used again for another connection.
+    bool watches_only;            ///< It may watch, stop and e-stop.
+    bool arming;                  ///< An arm of it was granted and is not answered yet.
+    bool due;                     ///< A periodic event is due in this cycle.
+    uint8_t topics;               ///< What it watches: a bit for each iwn_topic_t.
+    uint32_t rate_hz;             ///< Of the periodic events.
+    iw_time_us_t next_us;         ///< When the next of them is due.
     char name[IWN_NAME_MAX + 1U]; ///< As given with arm; empty: none.
 } iwn_client_t;
 
@@ -56,6 +56,7 @@ typedef struct {
     bool rolling_fault;
 } iwn_told_t;
 
+/// Small members first: a microcontroller reaches them by shorter instructions.
 typedef struct iwn_server {
     // Set by the caller before the first call.
     iw_gateway_t *core;
@@ -67,17 +68,17 @@ typedef struct iwn_server {
 
     // Set by the caller before each call.
     iw_time_us_t now_us;
-    iwn_estop_t estop;     ///< Before iwn_server_observe.
-    iwn_request_t request; ///< Before iwn_server_request.
+    iwn_estop_t estop; ///< Before iwn_server_observe.
 
     // Read by the caller.
-    iwn_refusal_t refusal;                ///< Why the request is refused; written by whoever refuses it.
-    iwn_stop_note_t last_stop;            ///< The last stop, with its sentence.
     iw_time_us_t stopped_us, estopped_us; ///< When a client asked last; 0: never.
     iw_client_t stopped_by, estopped_by;  ///< Which client that was.
-    char estop_reason[IWN_REASON_MAX + 1U];
     iwn_told_t told;
-    iw_snapshot_t seen; ///< Of iwn_server_look.
+    iw_snapshot_t seen;        ///< Of iwn_server_look.
+    iwn_request_t request;     ///< Set by the caller before iwn_server_request.
+    iwn_stop_note_t last_stop; ///< The last stop, with its sentence.
+    iwn_refusal_t refusal;     ///< Why the request is refused; written by whoever refuses it.
+    char estop_reason[IWN_REASON_MAX + 1U];
 } iwn_server_t;
 
 /// Before anything else; the members of the first group are set.

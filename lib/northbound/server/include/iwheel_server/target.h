@@ -82,7 +82,8 @@ typedef enum {
 } iwn_change_t;
 
 /// Something has changed, right before watchers are told.
-void iwn_target_changed(iwn_server_t *self, const iw_snapshot_t *seen, iwn_change_t change, const char *word, bool present);
+void iwn_target_changed(iwn_server_t *self, const iw_snapshot_t *seen, iwn_change_t change, const char *word,
+                        bool present);
 
 /// Microseconds since 1970, or IWN_WALL_UNKNOWN.
 int64_t iwn_target_wall_us(void);
