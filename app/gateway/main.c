@@ -31,7 +31,7 @@ static int start_core(gw_daemon_t *daemon) {
     const iw_config_t *config = &daemon->config.core;
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !config->listen_only;
     daemon->wheels.now_us = iw_clock_now_us();
-    daemon->suspended_us = iw_clock_suspended_us();
+    daemon->loop.suspended_us = iw_clock_suspended_us();
     if (gw_wheels_begin(&daemon->wheels, config, daemon->box.ring, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
@@ -90,7 +90,9 @@ static int serve(gw_daemon_t *daemon) {
             gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
             result = EX_SOFTWARE;
         }
-        result = daemon->gave_way ? EX_UNAVAILABLE : result;
+        if (daemon->loop.phase == GW_LOOP_GIVES_WAY) {
+            result = EX_UNAVAILABLE;
+        }
         gw_service_close_all(&daemon->clients);
         gw_knowledge_close(&daemon->knowledge);
         gw_loop_close(daemon);
