@@ -27,7 +27,7 @@ static int64_t wall_us(void) {
 
 bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
-    return self->link.is_here && self->state_length > 0U;
+    return self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
 }
 
 // ---- what the bridge says of itself -------------------------------------------------------------------------------
@@ -60,7 +60,7 @@ static void tell_info(mqtt_bridge_t *self) {
 
 /// A machine whose gateway is away is as good as away.
 static void tell_availability(mqtt_bridge_t *self, bool always) {
-    const bool online = self->link.is_here && self->state_length > 0U;
+    const bool online = self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
     if (online != self->online || always) {
         const size_t length =
             (size_t)snprintf(self->payload, sizeof self->payload, "%s", online ? "online" : "offline");

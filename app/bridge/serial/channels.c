@@ -18,9 +18,9 @@ static relay_channel_t *channel_of(relay_t *self, const gw_client_t *client) {
 
 /// Its client leaves it; the board is told.
 static void release(relay_channel_t *channel) {
+    channel->state = RELAY_FREE;
     channel->client = IW_CLIENT_NONE;
-    channel->tell_open = false;
-    channel->tell_close = true;
+    channel->close_due = true;
     channel->queue.count = 0;
 }
 
@@ -29,7 +29,7 @@ static relay_channel_t *free_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        if (channel->client == IW_CLIENT_NONE && (found == NULL || channel->used_us < found->used_us)) {
+        if (channel->state == RELAY_FREE && (found == NULL || channel->used_us < found->used_us)) {
             found = channel;
         }
     }
@@ -54,14 +54,14 @@ static uint64_t hold_us(const relay_t *self) {
 static void welcome(void *context, gw_client_t *client) {
     relay_t *self = (relay_t *)context;
     relay_channel_t *channel = free_channel(self);
-    if (!self->link.linked || channel == NULL) {
+    if (self->link.state == SERIAL_SILENT || channel == NULL) {
         turn_away(self, client, (self->trouble[0] != '\0') ? self->trouble : "it has not answered yet; try again");
         return;
     }
-    *channel = (relay_channel_t){.client = client->id,
+    *channel = (relay_channel_t){.state = RELAY_NEW,
+                                 .client = client->id,
                                  .watch = client->right == GW_WATCH,
-                                 .tell_open = true,
-                                 .tell_close = channel->tell_close,
+                                 .close_due = channel->close_due,
                                  .since_us = self->now_us,
                                  .used_us = self->now_us};
     serial_queue_init(&channel->queue, hold_us(self));
@@ -256,7 +256,8 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     relay_channel_t *channel = &self->channel[line->channel];
     gw_client_t *client = gw_clients_find(&self->clients, channel->client);
     const bool hello = begins(line, "{\"event\":\"hello\"");
-    if (client == NULL || (!channel->welcomed && !hello) || line->length + 1U > sizeof self->clients.line) {
+    if (client == NULL || (channel->state != RELAY_WELCOMED && !hello) ||
+        line->length + 1U > sizeof self->clients.line) {
         return; // Of whoever had this channel before.
     }
     if (begins(line, "{\"id\":")) {
@@ -265,8 +266,8 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     }
     memcpy(self->clients.line, line->json, line->length);
     self->clients.line[line->length] = '\n';
-    if (hello && !channel->welcomed) {
-        channel->welcomed = true;
+    if (hello && channel->state != RELAY_WELCOMED) {
+        channel->state = RELAY_WELCOMED;
         gw_client_reply(client, self->clients.line, line->length + 1U);
     } else if (!hello) {
         gw_client_event(client, self->clients.line, line->length + 1U);
@@ -297,7 +298,7 @@ static void tend(relay_t *self, relay_channel_t *channel) {
         release(channel);
         return;
     }
-    if (!channel->welcomed && self->now_us >= channel->since_us + RELAY_WELCOME_US) {
+    if (channel->state != RELAY_WELCOMED && self->now_us >= channel->since_us + RELAY_WELCOME_US) {
         release(channel);
         turn_away(self, client, "the board does not answer to a new client; is its image `gateway`, and not too old?");
         return;
@@ -318,7 +319,7 @@ static void tend(relay_t *self, relay_channel_t *channel) {
 
 void relay_tend_channels(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
-        if (self->channel[i].client != IW_CLIENT_NONE) {
+        if (self->channel[i].state != RELAY_FREE) {
             tend(self, &self->channel[i]);
         }
     }
@@ -329,7 +330,7 @@ uint64_t relay_channels_next_us(const relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         const relay_channel_t *channel = &self->channel[i];
         const uint64_t then_us =
-            (channel->client != IW_CLIENT_NONE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
+            (channel->state != RELAY_FREE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
         next_us = (then_us < next_us) ? then_us : next_us;
     }
     return next_us;
@@ -346,16 +347,15 @@ static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
     char json[64];
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        const bool opens = channel->client != IW_CLIENT_NONE && !channel->welcomed &&
-                           (channel->tell_open || self->now_us >= channel->opened_us + RELAY_OPEN_US);
-        if (!channel->tell_close && !opens) {
+        const bool again = channel->state == RELAY_OPENING && self->now_us >= channel->opened_us + RELAY_OPEN_US;
+        if (!channel->close_due && channel->state != RELAY_NEW && !again) {
             continue;
         }
-        if (channel->tell_close) {
-            channel->tell_close = false;
+        if (channel->close_due) {
+            channel->close_due = false;
             (void)snprintf(json, sizeof json, "{\"cmd\":\"close\",\"channel\":%u}", i);
         } else {
-            channel->tell_open = false;
+            channel->state = RELAY_OPENING;
             channel->opened_us = self->now_us;
             (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":%s}", i,
                            channel->watch ? "true" : "false");
@@ -369,9 +369,8 @@ static size_t next_request(relay_t *self, bool stops_only, char *out, size_t siz
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
         relay_channel_t *channel = &self->channel[number];
-        serial_request_t *request = (channel->client != IW_CLIENT_NONE && channel->welcomed)
-                                        ? serial_queue_next(&channel->queue, stops_only, self->now_us)
-                                        : NULL;
+        serial_request_t *request =
+            (channel->state == RELAY_WELCOMED) ? serial_queue_next(&channel->queue, stops_only, self->now_us) : NULL;
         if (request != NULL) {
             self->next_channel = number % IWN_LINE_CHANNELS;
             serial_queue_sent(request, self->now_us);
@@ -383,11 +382,11 @@ static size_t next_request(relay_t *self, bool stops_only, char *out, size_t siz
 
 static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
     static const char alive[] = "{\"cmd\":\"alive\"}";
-    if (!self->link.linked && self->now_us >= self->asked_us + RELAY_ASK_US) {
+    if (self->link.state == SERIAL_SILENT && self->now_us >= self->asked_us + RELAY_ASK_US) {
         self->asked_us = self->now_us;
         return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
     }
-    return (self->link.linked && gw_clients_count(&self->clients) > 0U &&
+    return (self->link.state == SERIAL_LINKED && gw_clients_count(&self->clients) > 0U &&
             self->now_us >= self->said_us + RELAY_ALIVE_US)
                ? write_line(0, alive, sizeof alive - 1U, out, size)
                : 0U;
@@ -395,10 +394,10 @@ static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
 
 size_t relay_next_line(relay_t *self, char *out, size_t size) {
     size_t length = 0;
-    if (self->link.linked) {
+    if (self->link.state == SERIAL_LINKED) {
         length = next_open_or_close(self, out, size);
         length = (length > 0U) ? length : next_request(self, true, out, size);
     }
     length = (length > 0U) ? length : next_sign_of_life(self, out, size);
-    return (length > 0U || !self->link.linked) ? length : next_request(self, false, out, size);
+    return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, false, out, size);
 }

@@ -38,10 +38,12 @@ typedef struct {
     size_t sampled;
 } serial_noise_t;
 
+typedef enum { SERIAL_SILENT, SERIAL_LINKED } serial_link_state_t;
+
 typedef struct {
     iwn_receiver_t receiver;
     iwn_work_t work;
-    bool linked;
+    serial_link_state_t state;
     char boot[IWN_LINE_BOOT + 1U];
     char version[33];
     uint64_t heard_us; ///< The last good line, or when the port was opened.

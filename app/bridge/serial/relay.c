@@ -125,7 +125,7 @@ static void tend_link(relay_t *self) {
     char words[sizeof self->trouble];
     const bool fell_silent = serial_link_fell_silent(&self->link, self->now_us);
     self->explained_us = fell_silent ? 0U : self->explained_us;
-    if (!self->link.linked && self->now_us >= self->explained_us) {
+    if (self->link.state == SERIAL_SILENT && self->now_us >= self->explained_us) {
         self->explained_us = self->now_us + EXPLAIN_AGAIN_US;
         serial_link_explain(&self->link, self->settings->board.port, self->settings->board.baud, words, sizeof words);
         set_trouble(self, words);
@@ -217,7 +217,7 @@ static uint64_t next_us(const relay_t *self) {
         return earlier(then_us, self->retry_us);
     }
     then_us = earlier(then_us, relay_channels_next_us(self));
-    if (!self->link.linked) {
+    if (self->link.state == SERIAL_SILENT) {
         return earlier(then_us, earlier(self->asked_us + RELAY_ASK_US, self->explained_us));
     }
     const bool waits = self->out_length == 0U && self->free_us > self->now_us + AHEAD_US;
