@@ -69,7 +69,8 @@ static void test_marker_that_could_not_be_set_is_tried_again(void) {
     (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->loop.mark_us, "not in each cycle");
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->loop.mark_us,
+                                                "not in each cycle");
     const iw_time_us_t failed_us = daemon_rig.daemon->loop.mark_us;
     while (daemon_rig.daemon->loop.mark_us == failed_us) {
         daemon_rig_run(1);
