@@ -136,15 +136,18 @@ static int run(gw_daemon_t *daemon) {
     gw_daemon_compose(daemon);
     gw_knowledge_open(&daemon->knowledge, config->record.directory);
     int result = gw_listener_prepare(&daemon->clients.listener[GW_DRIVE], &drive, stderr);
-    result = (result != 0) ? result
-                           : gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
-                                             GW_RUNTIME_DIRECTORY, stderr);
+    if (result == 0) {
+        result = gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
+                                 GW_RUNTIME_DIRECTORY, stderr);
+    }
     if (result != 0) {
         return result;
     }
     char *text = print_config(config);
     result = open_box(daemon, text);
-    result = (result == 0) ? open_hal(daemon) : result;
+    if (result == 0) {
+        result = open_hal(daemon);
+    }
     if (result == 0) {
         result = serve(daemon);
         iw_linux_hal_close(&daemon->wheels.hal);
@@ -173,7 +176,9 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
 int main(int argc, char **argv) {
     gw_options_t options;
     int result = begin_program("iwheel-gateway", argc, argv);
-    result = (result == 0) ? gw_options_parse(argc, argv, &options, stderr) : result;
+    if (result == 0) {
+        result = gw_options_parse(argc, argv, &options, stderr);
+    }
     if (result != 0) {
         return result;
     }

@@ -373,7 +373,9 @@ int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
                               (bridge_lease_key(&self->lease) != NULL) ? self->silent_us : UINT64_MAX};
     uint64_t next_us = times[0];
     for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {
-        next_us = (times[i] < next_us) ? times[i] : next_us;
+        if (times[i] < next_us) {
+            next_us = times[i];
+        }
     }
     return (next_us > now_us) ? (int)((next_us - now_us) / 1000U) + 1 : 0;
 }

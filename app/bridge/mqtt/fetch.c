@@ -67,7 +67,9 @@ static void next_file(fetch_t *self, size_t file, uint64_t now_us) {
 void fetch_choose(fetch_t *self, const char *name, uint64_t now_us) {
     size_t place = self->count;
     for (size_t i = 0; i < self->count; i++) {
-        place = (name == NULL || is_meant(&self->list[i], name)) ? i : place;
+        if (name == NULL || is_meant(&self->list[i], name)) {
+            place = i;
+        }
     }
     if (place == self->count) {
         if (name == NULL) {

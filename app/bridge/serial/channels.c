@@ -136,7 +136,9 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
         return;
     }
     channel->granted = channel->granted || place->kind == SERIAL_GRANTS;
-    channel->arm_number = (asked->cmd == IWN_CMD_ARM) ? place->number : channel->arm_number;
+    if (asked->cmd == IWN_CMD_ARM) {
+        channel->arm_number = place->number;
+    }
     serial_queue_put(&channel->queue);
 }
 
@@ -239,7 +241,9 @@ static void take_reply(relay_t *self, relay_channel_t *channel, gw_client_t *cli
         !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
         return; // It was given up, and its client told so.
     }
-    channel->armed_us = (number == channel->arm_number) ? self->now_us : channel->armed_us;
+    if (number == channel->arm_number) {
+        channel->armed_us = self->now_us;
+    }
     if (oldest->number == number) {
         pass_reply(self, client, oldest, at, (size_t)(end - at));
         serial_queue_drop(&channel->queue);
@@ -288,8 +292,9 @@ void relay_drop_clients(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         drop_client(self, &self->channel[i]);
     }
-    self->out_length =
-        (self->out_sent > 0U) ? self->out_length : 0U; // Half a line is ended, or the next one would be lost too.
+    if (self->out_sent == 0U) {
+        self->out_length = 0; // Half a line is ended, or the next one would be lost too.
+    }
 }
 
 static void tend(relay_t *self, relay_channel_t *channel) {
@@ -331,7 +336,9 @@ uint64_t relay_channels_next_us(const relay_t *self) {
         const relay_channel_t *channel = &self->channel[i];
         const uint64_t then_us =
             (channel->state != RELAY_FREE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
-        next_us = (then_us < next_us) ? then_us : next_us;
+        if (then_us < next_us) {
+            next_us = then_us;
+        }
     }
     return next_us;
 }
@@ -396,8 +403,12 @@ size_t relay_next_line(relay_t *self, char *out, size_t size) {
     size_t length = 0;
     if (self->link.state == SERIAL_LINKED) {
         length = next_open_or_close(self, out, size);
-        length = (length > 0U) ? length : next_request(self, true, out, size);
+        if (length == 0U) {
+            length = next_request(self, true, out, size);
+        }
     }
-    length = (length > 0U) ? length : next_sign_of_life(self, out, size);
+    if (length == 0U) {
+        length = next_sign_of_life(self, out, size);
+    }
     return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, false, out, size);
 }

@@ -30,10 +30,6 @@ static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
     *newest(self) = (serial_stamp_t){now_us, t_us};
 }
 
-uint64_t serial_link_stamped_us(const serial_link_t *self) {
-    return (self->stamps > 0U) ? self->stamp[(self->stamps - 1U) % SERIAL_STAMPS].heard_us : 0U;
-}
-
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us) {
     for (unsigned back = 1; back <= self->stamps && back <= SERIAL_STAMPS; back++) {
         const serial_stamp_t *stamp = &self->stamp[(self->stamps - back) % SERIAL_STAMPS];

@@ -74,8 +74,6 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us);
 
 /// The newest stamp that had been heard at that time; false if none had.
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us);
-/// When the newest of all was heard; 0: none.
-uint64_t serial_link_stamped_us(const serial_link_t *self);
 
 /// Why there is no board on this line, with the cure; `port` and `baud` are for the words.
 void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size);

@@ -126,7 +126,7 @@ static enum MHD_Result send_health(web_call_t *self) {
         text, sizeof text,
         "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
         "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s}\n",
-        good ? "true" : "false", server->link.gateway.state == BRIDGE_LINK_HERE ? "connected" : "away",
+        good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
         settings->drive.enabled ? "true" : "false",
         (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false", settings->drive.max_speed_mm_s,
         settings->drive.ttl_ms, settings->gateway.rate_hz, web_settings_has_fleet(settings) ? "true" : "false");
