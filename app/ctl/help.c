@@ -229,8 +229,10 @@ int help_unknown(const char *name) {
     size_t best_distance = GW_WORD_STRANGE;
     for (size_t i = 0; i < VERBS; i++) {
         const size_t far = gw_word_distance(name, verbs[i].name);
-        best = (far < best_distance) ? verbs[i].name : best;
-        best_distance = (far < best_distance) ? far : best_distance;
+        if (far < best_distance) {
+            best = verbs[i].name;
+            best_distance = far;
+        }
         IWN_TEXT_JOIN(&list, (i > 0) ? " " : "", verbs[i].name);
     }
     if (name[0] == '\0') {

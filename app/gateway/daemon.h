@@ -24,6 +24,34 @@
 #include "sockets/wakeup.h"
 #include "wheels/wheels.h"
 
+/// Whether the gateway goes on: SERVES --SIGTERM, SIGINT, SIGHUP--> ENDS, or SERVES --a gateway that goes before it--> GIVES_WAY. In both
+/// the wheels are stopped, and the loop returns when nothing is sent to them any more.
+typedef enum { GW_LOOP_SERVES, GW_LOOP_ENDS, GW_LOOP_GIVES_WAY } gw_loop_phase_t;
+
+/// How closely the loop follows the bus. Each step of the core decides it:
+///
+///     RESTING --setpoints are sent--> ALERT --armed--> DRIVING --stop--> ALERT --no more setpoints--> RESTING
+///
+/// RESTING, DRIVING: frames may wait and are read together. ALERT (a stop, or arming): each frame wakes the loop.
+typedef enum { GW_PACE_RESTING, GW_PACE_ALERT, GW_PACE_DRIVING } gw_pace_t;
+
+/// Of loop.c alone; main.c sets `suspended_us` and reads `phase`.
+typedef struct {
+    gw_loop_phase_t phase;
+    gw_pace_t pace;
+    bool frames_wait; ///< The bus wakes nobody. Independent: watchers and a silent bus forbid what the pace permits.
+    int signal_fd;
+    iw_client_t holder;        ///< Of the lease, as of the last step: served first.
+    iw_time_us_t suspended_us; ///< Of the machine, as last read.
+    iw_time_us_t clocks_us;    ///< When both clocks are read next, though nothing is late.
+    iw_time_us_t awaited_us;   ///< Until when the last wait was to last at the most.
+    iw_time_us_t look_us;      ///< When bus and e-stop are read though nothing wakes the loop.
+    iw_time_us_t frames_us;    ///< When frames were read last.
+    iw_time_us_t box_look_us;  ///< When the black box's writer is polled next.
+    iw_time_us_t mark_us;      ///< When a change of the crash marker that failed is tried again; 0: none did.
+    uint32_t silent_pairs;     ///< Setpoint pairs sent until the last silence.
+} gw_loop_t;
+
 typedef struct gw_daemon {
     gateway_config_t config;
     gw_log_t log;
@@ -36,20 +64,7 @@ typedef struct gw_daemon {
     gw_knowledge_t knowledge;
     gw_clients_t clients;
     gw_answers_t answers;
-    iw_time_us_t suspended_us; ///< Of the machine, as last looked at.
-    iw_time_us_t clocks_us;    ///< When both clocks are read next, though nothing is late.
-    iw_time_us_t awaited_us;   ///< Until when the last wait was to last at the most.
-    iw_time_us_t box_look_us;  ///< When the black box's writer is listened to next.
-    iw_client_t holder;        ///< Of the lease, as of the last step: served first.
-    int signal_fd;
-    bool gave_way;          ///< It shuts down because somebody else's gateway goes before it.
-    iw_time_us_t frames_us; ///< When frames were taken last.
-    iw_time_us_t mark_us;   ///< When a change of the crash marker that failed is tried again; 0: none did.
-    uint32_t silent_pairs;  ///< Setpoint pairs handed over until the last silence.
-    iw_time_us_t look_us;   ///< When bus and e-stop are looked at though nothing has woken us.
-    bool driving;           ///< The wheels are armed, and follow the holder of the lease.
-    bool frames_may_wait;   ///< As far as the wheels are concerned.
-    bool frames_wait;       ///< The bus wakes nobody for now: its frames are taken together.
+    gw_loop_t loop;
 } gw_daemon_t;
 
 /// Tells the parts of each other and of the configuration, which is set. They are opened after that.

@@ -52,11 +52,11 @@ static int open_signals(void) {
 int gw_loop_open(gw_daemon_t *daemon) {
     int error = gw_wakeup_open(&daemon->wakeup);
     daemon->clients.epoll_fd = daemon->wakeup.fd;
-    daemon->signal_fd = (error == 0) ? open_signals() : -1;
-    if (error == 0 && daemon->signal_fd < 0) {
+    daemon->loop.signal_fd = (error == 0) ? open_signals() : -1;
+    if (error == 0 && daemon->loop.signal_fd < 0) {
         error = errno;
     }
-    const int fds[] = {daemon->signal_fd,
+    const int fds[] = {daemon->loop.signal_fd,
                        daemon->clients.listener[GW_DRIVE].fd,
                        daemon->clients.listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->wheels.hal),
@@ -74,16 +74,18 @@ int gw_loop_open(gw_daemon_t *daemon) {
 }
 
 void gw_loop_close(gw_daemon_t *daemon) {
-    (void)close(daemon->signal_fd);
+    (void)close(daemon->loop.signal_fd);
     gw_wakeup_close(&daemon->wakeup);
 }
 
-static void shut_down(gw_daemon_t *daemon) {
+/// Leaves SERVES.
+static void shut_down(gw_daemon_t *daemon, gw_loop_phase_t phase) {
     if (gw_wheels_look(&daemon->wheels).holding) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
                "parking brake");
     }
+    daemon->loop.phase = phase;
     daemon->wheels.shutting_down = true;
     gw_notify_stopping(&daemon->notify);
     gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
@@ -91,22 +93,22 @@ static void shut_down(gw_daemon_t *daemon) {
 
 static void take_signal(gw_daemon_t *daemon) {
     struct signalfd_siginfo info;
-    if (read(daemon->signal_fd, &info, sizeof info) == (ssize_t)sizeof info && !daemon->wheels.shutting_down) {
+    if (read(daemon->loop.signal_fd, &info, sizeof info) == (ssize_t)sizeof info &&
+        daemon->loop.phase == GW_LOOP_SERVES) {
         gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
-        shut_down(daemon);
+        shut_down(daemon, GW_LOOP_ENDS);
     }
 }
 
 /// Root's and the service's gateways do not wait for one of another user's.
 static void give_way(gw_daemon_t *daemon) {
     const gw_holder_t *holder = &daemon->runtime.lock.holder;
-    if (!daemon->wheels.shutting_down && gw_bus_lock_tend(&daemon->runtime.lock, daemon->wheels.now_us)) {
-        daemon->gave_way = true;
+    if (daemon->loop.phase == GW_LOOP_SERVES && gw_bus_lock_tend(&daemon->runtime.lock, daemon->wheels.now_us)) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
                "ending",
                (unsigned)holder->uid, (long)holder->pid, daemon->config.bus.interface);
-        shut_down(daemon);
+        shut_down(daemon, GW_LOOP_GIVES_WAY);
     }
 }
 
@@ -114,39 +116,41 @@ static void give_way(gw_daemon_t *daemon) {
 /// first is a zero pair, and another step comes before anything else.
 static bool needs_marker(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     if (!gw_wheels_are_sent_to(&daemon->wheels)) {
-        daemon->silent_pairs = seen->sent->pairs;
+        daemon->loop.silent_pairs = seen->sent->pairs;
         return false;
     }
-    return daemon->runtime.marked || seen->sent->pairs != daemon->silent_pairs;
+    return daemon->runtime.marked || seen->sent->pairs != daemon->loop.silent_pairs;
 }
 
 /// What has failed is told once and tried again.
 static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     const bool needed = needs_marker(daemon, seen);
-    if (daemon->config.core.listen_only || daemon->wheels.now_us < daemon->mark_us) {
+    if (daemon->config.core.listen_only || daemon->wheels.now_us < daemon->loop.mark_us) {
         return;
     }
     if (gw_runtime_mark(&daemon->runtime, needed)) {
-        daemon->mark_us = 0;
+        daemon->loop.mark_us = 0;
         return;
     }
-    if (daemon->mark_us == 0U) {
+    if (daemon->loop.mark_us == 0U) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "cannot change the crash marker %s: %s; until that works the wheels would keep their last command for a "
                "second after a crash",
                daemon->runtime.marker_path, strerror(errno));
     }
-    daemon->mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
+    daemon->loop.mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
 }
 
 /// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
 static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
-    if (suspended_us > daemon->suspended_us + IW_GATEWAY_LATE_US) {
-        gw_wheels_slept(&daemon->wheels, suspended_us - daemon->suspended_us);
+    if (suspended_us > daemon->loop.suspended_us + IW_GATEWAY_LATE_US) {
+        gw_wheels_slept(&daemon->wheels, suspended_us - daemon->loop.suspended_us);
         gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
-               (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
+               (unsigned long long)((suspended_us - daemon->loop.suspended_us) / IW_US_PER_MS));
     }
-    daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;
+    if (suspended_us > daemon->loop.suspended_us) {
+        daemon->loop.suspended_us = suspended_us;
+    }
 }
 
 /// The next of looks no further apart than `most_us`, the last of which comes at `until_us`: none right before it, which would hold
@@ -156,28 +160,34 @@ static iw_time_us_t evenly(iw_time_us_t now_us, iw_time_us_t until_us, iw_time_u
     return (left_us > most_us) ? now_us + left_us / ((left_us + most_us - 1U) / most_us) : now_us + most_us;
 }
 
-/// Frames may wait and be taken together while nothing depends on one of them at once: while nothing is sent, and while ARMED.
-/// Every step takes them before it judges, and what it judges is tens of milliseconds old. In a stop, and until the wheels are
-/// armed, each frame wakes us. The e-stop and the clients always do.
+/// Frames may wait while nothing depends on one of them immediately. Every step reads them before it judges, and what it judges is tens of
+/// milliseconds old. The e-stop and the clients always wake the loop.
+static gw_pace_t pace_of(const gw_daemon_t *daemon, const iw_snapshot_t *seen) {
+    if (!gw_wheels_are_sent_to(&daemon->wheels)) {
+        return GW_PACE_RESTING;
+    }
+    return (seen->state == IW_STATE_ARMED && !seen->arming) ? GW_PACE_DRIVING : GW_PACE_ALERT;
+}
+
 static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
-    const bool sending = gw_wheels_are_sent_to(&daemon->wheels);
-    const bool driving = sending && seen->state == IW_STATE_ARMED && !seen->arming;
-    const iw_time_us_t sending_us = (driving && seen->waiting_us != IW_NEVER) ? ECHO_LOOK_US : LOOK_US;
-    daemon->driving = driving;
-    daemon->frames_may_wait = !sending || driving;
-    daemon->look_us = sending ? evenly(seen->at_us, daemon->wheels.step_us, sending_us) : seen->at_us + REST_LOOK_US;
+    gw_loop_t *loop = &daemon->loop;
+    loop->pace = pace_of(daemon, seen);
+    const bool echo_waits = loop->pace == GW_PACE_DRIVING && seen->waiting_us != IW_NEVER;
+    loop->look_us = (loop->pace == GW_PACE_RESTING)
+                        ? seen->at_us + REST_LOOK_US
+                        : evenly(seen->at_us, daemon->wheels.step_us, echo_waits ? ECHO_LOOK_US : LOOK_US);
 }
 
 /// By one clock, in which a suspend shows as lateness: what is late is looked at by both, and all is now and then.
 static void read_clock(gw_daemon_t *daemon) {
-    const iw_time_us_t now_us = iw_clock_awake_us(daemon->suspended_us);
-    if (now_us < daemon->awaited_us + ASLEEP_US && now_us < daemon->clocks_us) {
+    const iw_time_us_t now_us = iw_clock_awake_us(daemon->loop.suspended_us);
+    if (now_us < daemon->loop.awaited_us + ASLEEP_US && now_us < daemon->loop.clocks_us) {
         gw_wheels_time(&daemon->wheels, now_us);
         return;
     }
     iw_time_us_t suspended_us;
     gw_wheels_time(&daemon->wheels, iw_clock_read(&suspended_us));
-    daemon->clocks_us = daemon->wheels.now_us + CLOCKS_US;
+    daemon->loop.clocks_us = daemon->wheels.now_us + CLOCKS_US;
     note_suspend(daemon, suspended_us);
 }
 
@@ -192,7 +202,7 @@ static void step(gw_daemon_t *daemon) {
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_arming(&daemon->answers, &seen);
     plan_look(daemon, &seen);
-    daemon->holder = seen.holder;
+    daemon->loop.holder = seen.holder;
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
@@ -200,7 +210,8 @@ static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
 }
 
 static bool looks(const gw_daemon_t *daemon) {
-    return daemon->frames_wait || (daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels));
+    return daemon->loop.frames_wait ||
+           (daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels));
 }
 
 /// When there is something to do though nothing comes; 0: at once.
@@ -212,20 +223,22 @@ static iw_time_us_t next_us(gw_daemon_t *daemon) {
     next_us = earlier(next_us, iwn_server_next_us(&daemon->answers.server));
     next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
     next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
-    return looks(daemon) ? earlier(next_us, daemon->look_us) : next_us;
+    return looks(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
 }
 
 /// Whether the bus is to wake us. Frames that keep coming wait, unless somebody watches them.
 static void heed_bus(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
-    daemon->frames_us = (wheels->tape.tapped > 0U) ? wheels->now_us : daemon->frames_us;
-    const bool may_wait = daemon->frames_may_wait && wheels->now_us < daemon->frames_us + FRAMES_GONE_US &&
-                          wheels->tape.tapped < GW_FRAMES &&
+    if (wheels->tape.tapped > 0U) {
+        daemon->loop.frames_us = wheels->now_us;
+    }
+    const bool may_wait = daemon->loop.pace != GW_PACE_ALERT &&
+                          wheels->now_us < daemon->loop.frames_us + FRAMES_GONE_US && wheels->tape.tapped < GW_FRAMES &&
                           iwn_server_watching(&daemon->answers.server, IWN_TOPIC_FRAME) == 0U;
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
-    if (may_wait != daemon->frames_wait &&
+    if (may_wait != daemon->loop.frames_wait &&
         epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
-        daemon->frames_wait = may_wait;
+        daemon->loop.frames_wait = may_wait;
     }
 }
 
@@ -239,7 +252,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     case GW_TAG_WATCH_LISTENER:
         return true;
     case GW_TAG_BOX:
-        daemon->box_look_us = 0;
+        daemon->loop.box_look_us = 0;
         return false;
     case GW_TAG_BUS: // Looked at in every cycle.
     case GW_TAG_ESTOP:
@@ -255,13 +268,13 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
 }
 
 static bool has_come_to_rest(const gw_daemon_t *daemon) {
-    return daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels);
+    return daemon->loop.phase != GW_LOOP_SERVES && !gw_wheels_are_sent_to(&daemon->wheels);
 }
 
 /// Told of by the wait, unless the writer had to be started anew: then by a look now and then.
 static void listen_to_writer(gw_daemon_t *daemon) {
-    if (daemon->wheels.now_us >= daemon->box_look_us) {
-        daemon->box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
+    if (daemon->wheels.now_us >= daemon->loop.box_look_us) {
+        daemon->loop.box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
         gw_record_take(&daemon->box, &daemon->log);
         if (!gw_recordings_take(&daemon->answers)) {
             gw_log(&daemon->log, GW_LOG_WARNING,
@@ -276,7 +289,8 @@ static void listen_to_writer(gw_daemon_t *daemon) {
 static gw_client_t *heard_first(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     const bool due = wheels->now_us >= wheels->step_us || wheels->requested;
-    gw_client_t *holder = (daemon->driving && !due) ? gw_clients_find(&daemon->clients, daemon->holder) : NULL;
+    gw_client_t *holder =
+        (daemon->loop.pace == GW_PACE_DRIVING && !due) ? gw_clients_find(&daemon->clients, daemon->loop.holder) : NULL;
     return (holder != NULL && holder->readable && !holder->leaving) ? holder : NULL;
 }
 
@@ -292,7 +306,7 @@ static void hear_and_step(gw_daemon_t *daemon, iw_linux_told_t told) {
 }
 
 static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
-    gw_service_clients(&daemon->clients, daemon->holder);
+    gw_service_clients(&daemon->clients, daemon->loop.holder);
     if (daemon->wheels.requested) {
         read_clock(daemon);
         step(daemon); // A new command leaves at once.
@@ -304,7 +318,7 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     heed_bus(daemon);
     gw_answers_frames(&daemon->answers);
     gw_answers_periodic(&daemon->answers);
-    gw_service_flush(&daemon->clients, daemon->holder);
+    gw_service_flush(&daemon->clients, daemon->loop.holder);
     gw_knowledge_tend(&daemon->knowledge);
     give_way(daemon);
     gw_notify_cycle(&daemon->notify, daemon->wheels.now_us);
@@ -314,10 +328,10 @@ int gw_loop_run(gw_daemon_t *daemon) {
     bool ready = false;
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
-        daemon->awaited_us = next_us(daemon);
+        daemon->loop.awaited_us = next_us(daemon);
         // What leaves has its time; all else may come later by as long as this cycle took.
         const iw_time_us_t now_us = gw_wheels_are_sent_to(&daemon->wheels) ? 0U : daemon->wheels.now_us;
-        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->awaited_us);
+        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->loop.awaited_us);
         if (count < 0 && errno != EINTR) {
             return errno;
         }

@@ -31,7 +31,7 @@ static int start_core(gw_daemon_t *daemon) {
     const iw_config_t *config = &daemon->config.core;
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !config->listen_only;
     daemon->wheels.now_us = iw_clock_now_us();
-    daemon->suspended_us = iw_clock_suspended_us();
+    daemon->loop.suspended_us = iw_clock_suspended_us();
     if (gw_wheels_begin(&daemon->wheels, config, daemon->box.ring, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
@@ -90,7 +90,9 @@ static int serve(gw_daemon_t *daemon) {
             gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
             result = EX_SOFTWARE;
         }
-        result = daemon->gave_way ? EX_UNAVAILABLE : result;
+        if (daemon->loop.phase == GW_LOOP_GIVES_WAY) {
+            result = EX_UNAVAILABLE;
+        }
         gw_service_close_all(&daemon->clients);
         gw_knowledge_close(&daemon->knowledge);
         gw_loop_close(daemon);
@@ -134,15 +136,18 @@ static int run(gw_daemon_t *daemon) {
     gw_daemon_compose(daemon);
     gw_knowledge_open(&daemon->knowledge, config->record.directory);
     int result = gw_listener_prepare(&daemon->clients.listener[GW_DRIVE], &drive, stderr);
-    result = (result != 0) ? result
-                           : gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
-                                             GW_RUNTIME_DIRECTORY, stderr);
+    if (result == 0) {
+        result = gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
+                                 GW_RUNTIME_DIRECTORY, stderr);
+    }
     if (result != 0) {
         return result;
     }
     char *text = print_config(config);
     result = open_box(daemon, text);
-    result = (result == 0) ? open_hal(daemon) : result;
+    if (result == 0) {
+        result = open_hal(daemon);
+    }
     if (result == 0) {
         result = serve(daemon);
         iw_linux_hal_close(&daemon->wheels.hal);
@@ -171,7 +176,9 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
 int main(int argc, char **argv) {
     gw_options_t options;
     int result = begin_program("iwheel-gateway", argc, argv);
-    result = (result == 0) ? gw_options_parse(argc, argv, &options, stderr) : result;
+    if (result == 0) {
+        result = gw_options_parse(argc, argv, &options, stderr);
+    }
     if (result != 0) {
         return result;
     }

@@ -70,7 +70,9 @@ void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_fra
     candump_t written = candump_from_core(frame, (int64_t)at_us, "sim");
     const candump_mark_t sender = from_client ? CANDUMP_SENT : CANDUMP_RECEIVED;
     written.mark = self->tell_direction ? sender : CANDUMP_UNMARKED;
-    written.length = written.remote ? 0U : written.length;
+    if (written.remote) {
+        written.length = 0U;
+    }
     append(self, at_us, line, candump_write(&written, line));
 }
 

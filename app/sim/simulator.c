@@ -28,8 +28,8 @@ __attribute__((format(printf, 2, 3))) static void say(const sim_simulator_t *sel
     va_start(arguments, format);
     int const body = vsnprintf(&text[head], sizeof text - (size_t)head - 1U, format, arguments);
     va_end(arguments);
-    size_t length = (size_t)head + (size_t)body;
-    length = (length < sizeof text - 1U) ? length : sizeof text - 2U;
+    size_t const whole = (size_t)head + (size_t)body;
+    size_t length = (whole < sizeof text - 1U) ? whole : sizeof text - 2U;
     text[length++] = '\n';
     (void)!write(STDOUT_FILENO, text, length);
 }

@@ -105,7 +105,9 @@ iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us) {
         self->at_us = now_us;
     }
     const int32_t path_um = iw_magnitude(self->path_um);
-    self->largest_um = (path_um > self->largest_um) ? path_um : self->largest_um;
+    if (path_um > self->largest_um) {
+        self->largest_um = path_um;
+    }
     if (path_um < (int32_t)self->config->pair_mm * 1000) {
         return IW_DIVERGE_NOT;
     }

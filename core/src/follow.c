@@ -27,7 +27,9 @@ static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, ui
             self->since_us[i] = now_us;
         }
         const bool lasted = (holds & BIT(i)) != 0U && iw_age_us(self->since_us[i], now_us) >= for_us[i];
-        verdict = (lasted && verdict == IW_FOLLOW_OK) ? (iw_follow_verdict_t)i : verdict;
+        if (lasted && verdict == IW_FOLLOW_OK) {
+            verdict = (iw_follow_verdict_t)i;
+        }
     }
     return verdict;
 }

@@ -110,7 +110,9 @@ static void measure(const iw_force_t *self, iw_force_quality_t *out_quality) {
     for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
         const int16_t raw = self->sample[at];
         at = (at + 1U < IW_FORCE_WINDOW_SAMPLES) ? at + 1U : 0U;
-        older = (i == HALF) ? sum : older;
+        if (i == HALF) {
+            older = sum;
+        }
         sum += raw;
         any_saturated = saturated(raw) || any_saturated;
     }

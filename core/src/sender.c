@@ -80,8 +80,9 @@ static bool hand_over_as_one(iw_sender_t *self, iw_time_us_t now_us, bool zero) 
 static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     const bool first = self->pair_us == IW_NEVER;
     self->sent.gap_us = first ? 0U : (uint32_t)(now_us - self->pair_us);
-    self->sent.gap_max_us =
-        (first || self->sent.gap_us > self->sent.gap_max_us) ? self->sent.gap_us : self->sent.gap_max_us;
+    if (first || self->sent.gap_us > self->sent.gap_max_us) {
+        self->sent.gap_max_us = self->sent.gap_us;
+    }
     self->pair_us = now_us;
     self->sent.pairs++;
 }

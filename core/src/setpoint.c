@@ -141,8 +141,12 @@ static void plan(step_t *step, size_t i, int32_t value, int32_t target, const ui
     const uint32_t fraction = portion_of(allowed[braking ? 1U : 0U], way);
     step->aim[i] = aim;
     step->braking[i] = braking;
-    step->share[0] = (fraction < step->share[0]) ? fraction : step->share[0];
-    step->share[1] = (braking && fraction < step->share[1]) ? fraction : step->share[1];
+    if (fraction < step->share[0]) {
+        step->share[0] = fraction;
+    }
+    if (braking && fraction < step->share[1]) {
+        step->share[1] = fraction;
+    }
 }
 
 static IW_APART int32_t part_of_way(const step_t *step, size_t i, int32_t value) {
@@ -161,7 +165,9 @@ static IW_APART int32_t turn_by(const step_t *step, const int32_t *speed, bool b
 static IW_APART void cut_step(step_t *step, bool braking, uint32_t fraction) {
     uint32_t *const share = &step->share[braking ? 1U : 0U];
     const uint32_t cut = (uint32_t)((uint64_t)*share * fraction / FRACTION_ONE);
-    *share = (cut < *share) ? cut : *share;
+    if (cut < *share) {
+        *share = cut;
+    }
 }
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that

@@ -246,7 +246,9 @@ static unsigned last_line(const unsigned *lines) {
         const uint16_t range = keys[i].range;
         const bool involved = range == IW_CONFIG_PERIOD || range == IW_CONFIG_LEASE || range == IW_CONFIG_DECEL ||
                               range == IW_CONFIG_MAX_SPEED;
-        last = (involved && lines[i] > last) ? lines[i] : last;
+        if (involved && lines[i] > last) {
+            last = lines[i];
+        }
     }
     return last;
 }
@@ -353,30 +355,32 @@ void gateway_config_default(gateway_config_t *out_config) {
     iw_config_default(&out_config->core);
 }
 
+/// Stores what was read without an error. Returns `result`.
+static int store_good(int result, const gateway_config_t *read, gateway_config_t *out_config) {
+    if (result == 0) {
+        *out_config = *read;
+    }
+    return result;
+}
+
 int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *err) {
     gateway_config_t config;
     gateway_config_default(&config);
-    const int result = settings_load(&form, path, &config, err);
-    *out_config = (result == 0) ? config : *out_config;
-    return result;
+    return store_good(settings_load(&form, path, &config, err), &config, out_config);
 }
 
 int gateway_config_parse(const char *name, const char *text, size_t size, gateway_config_t *out_config, FILE *err) {
     settings_report_t report = {.name = name, .err = err};
     gateway_config_t config;
     gateway_config_default(&config);
-    const int result = settings_parse(&form, &report, text, size, &config);
-    *out_config = (result == 0) ? config : *out_config;
-    return result;
+    return store_good(settings_parse(&form, &report, text, size, &config), &config, out_config);
 }
 
 int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin,
                             FILE *err) {
     settings_report_t report = {.name = origin, .err = err};
     gateway_config_t changed = *config;
-    const int result = settings_override(&form, &report, name, value, &changed);
-    *config = (result == 0) ? changed : *config;
-    return result;
+    return store_good(settings_override(&form, &report, name, value, &changed), &changed, config);
 }
 
 void gateway_config_print(const gateway_config_t *config, FILE *out) {

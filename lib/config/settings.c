@@ -198,7 +198,9 @@ static char *next_line(char *out, int size, void *context) {
     }
     if (length > 0 && line[0] == '[') {
         check_section(loader, line, length);
-        length = loader->section_bad ? 0 : length;
+        if (loader->section_bad) {
+            length = 0;
+        }
     } else if (length > 0 && line[0] != ';' && line[0] != '#') {
         loader->pending = line;
         loader->pending_length = length;

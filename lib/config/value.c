@@ -22,7 +22,9 @@ static bool read_digits(const char *text, size_t length, uint32_t base, uint32_t
         if (digit >= base) {
             return false;
         }
-        number = (number > UINT32_MAX / 16U) ? number : number * base + digit;
+        if (number <= UINT32_MAX / 16U) {
+            number = number * base + digit;
+        }
     }
     *out_number = number;
     return length > 0;
@@ -70,7 +72,8 @@ static void find_range(const settings_form_t *form, const settings_key_t *row, u
     }
 }
 
-void settings_value_choices(const settings_form_t *form, const settings_key_t *row, char *out, size_t size) {
+/// The values that a person may write: "20..500 ms", "cN or dN"; empty where the help names them.
+static void settings_value_choices(const settings_form_t *form, const settings_key_t *row, char *out, size_t size) {
     uint32_t min = 0;
     uint32_t max = 0;
     out[0] = '\0';
@@ -227,7 +230,8 @@ bool settings_value_parse(const settings_form_t *form, const settings_key_t *row
     return good;
 }
 
-bool settings_value_format(const settings_key_t *row, const void *values, char out[SETTINGS_MESSAGE_SIZE]) {
+/// As the file has it. False if the key is unset.
+static bool settings_value_format(const settings_key_t *row, const void *values, char out[SETTINGS_MESSAGE_SIZE]) {
     out[0] = '\0';
     switch (row->kind) {
     case SETTINGS_NUMBER:

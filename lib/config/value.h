@@ -12,10 +12,4 @@
 bool settings_value_parse(const settings_form_t *form, const settings_key_t *row, const char *text, void *values,
                           char out_why[SETTINGS_MESSAGE_SIZE]);
 
-/// Writes the value as the file has it. False if the key is unset.
-bool settings_value_format(const settings_key_t *row, const void *values, char out[SETTINGS_MESSAGE_SIZE]);
-
-/// What may be written, for a human: "20..500 ms", "cN or dN"; empty where the help says it.
-void settings_value_choices(const settings_form_t *form, const settings_key_t *row, char *out, size_t size);
-
 #endif

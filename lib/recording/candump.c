@@ -125,7 +125,9 @@ static bool skip_blanks(cursor_t *cursor) {
 static unsigned take_digits(cursor_t *cursor, unsigned counted, int64_t *value) {
     unsigned digits = 0;
     for (; cursor->at < cursor->end && *cursor->at >= '0' && *cursor->at <= '9'; cursor->at++) {
-        *value = (digits < counted) ? *value * 10 + (*cursor->at - '0') : *value;
+        if (digits < counted) {
+            *value = *value * 10 + (*cursor->at - '0');
+        }
         digits++;
     }
     return digits;
@@ -220,11 +222,12 @@ candump_result_t candump_parse(const char *line, size_t length, candump_t *out_f
     if (cursor.at == cursor.end || *cursor.at == '#' || *cursor.at == ';') {
         return CANDUMP_EMPTY;
     }
-    const char *why = parse_time(&cursor, &frame);
-    why = (why != NULL) ? why : parse_interface(&cursor, &frame);
-    why = (why != NULL) ? why : parse_id(&cursor, &frame);
-    why = (why != NULL) ? why : parse_data(&cursor, &frame);
-    why = (why != NULL) ? why : parse_mark(&cursor, &frame);
+    static const char *(*const parts[])(cursor_t *, candump_t *) = {parse_time, parse_interface, parse_id, parse_data,
+                                                                    parse_mark};
+    const char *why = NULL;
+    for (size_t i = 0; why == NULL && i < sizeof parts / sizeof parts[0]; i++) {
+        why = parts[i](&cursor, &frame);
+    }
     if (why != NULL) {
         *out_why = why;
         return CANDUMP_BAD;

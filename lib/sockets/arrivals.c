@@ -98,7 +98,9 @@ static void look_at_taken(places_t *seen, gw_client_t *place, uid_t uid) {
     seen->held += own ? 1U : 0U;
     if (!place->said && !place->closing) {
         seen->oldest = older(seen->oldest, place);
-        seen->own = own ? older(seen->own, place) : seen->own;
+        if (own) {
+            seen->own = older(seen->own, place);
+        }
     }
 }
 

@@ -19,14 +19,12 @@ uint32_t gw_clients_count(const gw_clients_t *self) {
 void gw_clients_note_stop(gw_clients_t *self, const gw_client_t *by) {
     for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         gw_client_t *client = &self->client[i];
-        client->stopped_us = (client != by) ? self->now_us : client->stopped_us;
+        if (client != by) {
+            client->stopped_us = self->now_us;
+        }
     }
 }
 
-size_t gw_clients_write_refusal(gw_clients_t *self, const iwn_id_t *id, const iwn_refusal_t *refusal) {
-    return iwn_tell_refusal(self->line, sizeof self->line, id, refusal);
-}
-
 void gw_clients_refuse(gw_clients_t *self, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal) {
-    gw_client_reply(client, self->line, gw_clients_write_refusal(self, id, refusal));
+    gw_client_reply(client, self->line, iwn_tell_refusal(self->line, sizeof self->line, id, refusal));
 }

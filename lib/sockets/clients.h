@@ -82,9 +82,6 @@ void gw_clients_note_stop(gw_clients_t *self, const gw_client_t *by);
 /// A reply that says no.
 void gw_clients_refuse(gw_clients_t *self, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
-/// The same without a client: leaves it in `line`, returns its length.
-size_t gw_clients_write_refusal(gw_clients_t *self, const iwn_id_t *id, const iwn_refusal_t *refusal);
-
 /// Serving the clients: accept, read, carry out, flush, close. Bounded work for each of them in each cycle.
 ///
 /// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.

@@ -178,7 +178,9 @@ static int make_socket(gw_listener_t *self, FILE *err) {
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
     int back;
     int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(self, err, errno);
-    result = (result != 0) ? result : bind_socket(self, &address, err);
+    if (result == 0) {
+        result = bind_socket(self, &address, err);
+    }
     leave(back);
     return result;
 }
@@ -203,6 +205,13 @@ static void give_to_group(const gw_listener_t *self, gw_log_t *log) {
     }
 }
 
+/// Takes the reserved descriptor again.
+static void restore(gw_listener_t *self) {
+    if (self->reserve_fd < 0) {
+        self->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    }
+}
+
 int gw_listener_open(gw_listener_t *self, gw_log_t *log, FILE *err) {
     int result = make_socket(self, err);
     if (result == 0) {
@@ -213,7 +222,7 @@ int gw_listener_open(gw_listener_t *self, gw_log_t *log, FILE *err) {
         gw_listener_close(self);
         return result;
     }
-    gw_listener_restore(self);
+    restore(self);
     return 0;
 }
 
@@ -236,14 +245,8 @@ void gw_listener_close(gw_listener_t *self) {
     close_one(&self->reserve_fd);
 }
 
-void gw_listener_restore(gw_listener_t *self) {
-    if (self->reserve_fd < 0) {
-        self->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    }
-}
-
 gw_accept_t gw_listener_accept(gw_listener_t *self, int *out_fd) {
-    gw_listener_restore(self);
+    restore(self);
     *out_fd = accept4(self->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (*out_fd >= 0) {
         return GW_ACCEPT_ONE;

@@ -34,7 +34,7 @@ typedef enum {
 typedef enum {
     GW_ACCEPT_NONE = 0, ///< Nobody waits.
     GW_ACCEPT_ONE,      ///< `*out_fd` is the connection.
-    GW_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: tell it, close it, call gw_listener_restore.
+    GW_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: report it, close it. The next call makes room again.
     GW_ACCEPT_PAUSE,    ///< Out of resources: call again after GW_LISTENER_PAUSE_US.
 } gw_accept_t;
 
@@ -77,8 +77,5 @@ void gw_listener_close(gw_listener_t *self);
 
 /// Takes one waiting connection. Never blocks.
 gw_accept_t gw_listener_accept(gw_listener_t *self, int *out_fd);
-
-/// Takes the reserved descriptor again.
-void gw_listener_restore(gw_listener_t *self);
 
 #endif

@@ -80,9 +80,13 @@ int gw_folder_open_own(const char *path) {
     const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
     gw_folder_t folder;
     int error = gw_folder_open(&folder, path, &owners);
-    error = (error == 0 && folder.shared) ? GW_FOLDER_SHARED : error;
+    if (error == 0 && folder.shared) {
+        error = GW_FOLDER_SHARED;
+    }
     const int fd = (error == 0) ? openat(folder.fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
-    error = (error == 0 && fd < 0) ? errno : error;
+    if (error == 0 && fd < 0) {
+        error = errno;
+    }
     gw_folder_close(&folder);
     errno = error;
     return fd;

@@ -42,7 +42,9 @@ static void hear_out(gw_clients_t *self, gw_client_t *client) {
 void gw_service_finish(gw_clients_t *self, gw_client_t *client) {
     const iw_time_us_t until_us = client->close_us;
     gw_client_finish(client, self->now_us);
-    client->close_us = (client->right == GW_STOP) ? until_us : client->close_us;
+    if (client->right == GW_STOP) {
+        client->close_us = until_us;
+    }
     hear_out(self, client);
     self->servant.leave(self->servant.context, client);
 }
@@ -142,7 +144,9 @@ static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint3
         left &= ~(UINT64_C(1) << slot);
         gw_client_t *client = &self->client[gw_parts[right].first + slot];
         const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
-        round->end_us = (round->end_us == 0U && worked) ? now_us + GW_ROUND_US : round->end_us;
+        if (round->end_us == 0U && worked) {
+            round->end_us = now_us + GW_ROUND_US;
+        }
         if (worked && now_us >= round->end_us) {
             *next = slot;
             return false;
@@ -238,7 +242,9 @@ iw_time_us_t gw_service_next_us(const gw_clients_t *self) {
     iw_time_us_t next_us = IW_NEVER;
     for (unsigned right = 0; right < GW_RIGHTS; right++) {
         const iw_time_us_t from_us = self->listener[right].from_us;
-        next_us = (from_us != 0U && from_us < next_us) ? from_us : next_us;
+        if (from_us != 0U && from_us < next_us) {
+            next_us = from_us;
+        }
     }
     for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         const gw_client_t *client = &self->client[i];

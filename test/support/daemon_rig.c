@@ -265,7 +265,7 @@ static void begin_core(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
     wheels->hal = (iw_linux_hal_t){.estop_ops = &estop_ops, .estop_last = -1};
     wheels->now_us = daemon_rig.now_us;
-    daemon->suspended_us = daemon_rig.suspended_us;
+    daemon->loop.suspended_us = daemon_rig.suspended_us;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, gw_wheels_begin(wheels, &daemon->config.core, daemon->box.ring,
                                                         gw_runtime_crashed(&daemon->runtime)));
     gw_bus_facts_follow(&daemon->facts, wheels, false);

@@ -59,7 +59,7 @@ static void connect_both(void) {
     TEST_ASSERT_NOT_NULL(strstr(line, "\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":7"));
     fake_gateway_reply(&gateway, WATCHES, line, true, "");
     step();
-    TEST_ASSERT_TRUE(link_.is_here);
+    TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state);
 }
 
 void setUp(void) {
@@ -123,7 +123,7 @@ static void test_question_without_place_is_not_accepted(void) {
     step();
     step();
     TEST_ASSERT_EQUAL(BRIDGE_ASKED_MAX, refused);
-    TEST_ASSERT_TRUE(link_.is_here);
+    TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state);
 }
 
 static void test_forgotten_question_is_not_sent(void) {
@@ -181,7 +181,7 @@ static void test_stop_without_reply_is_reported_and_reconnects(void) {
     now_us += 1U;
     step();
     TEST_ASSERT_EQUAL(1, refused);
-    TEST_ASSERT_TRUE(link_.is_here); // The connection that watches is not concerned.
+    TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state); // The connection that watches is not concerned.
     now_us += 3000U * MS;
     step();
     step();
@@ -214,7 +214,7 @@ static void test_gateway_that_does_not_greet_delays_nothing(void) {
     gateway.greets = false;
     step();
     step();
-    TEST_ASSERT_FALSE(link_.is_here);
+    TEST_ASSERT_NOT_EQUAL(BRIDGE_LINK_HERE, link_.state);
     TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
     now_us += BRIDGE_STOP_US;
     step();

@@ -13,7 +13,8 @@
 #include <unistd.h>
 
 #define HELLO "{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n"
-#define SOON  20 ///< ms; what has to come is there already.
+#define BRIEF 20   ///< ms; nothing is to come.
+#define SOON  2000 ///< ms; what has to come is there already, but the machine may be busy.
 
 static iwc_t *gateway;
 static int server;

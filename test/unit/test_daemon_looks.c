@@ -153,7 +153,7 @@ static void test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_fr
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
-        TEST_ASSERT_TRUE(daemon_rig.daemon->frames_wait);
+        TEST_ASSERT_TRUE(daemon_rig.daemon->loop.frames_wait);
         const iw_time_us_t before_us = daemon_rig.now_us;
         daemon_rig.rx[daemon_rig.rx_count++] =
             (iw_can_frame_t){.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_RECEIVED};

@@ -69,9 +69,10 @@ static void test_marker_that_could_not_be_set_is_tried_again(void) {
     (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->mark_us, "not in each cycle");
-    const iw_time_us_t failed_us = daemon_rig.daemon->mark_us;
-    while (daemon_rig.daemon->mark_us == failed_us) {
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->loop.mark_us,
+                                                "not in each cycle");
+    const iw_time_us_t failed_us = daemon_rig.daemon->loop.mark_us;
+    while (daemon_rig.daemon->loop.mark_us == failed_us) {
         daemon_rig_run(1);
     }
     const iw_time_us_t again_us = daemon_rig.now_us + MS(100);
@@ -418,12 +419,12 @@ static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
     }
     daemon_rig_keep_log();
     daemon_rig_begin_driving(client);
-    TEST_ASSERT_FALSE(daemon_rig.daemon->gave_way);
+    TEST_ASSERT_EQUAL_INT(GW_LOOP_SERVES, daemon_rig.daemon->loop.phase);
     daemon_rig.daemon->runtime.lock.names.owners.own = 65534;
     daemon_rig.daemon->runtime.lock.names.place = 1;
     daemon_rig_run(10000);
     TEST_ASSERT_TRUE(daemon_rig.ended);
-    TEST_ASSERT_TRUE(daemon_rig.daemon->gave_way);
+    TEST_ASSERT_EQUAL_INT(GW_LOOP_GIVES_WAY, daemon_rig.daemon->loop.phase);
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
     TEST_ASSERT_FALSE(daemon_rig_marked());
     char line[96];

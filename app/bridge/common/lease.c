@@ -81,7 +81,9 @@ static bridge_place_t *find_place(bridge_lease_t *self) {
         if (self->place[i].state == BRIDGE_FREE) {
             return &self->place[i];
         }
-        ending = (self->place[i].state == BRIDGE_ENDING) ? &self->place[i] : ending;
+        if (self->place[i].state == BRIDGE_ENDING) {
+            ending = &self->place[i];
+        }
     }
     if (ending != NULL) {
         set_free(ending, NULL);
@@ -245,7 +247,9 @@ uint64_t bridge_lease_next_us(const bridge_lease_t *self, uint64_t now_us) {
             continue;
         }
         const uint64_t line_us = bridge_line_next_us(&place->line, now_us);
-        next_us = (line_us < next_us) ? line_us : next_us;
+        if (line_us < next_us) {
+            next_us = line_us;
+        }
         if (place->state != BRIDGE_HELD && place->until_us < next_us) {
             next_us = place->until_us;
         }
@@ -262,7 +266,9 @@ void bridge_movers_note(bridge_movers_t *self, const char *name, uint64_t now_us
             at = i;
             break;
         }
-        at = (self->source[i].us < self->source[at].us) ? i : at; // The oldest.
+        if (self->source[i].us < self->source[at].us) {
+            at = i; // The oldest.
+        }
     }
     (void)snprintf(self->source[at].name, sizeof self->source[at].name, "%s", name);
     self->source[at].us = now_us;

@@ -49,43 +49,36 @@ void bridge_link_close(bridge_link_t *self) {
 
 // ---- here and gone ------------------------------------------------------------------------------------------------
 
-static void say_away(bridge_link_t *self) {
-    const char *socket = self->terms.socket;
-    if (self->is_here) {
-        (void)fprintf(stderr, "%s: the gateway at %s is gone; waiting for it\n", self->terms.program, socket);
-    } else if (!self->told_away) {
-        (void)fprintf(stderr, "%s: no gateway at %s (%s); waiting for it\n", self->terms.program, socket,
-                      iwc_words(self->line.result));
-    }
-    self->told_away = true;
-}
-
-/// The line has ended, or was never there.
+/// Becomes AWAY, or stays so: the line has ended, or was never there.
 static void lose(bridge_link_t *self) {
-    const bool was_here = self->is_here;
+    const bridge_link_state_t before = self->state;
+    const char *socket = self->terms.socket;
     bridge_line_drop(&self->line, self->line.result);
-    say_away(self);
-    self->is_here = false;
-    for (unsigned left = self->count; was_here && left > 0U; left--) {
-        answer_none(self, 0);
-    }
-    if (was_here) {
+    self->state = BRIDGE_LINK_AWAY;
+    if (before == BRIDGE_LINK_HERE) {
+        (void)fprintf(stderr, "%s: the gateway at %s is gone; waiting for it\n", self->terms.program, socket);
+        for (unsigned left = self->count; left > 0U; left--) {
+            answer_none(self, 0);
+        }
         self->wait_us = SHORTEST_US;
         self->listener.gone(self->listener.context, self->now_us);
+    } else if (before == BRIDGE_LINK_STARTING) {
+        (void)fprintf(stderr, "%s: no gateway at %s (%s); waiting for it\n", self->terms.program, socket,
+                      iwc_words(self->line.result));
     }
     self->try_us = bridge_backoff_us(&self->wait_us, LONGEST_US, &self->random, self->now_us);
 }
 
+/// Becomes HERE, if the gateway accepts the subscription.
 static void take_subscribed(void *context, const iwc_message_t *reply) {
     bridge_link_t *self = context;
     if (reply == NULL || iwc_truth(reply, "ok").value != 1) {
         if (self->line.state == BRIDGE_HERE) {
             self->line.result = (reply == NULL) ? IWC_TIMEOUT : IWC_REFUSED;
         }
-        return; // `step` sees that it is not here, and that no question is on its way.
+        return; // `step` sees that it is not HERE, and that no question is on its way.
     }
-    self->is_here = true;
-    self->told_away = false;
+    self->state = BRIDGE_LINK_HERE;
     self->connections++;
     (void)fprintf(stderr, "%s: connected to the gateway at %s\n", self->terms.program, self->terms.socket);
     self->listener.here(self->listener.context, self->now_us);
@@ -153,23 +146,24 @@ static int come_here(bridge_link_t *self) {
 
 static void listen_now(bridge_link_t *self) {
     iwc_message_t event;
-    if (self->terms.latest && self->is_here) {
+    if (self->terms.latest && self->state == BRIDGE_LINK_HERE) {
         (void)iwc_latest(self->line.gateway); // If it has ended, the next line finds that out.
     }
     for (unsigned i = 0; i < 256U && bridge_line_next(&self->line, &event); i++) {
-        if (self->is_here) {
+        if (self->state == BRIDGE_LINK_HERE) {
             self->listener.event(self->listener.context, &event, self->now_us);
         }
     }
     (void)bridge_line_expire(&self->line, self->now_us);
     const bool subscribing = bridge_line_in_flight(&self->line) > 0U;
-    if (self->line.state == BRIDGE_AWAY || (!self->is_here && !subscribing)) {
+    if (self->line.state == BRIDGE_AWAY || (self->state != BRIDGE_LINK_HERE && !subscribing)) {
         lose(self);
     }
 }
 
 static void send_waiting(bridge_link_t *self) {
-    while (self->is_here && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
+    while (self->state == BRIDGE_LINK_HERE && self->count > 0U &&
+           bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
         const bridge_question_t *question = &self->waits[0];
         const bridge_sent_t sent = {0, question->until_us, question->answer, question->context};
         const iwc_result_t result = bridge_line_send(&self->line, question->request, &sent);
@@ -212,7 +206,7 @@ uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us) {
     if (self->count > 0U && self->waits[0].until_us < next_us) {
         next_us = self->waits[0].until_us;
     }
-    if (self->is_here && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
+    if (self->state == BRIDGE_LINK_HERE && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
         return now_us;
     }
     return (stop_us < next_us) ? stop_us : next_us;
@@ -227,7 +221,7 @@ bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t a
     if (bridge_is_stop(request)) {
         return bridge_stop_ask(&self->stop, request, answer, context, now_us);
     }
-    if (!self->is_here || self->count >= BRIDGE_ASKED_MAX || strlen(request) >= BRIDGE_REQUEST_SIZE) {
+    if (self->state != BRIDGE_LINK_HERE || self->count >= BRIDGE_ASKED_MAX || strlen(request) >= BRIDGE_REQUEST_SIZE) {
         return false;
     }
     bridge_question_t *question = &self->waits[self->count++];

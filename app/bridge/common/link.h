@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// A bridge's side towards the gateway: what it watches, what it asks, and the path of its stops.
 ///
-///     AWAY --subscribed--> HERE --lost--> AWAY, tried again after 0.1 s to 2 s
+///     STARTING --no gateway--> AWAY --subscribed--> HERE --lost--> AWAY, tried again after 0.1 s to 2 s
+///        '--------------subscribed-----------------^
+///
+/// The log reports an absent gateway once, when the link becomes AWAY. Connection and greeting are states of the line (line.h).
 ///
 /// Questions go over the connection that watches: at most BRIDGE_LINE_MAX of them have no reply, the others wait here in their order.
 /// Stops go over a connection of their own (stop.h) and never behind a question. No call waits. No question is sent twice.
@@ -39,14 +42,15 @@ typedef struct {
     void *context;
 } bridge_question_t;
 
+typedef enum { BRIDGE_LINK_STARTING, BRIDGE_LINK_AWAY, BRIDGE_LINK_HERE } bridge_link_state_t;
+
 typedef struct {
     bridge_link_terms_t terms;
     bridge_listener_t listener;
     bridge_line_t line; ///< That watches.
     bridge_stop_t stop;
     int epoll_fd;
-    bool is_here;
-    bool told_away;     ///< In the log, that it is not here.
+    bridge_link_state_t state;
     uint64_t try_us;    ///< When to connect next.
     uint64_t wait_us;   ///< Between two tries.
     uint64_t denied_us; ///< Since when the socket may not be used; 0: it may.

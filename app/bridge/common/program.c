@@ -110,7 +110,9 @@ static int configure(const bridge_program_t *self, const wanted_t *wanted) {
 int bridge_program_begin(const bridge_program_t *self, int count, char **arguments, int *out_action) {
     wanted_t wanted = {.action = BRIDGE_RUN};
     int code = begin_program(self->form->program, count, arguments);
-    code = (code == 0) ? parse(self, count, arguments, &wanted) : code;
+    if (code == 0) {
+        code = parse(self, count, arguments, &wanted);
+    }
     if (code != BRIDGE_GO) {
         return code;
     }

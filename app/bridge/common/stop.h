@@ -37,8 +37,8 @@ struct bridge_stop {
     uint64_t try_us;  ///< When to connect next, if no request comes.
     uint64_t wait_us; ///< Between two tries.
     uint64_t random;
-    uint64_t since_us; ///< When the line came up last.
-    bool in_flight[BRIDGE_STOP_KINDS];
+    uint64_t since_us;                 ///< When the line came up last.
+    bool in_flight[BRIDGE_STOP_KINDS]; ///< Independent of the next line: a new one may be wanted before the reply.
     uint64_t wanted_until_us[BRIDGE_STOP_KINDS]; ///< Asked for and not sent yet; 0: no.
     char request[BRIDGE_STOP_KINDS][BRIDGE_REQUEST_SIZE];
     bridge_stop_tag_t tag[BRIDGE_STOP_KINDS];

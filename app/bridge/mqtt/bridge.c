@@ -27,7 +27,7 @@ static int64_t wall_us(void) {
 
 bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
-    return self->link.is_here && self->state_length > 0U;
+    return self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
 }
 
 // ---- what the bridge says of itself -------------------------------------------------------------------------------
@@ -60,7 +60,7 @@ static void tell_info(mqtt_bridge_t *self) {
 
 /// A machine whose gateway is away is as good as away.
 static void tell_availability(mqtt_bridge_t *self, bool always) {
-    const bool online = self->link.is_here && self->state_length > 0U;
+    const bool online = self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
     if (online != self->online || always) {
         const size_t length =
             (size_t)snprintf(self->payload, sizeof self->payload, "%s", online ? "online" : "offline");
@@ -373,7 +373,9 @@ int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
                               (bridge_lease_key(&self->lease) != NULL) ? self->silent_us : UINT64_MAX};
     uint64_t next_us = times[0];
     for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {
-        next_us = (times[i] < next_us) ? times[i] : next_us;
+        if (times[i] < next_us) {
+            next_us = times[i];
+        }
     }
     return (next_us > now_us) ? (int)((next_us - now_us) / 1000U) + 1 : 0;
 }

@@ -71,7 +71,9 @@ static void on_disconnect(struct mosquitto *client, void *context, int code, con
     mqtt_broker_t *self = context;
     (void)client;
     (void)properties;
-    self->refusal = (code >= MQTT_RC_UNSPECIFIED) ? code : self->refusal;
+    if (code >= MQTT_RC_UNSPECIFIED) {
+        self->refusal = code;
+    }
     self->lost = true;
 }
 

@@ -67,13 +67,13 @@ typedef struct {
     size_t next;               ///< Number of the one to try next.
     char *user;                ///< NULL: none.
     char *password;            ///< Behind `user`.
-    bool told_away;            ///< In the log.
+    bool told_away;            ///< In the log; in every state: many tries in a row are one absence.
     int subscriptions[4];      ///< Message numbers, in the order of the listener's topics.
     uint64_t up_us;            ///< When the broker accepted this connection.
     unsigned short_ones;       ///< Connections in a row that ended at once after that.
     uint64_t short_us;         ///< When the log may mention them again.
     uint64_t taken;            ///< Connections that another client with this name has ended, as far as is known.
-    bool lost;                 ///< The library says so.
+    bool lost;                 ///< The library says so, from within a call of it; the state changes after that call.
     int refusal;               ///< Of the last CONNACK, or by MQTT 5 of a message.
     char words[160];           ///< What the library said last of its trouble.
     uint64_t now_us;

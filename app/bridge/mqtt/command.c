@@ -174,7 +174,9 @@ static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_
         if (strcmp(self->senders[i].name, from) == 0) {
             return i;
         }
-        oldest = (self->senders[i].heard_us < self->senders[oldest].heard_us) ? i : oldest;
+        if (self->senders[i].heard_us < self->senders[oldest].heard_us) {
+            oldest = i;
+        }
     }
     const bool free = self->senders[oldest].name[0] == '\0' || now_us - self->senders[oldest].heard_us > FORGET_US;
     return free ? oldest : MQTT_SENDERS;

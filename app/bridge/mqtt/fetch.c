@@ -67,7 +67,9 @@ static void next_file(fetch_t *self, size_t file, uint64_t now_us) {
 void fetch_choose(fetch_t *self, const char *name, uint64_t now_us) {
     size_t place = self->count;
     for (size_t i = 0; i < self->count; i++) {
-        place = (name == NULL || is_meant(&self->list[i], name)) ? i : place;
+        if (name == NULL || is_meant(&self->list[i], name)) {
+            place = i;
+        }
     }
     if (place == self->count) {
         if (name == NULL) {
@@ -97,12 +99,12 @@ static void write_command(fetch_t *self, const char **out_verb, char out_payload
     iwn_out_open(&json, NULL, '{');
     iwn_out_text(&json, "from", self->from);
     iwn_out_int(&json, "seq", self->seq);
-    if (!self->greets) {
+    if (self->asked == FETCH_COMMAND) {
         iwn_out_text(&json, "boot", self->boot);
         iwn_out_int(&json, "t_us", self->t_us);
     }
-    *out_verb = self->greets ? "hello" : (self->stage == FETCH_LISTING) ? "recordings" : "recording";
-    if (!self->greets && self->stage == FETCH_FETCHING) {
+    *out_verb = (self->asked == FETCH_HELLO) ? "hello" : (self->stage == FETCH_LISTING) ? "recordings" : "recording";
+    if (self->asked == FETCH_COMMAND && self->stage == FETCH_FETCHING) {
         char name[FETCH_NAME_SIZE + 8U];
         (void)snprintf(name, sizeof name, "%s%s", self->list[self->chosen].name, fetch_endings[self->file]);
         iwn_out_text(&json, "name", name);
@@ -137,9 +139,10 @@ bool fetch_step(fetch_t *self, uint64_t now_us, const char **out_verb, char out_
     if (!asks || now_us < self->next_us) {
         return false;
     }
-    self->again += self->waits ? 1U : 0U;
-    self->greets = self->waits || self->boot[0] == '\0' || now_us - self->quoted_us > QUOTE_US;
-    self->waits = true;
+    const bool again = self->asked != FETCH_NONE;
+    const bool greets = again || self->boot[0] == '\0' || now_us - self->quoted_us > QUOTE_US;
+    self->again += again ? 1U : 0U;
+    self->asked = greets ? FETCH_HELLO : FETCH_COMMAND;
     self->seq++;
     self->next_us = now_us + ANSWER_US;
     write_command(self, out_verb, out_payload);
@@ -257,21 +260,22 @@ static fetch_news_t take_answer(fetch_t *self, iwn_json_t root, const iwc_messag
     fetch_news_t news = FETCH_NOTHING;
     const iwc_value_t t_us = read_number(root, "t_us");
     const fetch_stage_t stage = self->stage;
-    if (read_number(root, "seq").value != self->seq || !self->waits || !t_us.known) {
+    const fetch_asked_t asked = self->asked;
+    if (read_number(root, "seq").value != self->seq || asked == FETCH_NONE || !t_us.known) {
         return news;
     }
     read_text(root, "boot", self->boot, sizeof self->boot);
     self->t_us = t_us.value;
     self->quoted_us = now_us;
-    self->waits = false;
+    self->asked = FETCH_NONE;
     self->next_us = now_us;
     if (!is_true(root, "ok")) {
         take_refusal(self, root, now_us);
-    } else if (!self->greets && stage == FETCH_LISTING) {
+    } else if (asked == FETCH_COMMAND && stage == FETCH_LISTING) {
         take_list(self, root);
         self->refused = 0;
         self->begun_us = now_us;
-    } else if (!self->greets && stage == FETCH_FETCHING) {
+    } else if (asked == FETCH_COMMAND && stage == FETCH_FETCHING) {
         news = take_piece(self, reply, now_us);
     }
     return news;

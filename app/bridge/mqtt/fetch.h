@@ -25,6 +25,11 @@
 
 typedef enum { FETCH_LISTING, FETCH_LISTED, FETCH_FETCHING, FETCH_DONE, FETCH_FAILED } fetch_stage_t;
 
+/// The command under way; each answer makes it NONE:
+///
+///     NONE --boot unknown or old--> HELLO;  NONE --else--> COMMAND;  HELLO, COMMAND --no answer in time--> HELLO
+typedef enum { FETCH_NONE, FETCH_HELLO, FETCH_COMMAND } fetch_asked_t;
+
 /// One that the machine has.
 typedef struct {
     char name[FETCH_NAME_SIZE];
@@ -38,8 +43,8 @@ typedef struct {
     char from[MQTT_SENDER_SIZE]; ///< Who asks.
     fetch_stage_t stage;
     uint64_t patience_us;
-    bool seen;                                ///< Anything came of this machine.
-    bool online;                              ///< As it said last.
+    bool seen;                                ///< Anything came of this machine, in whatever stage.
+    bool online;                              ///< As it said last; it may answer before it says so.
     fetch_recording_t list[FETCH_LISTED_MAX]; ///< The oldest first.
     size_t count;
     size_t chosen;
@@ -58,8 +63,7 @@ typedef struct {
     int64_t t_us;
     uint64_t quoted_us; ///< When it came.
     int64_t seq;
-    bool greets;       ///< It is `hello`.
-    bool waits;        ///< For its answer.
+    fetch_asked_t asked;
     uint64_t next_us;  ///< When something is due: to give up waiting, or to ask.
     uint64_t begun_us; ///< When it was begun, or the last piece or list came.
     unsigned refused;  ///< Times in a row.

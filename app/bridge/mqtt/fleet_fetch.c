@@ -132,21 +132,6 @@ static void up(void *context) {
     self->was_up = true;
 }
 
-static void down(void *context) {
-    (void)context;
-}
-
-static void sent(void *context, int message) {
-    (void)context;
-    (void)message;
-}
-
-static void refused(void *context, int message, const char *why) {
-    (void)context;
-    (void)message;
-    (void)why; // It sends by QoS 0 only, of which none comes.
-}
-
 /// On a terminal, how far it is.
 static void show_progress(const asking_t *self) {
     const fetch_t *fetch = &self->fetch;
@@ -233,12 +218,16 @@ static int with_list(const mqtt_settings_t *settings, const fleet_wanted_t *want
     mqtt_topic(wanted->id, "reply", self.from, self.topics[1]);
     self.listed[0] = self.topics[0];
     self.listed[1] = self.topics[1];
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", self.from, self.listed, NULL, &self, up,
-                                             down,           sent,      refused,     came};
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", self.from,         self.listed,          NULL, &self, up,
+                                             fleet_ignore,   fleet_ignore_sent, fleet_ignore_refused, came};
     fetch_begin(&self.fetch, wanted->id, self.from, wanted->wait_s * 1000000U, bridge_now_us());
     int code = mqtt_broker_open(&self.broker, settings, &listener);
-    code = (code == 0) ? run_to(&self, FETCH_LISTED) : code;
-    code = (code == 0) ? rest(&self) : code;
+    if (code == 0) {
+        code = run_to(&self, FETCH_LISTED);
+    }
+    if (code == 0) {
+        code = rest(&self);
+    }
     remove_parts(&self);
     if (!mqtt_broker_close(&self.broker)) {
         _exit(code);
@@ -328,8 +317,12 @@ static void tell_fetched(const asking_t *self) {
 static int fetch_one(asking_t *self) {
     fetch_choose(&self->fetch, self->wanted->name, self->now_us);
     int code = (self->fetch.stage == FETCH_FAILED) ? 0 : name_files(self);
-    code = (code == 0) ? run_to(self, FETCH_DONE) : code;
-    code = (code == 0) ? place_files(self) : code;
+    if (code == 0) {
+        code = run_to(self, FETCH_DONE);
+    }
+    if (code == 0) {
+        code = place_files(self);
+    }
     if (code != 0) {
         return code;
     }

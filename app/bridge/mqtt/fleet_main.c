@@ -166,7 +166,9 @@ static int take_words(words_t *self, int count, char **words) {
         [HISTORY] = "history", [RECORDINGS] = "recordings", [RECORDING] = "recording"};
     static const int most[VERBS] = {[TABLE] = 0, [HISTORY] = 2, [RECORDINGS] = 2, [RECORDING] = 3};
     for (unsigned i = HISTORY; count > 0 && i < (unsigned)VERBS; i++) {
-        self->verb = (strcmp(words[0], verbs[i]) == 0) ? (verb_t)i : self->verb;
+        if (strcmp(words[0], verbs[i]) == 0) {
+            self->verb = (verb_t)i;
+        }
     }
     if (count > 0 && self->verb == TABLE) {
         return misuse("\"%.40s\" is no verb; there are history, recordings and recording", words[0]);
@@ -196,8 +198,12 @@ static int judge(words_t *self) {
     }
     span->machine = self->wanted.id;
     span->json = self->wanted.json;
-    span->until_us = self->until ? span->until_us : wall_us();
-    span->since_us = (span->since_us > 0) ? span->since_us : span->until_us - DAY_US;
+    if (!self->until) {
+        span->until_us = wall_us();
+    }
+    if (span->since_us <= 0) {
+        span->since_us = span->until_us - DAY_US;
+    }
     return (span->since_us < span->until_us) ? -1 : misuse("--since must lie before --until");
 }
 
@@ -217,7 +223,9 @@ static int parse(words_t *self, int count, char **arguments) {
     while (code < 0 && (option = getopt_long(count, arguments, ":c:o:", options, NULL)) != -1) {
         code = begin_is_value("iwheel-fleet", optarg) ? take_option(self, option) : EX_USAGE;
     }
-    code = (code < 0) ? take_words(self, count - optind, arguments + optind) : code;
+    if (code < 0) {
+        code = take_words(self, count - optind, arguments + optind);
+    }
     return (code < 0) ? judge(self) : code;
 }
 
@@ -228,7 +236,9 @@ int main(int count, char **arguments) {
     words_t words = {.used = EVERYWHERE, .wanted = {.wait_s = WAIT_S, .end_asked = &end_asked}};
     const struct sigaction action = {.sa_handler = ask_end};
     int code = begin_program("iwheel-fleet", count, arguments);
-    code = (code == 0) ? parse(&words, count, arguments) : code;
+    if (code == 0) {
+        code = parse(&words, count, arguments);
+    }
     if (code >= 0) {
         return code;
     }

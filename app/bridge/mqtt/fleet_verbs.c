@@ -37,19 +37,19 @@ static int complain(int code, const char *why) {
 
 // ---- the table ----------------------------------------------------------------------------------------------------
 
-static void up(void *context) {
+void fleet_ignore(void *context) {
     (void)context;
 }
 
-static void sent(void *context, int message) {
+void fleet_ignore_sent(void *context, int message) {
     (void)context;
     (void)message;
 }
 
-static void refused(void *context, int message, const char *why) {
+void fleet_ignore_refused(void *context, int message, const char *why) {
     (void)context;
     (void)message;
-    (void)why; // It sends by QoS 0 only, of which none comes.
+    (void)why;
 }
 
 static void came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
@@ -148,7 +148,9 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
                                          "iwheel/+/event/stop", NULL};
     char name[32];
     (void)snprintf(name, sizeof name, "iwheel-fleet-%d", (int)getpid());
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, refused, came};
+    const mqtt_broker_listener_t listener = {
+        "iwheel-fleet",       name, topics, NULL, &console, fleet_ignore, fleet_ignore, fleet_ignore_sent,
+        fleet_ignore_refused, came};
     if (!fleet_open(&console.fleet)) {
         return complain(EX_OSERR, "no memory");
     }
@@ -177,10 +179,6 @@ static void info_up(void *context) {
     self->history->has_info = true;
 }
 
-static void info_down(void *context) {
-    (void)context;
-}
-
 static void info_came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
     asking_info_t *self = context;
     (void)labels;
@@ -195,8 +193,9 @@ static int read_info(const mqtt_settings_t *settings, const fleet_wanted_t *want
     char topic[64];
     char name[40];
     const char *const topics[] = {topic, NULL};
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", name,      topics, NULL,    &self,
-                                             info_up,        info_down, sent,   refused, info_came};
+    const mqtt_broker_listener_t listener = {
+        "iwheel-fleet",       name,     topics, NULL, &self, info_up, fleet_ignore, fleet_ignore_sent,
+        fleet_ignore_refused, info_came};
     (void)snprintf(topic, sizeof topic, "iwheel/%s/info", (wanted->span.machine != NULL) ? wanted->span.machine : "+");
     (void)snprintf(name, sizeof name, "iwheel-fleet-history-%d", (int)getpid());
     const int code = mqtt_broker_open(&broker, settings, &listener);

@@ -21,6 +21,11 @@ typedef struct {
     const volatile sig_atomic_t *end_asked;
 } fleet_wanted_t;
 
+/// For a listener that does not need them: it sends by QoS 0 only, which is neither confirmed nor refused.
+void fleet_ignore(void *context);
+void fleet_ignore_sent(void *context, int message);
+void fleet_ignore_refused(void *context, int message, const char *why);
+
 /// All of these: an exit code, with what is wrong told on stderr.
 ///
 /// The table of machines.

@@ -76,7 +76,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
     waiting_t *self = context;
     mqtt_bridge_t *bridge = self->bridge;
     self->used = false;
-    if (reply == NULL && self->order.verb == MQTT_ARM && bridge->link.is_here) {
+    if (reply == NULL && self->order.verb == MQTT_ARM && bridge->link.state == BRIDGE_LINK_HERE) {
         decline(bridge, &self->order, "stale_command",
                 "the wheels were stopped meanwhile, or the gateway did not answer; arm again");
         return;

@@ -71,7 +71,9 @@ static bool find_owner(const char *table, const char *local, const char *remote,
         found = sscanf(line, " %*[^:]: %47s %47s %*s %*s %*s %*s %15[0-9] %*s %23[0-9]", ends[0], ends[1], uid,
                        inode) == 4 &&
                 strtoul(inode, NULL, 10) != 0U && strcmp(ends[0], local) == 0 && strcmp(ends[1], remote) == 0;
-        *out_uid = found ? (uid_t)strtoul(uid, NULL, 10) : *out_uid;
+        if (found) {
+            *out_uid = (uid_t)strtoul(uid, NULL, 10);
+        }
     }
     if (file != NULL) {
         (void)fclose(file);

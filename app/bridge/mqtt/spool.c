@@ -18,6 +18,7 @@ static const char fresh[] = MQTT_SPOOL_FILE ".new";
 
 /// A record: length of what follows its head, and its CRC-32; then a letter, a number and the mark; of an event its name with a NUL, and
 /// its payload. What is confirmed is told by a record with the number up to which.
+#define SIZE_MIN  (2U * (size_t)MQTT_SPOOL_EVENT_MAX)
 #define HEAD_SIZE 8U
 #define BODY_SIZE 17U
 #define CONFIRMED 'c'
@@ -259,7 +260,9 @@ static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left
         } else {
             forget_one(self, number);
         }
-        self->last = (number > self->last) ? number : self->last;
+        if (number > self->last) {
+            self->last = number;
+        }
         self->mark = mark_of(record);
         return length;
     }
@@ -289,8 +292,7 @@ static void read_file(mqtt_spool_t *self, int file) {
 
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
     *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory), .file = -1};
-    self->size = 2U * (size_t)MQTT_SPOOL_EVENT_MAX;
-    self->size = (max_bytes > self->size) ? max_bytes : self->size;
+    self->size = (max_bytes > SIZE_MIN) ? max_bytes : SIZE_MIN;
     const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
     const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
     self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;

@@ -50,7 +50,9 @@ static bool is_address(const char *host) {
 /// fleet's certificates say which of them are servers.
 static natsStatus use_tls(natsOptions *options, const mqtt_settings_t *settings, const char *host) {
     natsStatus status = natsOptions_SetSecure(options, true);
-    status = (status == NATS_OK) ? natsOptions_LoadCATrustedCertificates(options, settings->broker.ca) : status;
+    if (status == NATS_OK) {
+        status = natsOptions_LoadCATrustedCertificates(options, settings->broker.ca);
+    }
     if (status == NATS_OK && mqtt_settings_given(settings->broker.certificate)) {
         status = natsOptions_LoadCertificatesChain(options, settings->broker.certificate, settings->broker.key);
     }
@@ -63,13 +65,21 @@ static natsStatus connect_to(reader_t *self, const mqtt_settings_t *settings, co
     (void)snprintf(url, sizeof url, "nats://%s%s%s:%u", colons ? "[" : "", host, colons ? "]" : "",
                    (unsigned)settings->broker.stream_port);
     natsStatus status = natsOptions_Create(&self->options);
-    status = (status == NATS_OK) ? natsOptions_SetURL(self->options, url) : status;
-    status = (status == NATS_OK) ? natsOptions_SetTimeout(self->options, TRY_MS) : status;
-    status = (status == NATS_OK) ? natsOptions_SetAllowReconnect(self->options, false) : status;
+    if (status == NATS_OK) {
+        status = natsOptions_SetURL(self->options, url);
+    }
+    if (status == NATS_OK) {
+        status = natsOptions_SetTimeout(self->options, TRY_MS);
+    }
+    if (status == NATS_OK) {
+        status = natsOptions_SetAllowReconnect(self->options, false);
+    }
     if (status == NATS_OK && mqtt_settings_given(settings->broker.ca)) {
         status = use_tls(self->options, settings, host);
     }
-    status = (status == NATS_OK) ? natsConnection_Connect(&self->connection, self->options) : status;
+    if (status == NATS_OK) {
+        status = natsConnection_Connect(&self->connection, self->options);
+    }
     jsOptions asking;
     (void)jsOptions_Init(&asking);
     asking.Wait = TRY_MS;
@@ -149,7 +159,9 @@ static natsStatus read_all(const reader_t *self, stream_take_t take, void *conte
     while (status == NATS_OK && left > 0U) {
         natsMsg *message = NULL;
         status = natsSubscription_NextMsg(&message, self->events, SILENCE_MS);
-        status = (status == NATS_OK) ? take_one(message, take, context, &left) : status;
+        if (status == NATS_OK) {
+            status = take_one(message, take, context, &left);
+        }
         natsMsg_Destroy(message);
     }
     return status;
@@ -160,7 +172,9 @@ static natsStatus try_to_read(reader_t *self, const stream_wish_t *wish, stream_
                               jsErrCode *trouble) {
     const char *words = NULL;
     natsStatus status = subscribe(self, wish, trouble);
-    status = (status == NATS_OK) ? read_all(self, take, context) : status;
+    if (status == NATS_OK) {
+        status = read_all(self, take, context);
+    }
     const bool forbidden =
         status != NATS_OK && natsConnection_GetLastError(self->connection, &words) == NATS_NOT_PERMITTED;
     return forbidden ? NATS_NOT_PERMITTED : status; // Who may not ask gets no answer, else.

@@ -23,7 +23,9 @@ static bool may_trust_wall(ros_ages_t *self, ros_moment_t now) {
     self->offset_us = offset_us;
     if (back_us > ROS_STEP_US) {
         const int64_t until_us = now.wall_us + back_us + ROS_OLD_US;
-        self->doubted_until_us = (until_us > self->doubted_until_us) ? until_us : self->doubted_until_us;
+        if (until_us > self->doubted_until_us) {
+            self->doubted_until_us = until_us;
+        }
     }
     return now.wall_us >= self->doubted_until_us;
 }
@@ -88,7 +90,9 @@ static ros_age_t judge_by_writer(ros_ages_t *self, uint64_t source, int64_t sent
         return ROS_AGE_OVERTAKEN;
     }
     entry->least_us += (now_us - entry->heard_us) / (PER_MILLION / ROS_DRIFT_PPM);
-    entry->least_us = (way_us < entry->least_us) ? way_us : entry->least_us;
+    if (way_us < entry->least_us) {
+        entry->least_us = way_us;
+    }
     entry->heard_us = now_us;
     entry->sent_us = sent_us;
     if (!entry->known) {

@@ -8,10 +8,6 @@
 /// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
 #define SILENT_US 150000
 
-static int64_t now_us(void) {
-    return bridge_clock_us(CLOCK_MONOTONIC);
-}
-
 // ---- commands ----------------------------------------------------------------------------------------------------
 
 /// What a command is, besides what it wants.
@@ -31,8 +27,12 @@ static judged_t judge_age(bridge_t *self, const ros_command_t *command) {
     if (command->stamp_us != 0) {
         const ros_age_t by_stamp =
             ros_ages_command(&self->stamp_ages, command->source, command->stamp_us, now, &stamp_age_us);
-        judged.age = (judged.age == ROS_AGE_FRESH) ? by_stamp : judged.age;
-        judged.age_us = (stamp_age_us > judged.age_us) ? stamp_age_us : judged.age_us;
+        if (judged.age == ROS_AGE_FRESH) {
+            judged.age = by_stamp;
+        }
+        if (stamp_age_us > judged.age_us) {
+            judged.age_us = stamp_age_us;
+        }
     }
     return judged;
 }
@@ -42,8 +42,10 @@ static judged_t judge_command(bridge_t *self, const ros_command_t *command) {
     judged_t judged = judge_age(self, command);
     judged.good = ros_twist_read(command->linear, command->angular, &judged.twist) == ROS_TWIST_GOOD;
     judged.moves = !judged.good || judged.twist.v_mm_s != 0 || judged.twist.yaw_mrad_s != 0;
-    self->coming_us = now_us();
-    self->moved_us = judged.moves ? self->coming_us : self->moved_us;
+    self->coming_us = bridge_monotonic_us();
+    if (judged.moves) {
+        self->moved_us = self->coming_us;
+    }
     ros_commands_t *commands = &self->facts.commands;
     if (!judged.good) {
         commands->bad++;
@@ -79,7 +81,7 @@ static void pass_on(bridge_t *self, const ros_command_t *command, const judged_t
     }
     self->facts.commands.unsent--;
     self->facts.commands.passed++;
-    self->commanded_us = now_us();
+    self->commanded_us = bridge_monotonic_us();
 }
 
 static void take_command(bridge_t *self, const ros_command_t *command) {
@@ -175,10 +177,10 @@ void bridge_step(bridge_t *self) {
     take_from_ros(self);
     if (self->facts.link != ROS_LINK_GONE) {
         bridge_listen(self);
-    } else if (now_us() >= self->retry_us) {
+    } else if (bridge_monotonic_us() >= self->retry_us) {
         (void)bridge_call(self);
     }
-    const int64_t now = now_us();
+    const int64_t now = bridge_monotonic_us();
     judge_silence(self, now);
     if (self->facts.link == ROS_LINK_UP && now - self->heard_us > SILENT_US) {
         self->facts.link = ROS_LINK_SILENT;
@@ -188,7 +190,7 @@ void bridge_step(bridge_t *self) {
 }
 
 static int wait_ms(const bridge_t *self) {
-    const int64_t now = now_us();
+    const int64_t now = bridge_monotonic_us();
     const bool here = self->facts.link != ROS_LINK_GONE;
     int64_t next_us = self->second_us;
     if (here && iwc_pending(self->gateway)) {
@@ -198,7 +200,9 @@ static int wait_ms(const bridge_t *self) {
         here ? INT64_MAX : self->retry_us, (self->facts.link == ROS_LINK_UP) ? self->heard_us + SILENT_US : INT64_MAX,
         (self->commanded_us > 0) ? self->commanded_us + (int64_t)self->settings.drive.timeout_ms * 1000 : INT64_MAX};
     for (size_t i = 0; i < 3U; i++) {
-        next_us = (others[i] < next_us) ? others[i] : next_us;
+        if (others[i] < next_us) {
+            next_us = others[i];
+        }
     }
     return (next_us > now) ? (int)((next_us - now) / 1000) + 1 : 0;
 }
@@ -251,7 +255,7 @@ int bridge_open(bridge_t *self, const ros_settings_t *settings) {
     self->settings = *settings;
     self->facts.drive = settings->drive.enabled;
     self->backoff_us = BRIDGE_BACKOFF_US;
-    ros_auto_init(&self->auto_arm, now_us());
+    ros_auto_init(&self->auto_arm, bridge_monotonic_us());
     ros_ages_init(&self->ages, settings->ros.loopback, settings->ros.synchronised, bridge_moment());
     self->stamp_ages = self->ages;
     const int result = open_both(self);

@@ -15,7 +15,7 @@ int64_t bridge_clock_us(clockid_t clock) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-static int64_t now_us(void) {
+int64_t bridge_monotonic_us(void) {
     return bridge_clock_us(CLOCK_MONOTONIC);
 }
 
@@ -37,7 +37,7 @@ void bridge_lose(bridge_t *self, const char *why) {
     bridge_end_lease(self);
     (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
     // Not all at once, where several wait for the same gateway.
-    self->retry_us = now_us() + self->backoff_us * 3 / 4 + now_us() % (self->backoff_us / 2);
+    self->retry_us = bridge_monotonic_us() + self->backoff_us * 3 / 4 + bridge_monotonic_us() % (self->backoff_us / 2);
     self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
     if (!self->told_gone) {
         (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
@@ -74,7 +74,7 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
         return;
     }
     self->facts.link = ROS_LINK_UP;
-    self->heard_us = now_us();
+    self->heard_us = bridge_monotonic_us();
     if (self->leased_us != 0 && !machine->now.ours && self->heard_us - self->leased_us > GRANTED_US) {
         bridge_end_lease(self);
     }
@@ -95,7 +95,9 @@ iwc_result_t bridge_call(bridge_t *self) {
     iwc_message_t status;
     iwc_result_t result = iwc_connect(self->gateway, self->settings.gateway.socket, CONNECT_MS);
     const bool newer = result == IWC_NEWER;
-    result = newer ? IWC_OK : result;
+    if (newer) {
+        result = IWC_OK;
+    }
     if (result == IWC_OK) {
         read_last_stop(self);
         result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);

@@ -26,6 +26,7 @@ void bridge_listen(bridge_t *self);
 
 /// Microseconds.
 int64_t bridge_clock_us(clockid_t clock);
+int64_t bridge_monotonic_us(void);
 
 /// Executes a request, or refuses it with the reason, and answers it.
 void bridge_take_request(bridge_t *self, const ros_request_t *request);

@@ -38,7 +38,9 @@ bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
     const bool quiet = now_us - self->moved_us >= ROS_QUIET_US;
     self->state = state_after_command(self, now_us);
     self->heard_us = now_us;
-    self->moved_us = moves ? now_us : self->moved_us;
+    if (moves) {
+        self->moved_us = now_us;
+    }
     // One attempt in that time too: a gateway that refuses is not asked with each command.
     if (self->state != ROS_AUTO_TRUSTED || !quiet || now_us - self->tried_us < ROS_QUIET_US) {
         return false;
@@ -48,7 +50,9 @@ bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
 }
 
 void ros_auto_stopped(ros_auto_t *self, bool by_our_silence) {
-    self->state = by_our_silence ? self->state : ROS_AUTO_WAITING;
+    if (!by_our_silence) {
+        self->state = ROS_AUTO_WAITING;
+    }
 }
 
 void ros_auto_person_stopped(ros_auto_t *self) {

@@ -11,6 +11,7 @@
 /// Keys of the configuration that odometry and driving depend on.
 #define ROS_CONFIGURED 4U
 
+///     GONE --snapshot--> UP --none for 0.15 s--> SILENT --snapshot--> UP; UP, SILENT --connection lost--> GONE
 typedef enum {
     ROS_LINK_GONE = 0, ///< No connection to the gateway.
     ROS_LINK_SILENT,   ///< Connected, but no snapshot came for too long.

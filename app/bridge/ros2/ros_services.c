@@ -78,7 +78,9 @@ ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
         copy.msg_iov = &whole;
         copy.msg_iovlen = 1;
         sent = send_as_it_is(fd, &copy, flags);
-        sent = (sent == (ssize_t)whole.iov_len) ? (ssize_t)length : sent; // CycloneDDS compares it with what it gave.
+        if (sent == (ssize_t)whole.iov_len) {
+            sent = (ssize_t)length; // CycloneDDS compares it with what it gave.
+        }
     }
     const int error = errno;
     (void)pthread_mutex_unlock(&out.lock);

@@ -18,9 +18,9 @@ static relay_channel_t *channel_of(relay_t *self, const gw_client_t *client) {
 
 /// Its client leaves it; the board is told.
 static void release(relay_channel_t *channel) {
+    channel->state = RELAY_FREE;
     channel->client = IW_CLIENT_NONE;
-    channel->tell_open = false;
-    channel->tell_close = true;
+    channel->close_due = true;
     channel->queue.count = 0;
 }
 
@@ -29,7 +29,7 @@ static relay_channel_t *free_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        if (channel->client == IW_CLIENT_NONE && (found == NULL || channel->used_us < found->used_us)) {
+        if (channel->state == RELAY_FREE && (found == NULL || channel->used_us < found->used_us)) {
             found = channel;
         }
     }
@@ -57,14 +57,14 @@ static void welcome(void *context, gw_client_t *client) {
         return; // A guest: guests.c carries out its one line.
     }
     relay_channel_t *channel = free_channel(self);
-    if (!self->link.linked || channel == NULL) {
+    if (self->link.state == SERIAL_SILENT || channel == NULL) {
         turn_away(self, client, (self->trouble[0] != '\0') ? self->trouble : "it has not answered yet; try again");
         return;
     }
-    *channel = (relay_channel_t){.client = client->id,
+    *channel = (relay_channel_t){.state = RELAY_NEW,
+                                 .client = client->id,
                                  .watch = client->right == GW_WATCH,
-                                 .tell_open = true,
-                                 .tell_close = channel->tell_close,
+                                 .close_due = channel->close_due,
                                  .since_us = self->now_us,
                                  .used_us = self->now_us};
     serial_queue_init(&channel->queue, hold_us(self));
@@ -139,7 +139,9 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
         return;
     }
     channel->granted = channel->granted || place->kind == SERIAL_GRANTS;
-    channel->arm_number = (asked->cmd == IWN_CMD_ARM) ? place->number : channel->arm_number;
+    if (asked->cmd == IWN_CMD_ARM) {
+        channel->arm_number = place->number;
+    }
     serial_queue_put(&channel->queue);
 }
 
@@ -242,7 +244,9 @@ static void take_reply(relay_t *self, relay_channel_t *channel, gw_client_t *cli
         !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
         return; // It was given up, and its client told so.
     }
-    channel->armed_us = (number == channel->arm_number) ? self->now_us : channel->armed_us;
+    if (number == channel->arm_number) {
+        channel->armed_us = self->now_us;
+    }
     if (oldest->number == number) {
         pass_reply(self, client, oldest, at, (size_t)(end - at));
         serial_queue_drop(&channel->queue);
@@ -259,7 +263,8 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     relay_channel_t *channel = &self->channel[line->channel];
     gw_client_t *client = gw_clients_find(&self->clients, channel->client);
     const bool hello = begins(line, "{\"event\":\"hello\"");
-    if (client == NULL || (!channel->welcomed && !hello) || line->length + 1U > sizeof self->clients.line) {
+    if (client == NULL || (channel->state != RELAY_WELCOMED && !hello) ||
+        line->length + 1U > sizeof self->clients.line) {
         return; // Of whoever had this channel before.
     }
     if (begins(line, "{\"id\":")) {
@@ -268,8 +273,8 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     }
     memcpy(self->clients.line, line->json, line->length);
     self->clients.line[line->length] = '\n';
-    if (hello && !channel->welcomed) {
-        channel->welcomed = true;
+    if (hello && channel->state != RELAY_WELCOMED) {
+        channel->state = RELAY_WELCOMED;
         gw_client_reply(client, self->clients.line, line->length + 1U);
     } else if (!hello) {
         gw_client_event(client, self->clients.line, line->length + 1U);
@@ -290,8 +295,9 @@ void relay_drop_clients(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         drop_client(self, &self->channel[i]);
     }
-    self->out_length =
-        (self->out_sent > 0U) ? self->out_length : 0U; // Half a line is ended, or the next one would be lost too.
+    if (self->out_sent == 0U) {
+        self->out_length = 0; // Half a line is ended, or the next one would be lost too.
+    }
 }
 
 static void tend(relay_t *self, relay_channel_t *channel) {
@@ -300,7 +306,7 @@ static void tend(relay_t *self, relay_channel_t *channel) {
         release(channel);
         return;
     }
-    if (!channel->welcomed && self->now_us >= channel->since_us + RELAY_WELCOME_US) {
+    if (channel->state != RELAY_WELCOMED && self->now_us >= channel->since_us + RELAY_WELCOME_US) {
         release(channel);
         turn_away(self, client, "the board does not answer to a new client; is its image `gateway`, and not too old?");
         return;
@@ -321,7 +327,7 @@ static void tend(relay_t *self, relay_channel_t *channel) {
 
 void relay_tend_channels(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
-        if (self->channel[i].client != IW_CLIENT_NONE) {
+        if (self->channel[i].state != RELAY_FREE) {
             tend(self, &self->channel[i]);
         }
     }
@@ -332,8 +338,10 @@ uint64_t relay_channels_next_us(const relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         const relay_channel_t *channel = &self->channel[i];
         const uint64_t then_us =
-            (channel->client != IW_CLIENT_NONE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
-        next_us = (then_us < next_us) ? then_us : next_us;
+            (channel->state != RELAY_FREE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
+        if (then_us < next_us) {
+            next_us = then_us;
+        }
     }
     return next_us;
 }
@@ -349,16 +357,15 @@ static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
     char json[64];
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        const bool opens = channel->client != IW_CLIENT_NONE && !channel->welcomed &&
-                           (channel->tell_open || self->now_us >= channel->opened_us + RELAY_OPEN_US);
-        if (!channel->tell_close && !opens) {
+        const bool again = channel->state == RELAY_OPENING && self->now_us >= channel->opened_us + RELAY_OPEN_US;
+        if (!channel->close_due && channel->state != RELAY_NEW && !again) {
             continue;
         }
-        if (channel->tell_close) {
-            channel->tell_close = false;
+        if (channel->close_due) {
+            channel->close_due = false;
             (void)snprintf(json, sizeof json, "{\"cmd\":\"close\",\"channel\":%u}", i);
         } else {
-            channel->tell_open = false;
+            channel->state = RELAY_OPENING;
             channel->opened_us = self->now_us;
             (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":%s}", i,
                            channel->watch ? "true" : "false");
@@ -372,9 +379,8 @@ static size_t next_request(relay_t *self, bool stops_only, char *out, size_t siz
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
         relay_channel_t *channel = &self->channel[number];
-        serial_request_t *request = (channel->client != IW_CLIENT_NONE && channel->welcomed)
-                                        ? serial_queue_next(&channel->queue, stops_only, self->now_us)
-                                        : NULL;
+        serial_request_t *request =
+            (channel->state == RELAY_WELCOMED) ? serial_queue_next(&channel->queue, stops_only, self->now_us) : NULL;
         if (request != NULL) {
             self->next_channel = number % IWN_LINE_CHANNELS;
             serial_queue_sent(request, self->now_us);
@@ -386,11 +392,11 @@ static size_t next_request(relay_t *self, bool stops_only, char *out, size_t siz
 
 static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
     static const char alive[] = "{\"cmd\":\"alive\"}";
-    if (!self->link.linked && self->now_us >= self->asked_us + RELAY_ASK_US) {
+    if (self->link.state == SERIAL_SILENT && self->now_us >= self->asked_us + RELAY_ASK_US) {
         self->asked_us = self->now_us;
         return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
     }
-    return (self->link.linked && gw_clients_count(&self->clients) > 0U &&
+    return (self->link.state == SERIAL_LINKED && gw_clients_count(&self->clients) > 0U &&
             self->now_us >= self->said_us + RELAY_ALIVE_US)
                ? write_line(0, alive, sizeof alive - 1U, out, size)
                : 0U;
@@ -398,10 +404,14 @@ static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
 
 size_t relay_next_line(relay_t *self, char *out, size_t size) {
     size_t length = 0;
-    if (self->link.linked) {
+    if (self->link.state == SERIAL_LINKED) {
         length = next_open_or_close(self, out, size);
-        length = (length > 0U) ? length : next_request(self, true, out, size);
+        if (length == 0U) {
+            length = next_request(self, true, out, size);
+        }
     }
-    length = (length > 0U) ? length : next_sign_of_life(self, out, size);
-    return (length > 0U || !self->link.linked) ? length : next_request(self, false, out, size);
+    if (length == 0U) {
+        length = next_sign_of_life(self, out, size);
+    }
+    return (length > 0U || self->link.state == SERIAL_SILENT) ? length : next_request(self, false, out, size);
 }

@@ -24,7 +24,7 @@ static relay_channel_t *quietest_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         relay_channel_t *channel = &self->channel[i];
-        const bool open = channel->client != IW_CLIENT_NONE && channel->welcomed && !channel->tell_close;
+        const bool open = channel->state == RELAY_WELCOMED && !channel->close_due;
         if (open && !serial_queue_is_full(&channel->queue) &&
             (found == NULL || channel->queue.count < found->queue.count)) {
             found = channel;

@@ -3,12 +3,17 @@
 
 #include <string.h>
 
+/// Its stamps are worth nothing any more.
+static void fall_silent(serial_link_t *self) {
+    self->state = SERIAL_SILENT;
+    self->stamps = 0;
+}
+
 void serial_link_init(serial_link_t *self, uint64_t now_us) {
-    self->linked = false;
+    fall_silent(self);
     self->boot[0] = '\0';
     self->version[0] = '\0';
     self->heard_us = now_us;
-    self->stamps = 0;
     self->noise = (serial_noise_t){.bytes = 0};
     iwn_receiver_init(&self->receiver, self->buffer, sizeof self->buffer, true);
 }
@@ -23,10 +28,6 @@ static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
         self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].heard_us < SERIAL_STAMP_US;
     self->stamps += close ? 0U : 1U;
     *newest(self) = (serial_stamp_t){now_us, t_us};
-}
-
-uint64_t serial_link_stamped_us(const serial_link_t *self) {
-    return (self->stamps > 0U) ? self->stamp[(self->stamps - 1U) % SERIAL_STAMPS].heard_us : 0U;
 }
 
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us) {
@@ -54,11 +55,12 @@ static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
     if (!iwn_json_find(event, "version", &value) || !iwn_json_text(value, self->version, sizeof self->version)) {
         self->version[0] = '\0';
     }
-    if (self->linked && strcmp(boot, self->boot) == 0) {
+    if (self->state == SERIAL_LINKED && strcmp(boot, self->boot) == 0) {
         return SERIAL_NEWS_NONE;
     }
     memcpy(self->boot, boot, sizeof boot);
-    self->linked = true;
+    self->state = SERIAL_LINKED;
+    self->stamps = 0;
     return SERIAL_NEWS_LINKED;
 }
 
@@ -99,16 +101,15 @@ static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t n
     self->heard_us = now_us;
     self->noise = (serial_noise_t){.bytes = 0};
     // A board's time falls when it starts anew, whatever it says of itself.
-    const bool fell = self->linked && self->stamps > 0U && line->t_us < newest(self)->t_us;
+    const bool fell = self->state == SERIAL_LINKED && self->stamps > 0U && line->t_us < newest(self)->t_us;
     if (fell) {
-        self->linked = false;
-        self->stamps = 0;
+        fall_silent(self);
     }
-    const serial_news_t news = (line->channel == 0U) ? take_event(self, root)
-                               : self->linked        ? SERIAL_NEWS_LINE
-                                                     : SERIAL_NEWS_NONE;
-    self->stamps = (news == SERIAL_NEWS_LINKED) ? 0U : self->stamps;
-    if (self->linked) {
+    serial_news_t news = (self->state == SERIAL_LINKED) ? SERIAL_NEWS_LINE : SERIAL_NEWS_NONE;
+    if (line->channel == 0U) {
+        news = take_event(self, root);
+    }
+    if (self->state == SERIAL_LINKED) {
         note_stamp(self, line->t_us, now_us);
     }
     return (fell && news != SERIAL_NEWS_LINKED) ? SERIAL_NEWS_LOST : news;
@@ -139,11 +140,10 @@ serial_news_t serial_link_put(serial_link_t *self, char byte, uint64_t now_us, i
 }
 
 bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us) {
-    if (!self->linked || now_us < self->heard_us + SERIAL_SILENT_US) {
+    if (self->state == SERIAL_SILENT || now_us < self->heard_us + SERIAL_SILENT_US) {
         return false;
     }
-    self->linked = false;
-    self->stamps = 0;
+    fall_silent(self);
     return true;
 }
 

@@ -38,10 +38,12 @@ typedef struct {
     size_t sampled;
 } serial_noise_t;
 
+typedef enum { SERIAL_SILENT, SERIAL_LINKED } serial_link_state_t;
+
 typedef struct {
     iwn_receiver_t receiver;
     iwn_work_t work;
-    bool linked;
+    serial_link_state_t state;
     char boot[IWN_LINE_BOOT + 1U];
     char version[33];
     uint64_t heard_us; ///< The last good line, or when the port was opened.
@@ -72,8 +74,6 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us);
 
 /// The newest stamp that had been heard at that time; false if none had.
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us);
-/// When the newest of all was heard; 0: none.
-uint64_t serial_link_stamped_us(const serial_link_t *self);
 
 /// Why there is no board on this line, with the cure; `port` and `baud` are for the words.
 void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size);

@@ -21,7 +21,7 @@ static int check(const serial_settings_t *settings, relay_t *relay) {
         return 1;
     }
     serial_link_init(link, bridge_now_us());
-    for (unsigned i = 0; i < 200U && !link->linked; i++) {
+    for (unsigned i = 0; i < 200U && link->state == SERIAL_SILENT; i++) {
         char bytes[512];
         iwn_line_t line;
         if (i % 30U == 0U) {
@@ -34,7 +34,7 @@ static int check(const serial_settings_t *settings, relay_t *relay) {
         }
     }
     serial_port_close(&port);
-    if (!link->linked) {
+    if (link->state == SERIAL_SILENT) {
         serial_link_explain(link, settings->board.port, settings->board.baud, words, sizeof words);
         (void)printf("fail  %s\n", words);
         return 1;

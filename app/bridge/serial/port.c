@@ -20,11 +20,12 @@ static const struct {
               {921600, B921600}, {1000000, B1000000}, {1152000, B1152000}, {1500000, B1500000}, {2000000, B2000000}};
 
 static speed_t speed_of(uint32_t baud) {
-    speed_t speed = B0;
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
-        speed = (speeds[i].baud == baud) ? speeds[i].speed : speed;
+        if (speeds[i].baud == baud) {
+            return speeds[i].speed;
+        }
     }
-    return speed;
+    return B0;
 }
 
 bool serial_port_has_baud(uint32_t baud) {
@@ -119,7 +120,9 @@ static int claim(int fd) {
 int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size) {
     self->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     int error = (self->fd < 0) ? errno : claim(self->fd);
-    error = (error == 0) ? configure(self->fd, baud) : error;
+    if (error == 0) {
+        error = configure(self->fd, baud);
+    }
     if (error != 0) {
         serial_port_close(self);
         return complain(path, error, out_why, size);

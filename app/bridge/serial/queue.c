@@ -118,7 +118,9 @@ uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us) {
     uint64_t next_us = UINT64_MAX;
     for (unsigned i = 0; i < self->count; i++) {
         const uint64_t then_us = turn_us(self, &self->ring[(self->first + i) % SERIAL_QUEUE_SIZE], now_us);
-        next_us = (then_us < next_us) ? then_us : next_us;
+        if (then_us < next_us) {
+            next_us = then_us;
+        }
     }
     return next_us;
 }
@@ -127,7 +129,9 @@ uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us) {
 static unsigned behind_stops(serial_queue_t *self) {
     unsigned end = 0;
     for (unsigned i = 0; i < self->count; i++) {
-        end = (at(self, i)->kind == SERIAL_STOPS && at(self, i)->state == SERIAL_WAITING) ? i + 1U : end;
+        if (at(self, i)->kind == SERIAL_STOPS && at(self, i)->state == SERIAL_WAITING) {
+            end = i + 1U;
+        }
     }
     return end;
 }
@@ -154,7 +158,9 @@ serial_request_t *serial_queue_next(serial_queue_t *self, bool stops_only, uint6
 }
 
 void serial_queue_sent(serial_request_t *request, uint64_t now_us) {
-    request->sent_us = (request->state == SERIAL_SENT) ? request->sent_us : now_us;
+    if (request->state != SERIAL_SENT) {
+        request->sent_us = now_us;
+    }
     request->tried_us = now_us;
     request->state = SERIAL_SENT;
 }

@@ -124,8 +124,10 @@ static void read_port(relay_t *self) {
 static void tend_link(relay_t *self) {
     char words[sizeof self->trouble];
     const bool fell_silent = serial_link_fell_silent(&self->link, self->now_us);
-    self->explained_us = fell_silent ? 0U : self->explained_us;
-    if (!self->link.linked && self->now_us >= self->explained_us) {
+    if (fell_silent) {
+        self->explained_us = 0;
+    }
+    if (self->link.state == SERIAL_SILENT && self->now_us >= self->explained_us) {
         self->explained_us = self->now_us + EXPLAIN_AGAIN_US;
         serial_link_explain(&self->link, self->settings->board.port, self->settings->board.baud, words, sizeof words);
         set_trouble(self, words);
@@ -153,9 +155,10 @@ static void write_port(relay_t *self) {
             return;
         }
         const uint64_t begin_us = (self->free_us > self->now_us) ? self->free_us : self->now_us;
-        self->free_us =
-            (count > 0) ? begin_us + (uint64_t)count * 10000000U / self->settings->board.baud : self->free_us;
-        self->said_us = (count > 0) ? self->now_us : self->said_us;
+        if (count > 0) {
+            self->free_us = begin_us + (uint64_t)count * 10000000U / self->settings->board.baud;
+            self->said_us = self->now_us;
+        }
         self->out_sent += (size_t)count;
         if (self->out_sent < self->out_length) {
             break; // Full: its next room wakes us.
@@ -217,7 +220,7 @@ static uint64_t next_us(const relay_t *self) {
         return earlier(then_us, self->retry_us);
     }
     then_us = earlier(then_us, relay_channels_next_us(self));
-    if (!self->link.linked) {
+    if (self->link.state == SERIAL_SILENT) {
         return earlier(then_us, earlier(self->asked_us + RELAY_ASK_US, self->explained_us));
     }
     const bool waits = self->out_length == 0U && self->free_us > self->now_us + AHEAD_US;
@@ -318,10 +321,14 @@ static int open_sockets(relay_t *self) {
                                          settings->northbound.watch_group, settings->northbound.watch_mode};
     gw_listener_t *listener = self->clients.listener;
     int result = gw_listener_prepare(&listener[GW_DRIVE], &drive, stderr);
-    result = (result != 0) ? result : gw_listener_open(&listener[GW_DRIVE], &self->log, stderr);
+    if (result == 0) {
+        result = gw_listener_open(&listener[GW_DRIVE], &self->log, stderr);
+    }
     if (result == 0 && strcmp(watching.path, "none") != 0) {
         result = gw_listener_prepare(&listener[GW_WATCH], &watching, stderr);
-        result = (result != 0) ? result : gw_listener_open(&listener[GW_WATCH], &self->log, stderr);
+        if (result == 0) {
+            result = gw_listener_open(&listener[GW_WATCH], &self->log, stderr);
+        }
     }
     return result;
 }
@@ -357,7 +364,9 @@ static int open_all(relay_t *self) {
 int relay_run(relay_t *self, const serial_settings_t *settings) {
     compose(self, settings);
     int result = open_sockets(self);
-    result = (result != 0) ? result : open_all(self);
+    if (result == 0) {
+        result = open_all(self);
+    }
     if (result == 0 && !bridge_reach_is_local("iwheel-serial", NULL, 0)) {
         result = EX_UNAVAILABLE;
     }

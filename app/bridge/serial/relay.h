@@ -40,14 +40,19 @@
 /// A port that takes nothing for so long is opened anew.
 #define RELAY_STUCK_US 1000000U
 
+/// A channel:
+///
+///     FREE --a client--> NEW --open is sent--> OPENING --hello--> WELCOMED: requests are sent
+///       ^------------ client or board gone, no hello -----------------'
+typedef enum { RELAY_FREE, RELAY_NEW, RELAY_OPENING, RELAY_WELCOMED } relay_channel_state_t;
+
 /// A client on the line.
 typedef struct {
-    iw_client_t client; ///< IW_CLIENT_NONE: nobody.
+    relay_channel_state_t state;
+    iw_client_t client; ///< FREE: IW_CLIENT_NONE.
     bool watch;
-    bool welcomed;  ///< Its hello has come: requests may go.
-    bool tell_open; ///< To be said to the board.
-    bool tell_close;
-    bool granted;        ///< It has asked for a lease: commands may follow.
+    bool close_due;      ///< To be sent for the client before, in any state: the next one may be there already.
+    bool granted;        ///< It has asked for a lease, in any state: commands may follow.
     uint64_t since_us;   ///< It came then.
     uint64_t opened_us;  ///< The last open was said then.
     uint64_t arm_number; ///< Of its last arm,

@@ -50,12 +50,6 @@ static void take_answer(void *context, const iwc_message_t *reply) {
     web_call_resume(self);
 }
 
-/// First: the answer may be there at once.
-static void suspend(web_call_t *self) {
-    self->suspended = true;
-    MHD_suspend_connection(self->connection);
-}
-
 /// Ends the wait of a suspended call, if the gateway could not be asked.
 static enum MHD_Result went_out(web_call_t *self, bool asked) {
     static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"";
@@ -69,7 +63,7 @@ static enum MHD_Result went_out(web_call_t *self, bool asked) {
 }
 
 static enum MHD_Result ask(web_call_t *self, const char *request) {
-    suspend(self);
+    web_call_suspend(self); // First: the answer may be there immediately.
     return went_out(self,
                     bridge_link_ask(&self->server->link.gateway, request, take_answer, self, self->server->now_us));
 }
@@ -140,7 +134,7 @@ static enum MHD_Result ask_arm(web_call_t *self) {
     if (result == BRIDGE_LEASE_BUSY) {
         return web_call_refuse(self, 409, "busy", "another page is asking for the lease; try again");
     }
-    suspend(self);
+    web_call_suspend(self); // First: the answer may be there immediately.
     return went_out(self, result == BRIDGE_LEASE_OK);
 }
 
@@ -164,7 +158,7 @@ static enum MHD_Result ask_drive(web_call_t *self) {
     }
     (void)snprintf(request, sizeof request, "{\"cmd\":\"twist\",\"v_mm_s\":%d,\"yaw_mrad_s\":%d}", (int)twist.v_mm_s,
                    (int)twist.yaw_mrad_s);
-    suspend(self);
+    web_call_suspend(self); // First: the answer may be there immediately.
     return went_out(self, bridge_lease_drive(&server->link.lease, key, request, (bridge_asker_t){take_answer, self},
                                              server->now_us) == BRIDGE_LEASE_OK);
 }

@@ -19,9 +19,14 @@ const char *web_call_argument(const web_call_t *self, const char *name) {
     return MHD_lookup_connection_value(self->connection, MHD_GET_ARGUMENT_KIND, name);
 }
 
+void web_call_suspend(web_call_t *self) {
+    self->state = WEB_CALL_SUSPENDED;
+    MHD_suspend_connection(self->connection);
+}
+
 void web_call_resume(web_call_t *self) {
-    if (self->suspended) {
-        self->suspended = false;
+    if (self->state == WEB_CALL_SUSPENDED) {
+        self->state = WEB_CALL_ANSWERING;
         MHD_resume_connection(self->connection);
     }
 }
@@ -121,7 +126,7 @@ static enum MHD_Result send_health(web_call_t *self) {
         text, sizeof text,
         "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
         "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s}\n",
-        good ? "true" : "false", server->link.gateway.is_here ? "connected" : "away",
+        good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
         settings->drive.enabled ? "true" : "false",
         (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false", settings->drive.max_speed_mm_s,
         settings->drive.ttl_ms, settings->gateway.rate_hz, web_settings_has_fleet(settings) ? "true" : "false");
@@ -191,8 +196,7 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
         taken = sizeof pulse;
     }
     if (taken == 0U) {
-        self->suspended = true;
-        MHD_suspend_connection(self->connection);
+        web_call_suspend(self);
         return 0;
     }
     self->told_us = server->now_us;
@@ -213,6 +217,7 @@ static enum MHD_Result send_events(web_call_t *self) {
 }
 
 static enum MHD_Result carry_out(web_call_t *self) {
+    self->state = WEB_CALL_ANSWERING;
     self->status = 200;
     switch (self->verdict.route->verb) {
     case WEB_FILE:
@@ -288,9 +293,11 @@ static void begin(web_call_t *self, const char *url, const char *method) {
         has_body(self->connection),
         is_doubled(self->connection)};
     self->verdict = web_judge(&rules, &asked);
-    self->begun = true;
+    self->state = WEB_CALL_JUDGED;
     if (peer != NULL) {
-        peer->asking = true;
+        if (peer->state == WEB_PEER_IDLE) {
+            peer->state = WEB_PEER_ASKING;
+        }
         peer->known = peer->known || asked.proof == WEB_PROOF_READ || asked.proof == WEB_PROOF_FULL;
     }
 }
@@ -317,7 +324,7 @@ enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection
     if (self == NULL) {
         return MHD_NO;
     }
-    if (!self->begun) {
+    if (self->state == WEB_CALL_NEW) {
         begin(self, url, method);
         // A body is not awaited; all else is answered when the library asks again.
         return (self->verdict.status != 413U && self->verdict.status != 400U)
@@ -336,7 +343,7 @@ enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection
     if (self->verdict.status != 200U) {
         return web_call_refuse(self, self->verdict.status, self->verdict.error, self->verdict.message);
     }
-    return (self->status == 0U) ? carry_out(self) : MHD_NO;
+    return (self->state == WEB_CALL_JUDGED) ? carry_out(self) : MHD_NO;
 }
 
 void web_call_completed(void *context, struct MHD_Connection *connection, void **place,
@@ -346,7 +353,9 @@ void web_call_completed(void *context, struct MHD_Connection *connection, void *
     web_peer_t *peer = peer_of(connection);
     (void)why;
     if (peer != NULL) {
-        peer->asking = false;
+        if (peer->state == WEB_PEER_ASKING) {
+            peer->state = WEB_PEER_IDLE;
+        }
         peer->since_us = server->now_us;
     }
     if (self == NULL) {

@@ -119,7 +119,7 @@ void web_link_close(web_link_t *self) {
 int web_link_step(web_link_t *self, uint64_t now_us) {
     const int code = bridge_link_step(&self->gateway, now_us);
     bridge_lease_step(&self->lease, now_us);
-    if (self->gateway.is_here && self->why_us != 0U && now_us >= self->why_us) {
+    if (self->gateway.state == BRIDGE_LINK_HERE && self->why_us != 0U && now_us >= self->why_us) {
         const bool asked = bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = asked ? 0U : now_us + WHY_AGAIN_US;
     }
@@ -132,12 +132,12 @@ uint64_t web_link_next_us(const web_link_t *self, uint64_t now_us) {
     if (lease_us < next_us) {
         next_us = lease_us;
     }
-    const bool asks = self->gateway.is_here && self->why_us != 0U && self->why_us < next_us;
+    const bool asks = self->gateway.state == BRIDGE_LINK_HERE && self->why_us != 0U && self->why_us < next_us;
     return asks ? self->why_us : next_us;
 }
 
 bool web_link_state(const web_link_t *self, uint64_t now_us, iwc_message_t *out_state) {
-    if (!self->gateway.is_here || self->state == NULL || now_us - self->state_us > STALE_US) {
+    if (self->gateway.state != BRIDGE_LINK_HERE || self->state == NULL || now_us - self->state_us > STALE_US) {
         return false;
     }
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};

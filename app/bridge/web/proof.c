@@ -59,7 +59,9 @@ static web_session_t *find_place(web_proofs_t *self, uint64_t now_us) {
         if (one->id[0] == '\0') {
             return one;
         }
-        oldest = (one->used_us < oldest->used_us) ? one : oldest;
+        if (one->used_us < oldest->used_us) {
+            oldest = one;
+        }
     }
     return (now_us - oldest->used_us > (uint64_t)2 * WEB_NONCE_US) ? oldest : NULL;
 }

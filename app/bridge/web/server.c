@@ -234,14 +234,14 @@ void web_server_close(web_server_t *self) {
 // ---- who is let in, and who makes room ------------------------------------------------------------------------------
 
 static void show_out(web_peer_t *peer) {
-    peer->leaving = true;
+    peer->state = WEB_PEER_LEAVING;
     (void)shutdown(peer->fd, SHUT_RDWR);
 }
 
 /// Half a request, or none, holds a connection no longer than this.
 static void close_idle_peers(const web_server_t *self) {
     for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
-        if (!peer->asking && self->now_us - peer->since_us > WEB_HEADER_US) {
+        if (peer->state == WEB_PEER_IDLE && self->now_us - peer->since_us > WEB_HEADER_US) {
             show_out(peer);
         }
     }
@@ -265,9 +265,9 @@ static web_peer_t *who_makes_room(const web_server_t *self) {
         if (peer->since_us == self->now_us) {
             continue; // Let in since the library's last round: what it asks was not read yet.
         }
-        if (!peer->leaving && !peer->known) {
+        if (peer->state != WEB_PEER_LEAVING && !peer->known) {
             stranger = peer;
-        } else if (!peer->leaving && !peer->asking) {
+        } else if (peer->state == WEB_PEER_IDLE) {
             idle = peer;
         }
     }
@@ -277,7 +277,7 @@ static web_peer_t *who_makes_room(const web_server_t *self) {
 static unsigned count_peers(const web_server_t *self) {
     unsigned count = 0;
     for (const web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
-        count += peer->leaving ? 0U : 1U;
+        count += (peer->state == WEB_PEER_LEAVING) ? 0U : 1U;
     }
     return count;
 }

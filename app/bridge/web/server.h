@@ -22,27 +22,33 @@
 #define WEB_PULSE_US 1000000U
 #define WEB_FILES    16U
 
+/// IDLE --complete request--> ASKING --answered--> IDLE; IDLE, ASKING --shut down--> LEAVING: the library forgets it in its next round.
+typedef enum { WEB_PEER_IDLE, WEB_PEER_ASKING, WEB_PEER_LEAVING } web_peer_state_t;
+
 /// A connection.
 typedef struct web_peer {
     int fd;
-    bool asking;  ///< In the middle of a complete request.
-    bool known;   ///< Has proved that it has the token, or the secret for reading.
-    bool leaving; ///< Shut down: the library forgets it in its next round.
+    web_peer_state_t state;
+    bool known; ///< Has proved that it has the token, or the secret for reading: for all its requests.
     uint64_t since_us;
     struct web_peer *next;
 } web_peer_t;
 
 typedef struct web_server web_server_t;
 
+///     NEW --judged--> JUDGED --carried out--> ANSWERING <--suspend, resume--> SUSPENDED
+///
+/// SUSPENDED: the library asks again only after the resume: an answer of the gateway or an event is awaited.
+typedef enum { WEB_CALL_NEW, WEB_CALL_JUDGED, WEB_CALL_ANSWERING, WEB_CALL_SUSPENDED } web_call_state_t;
+
 /// A request.
 typedef struct web_call {
+    web_call_state_t state;
     web_server_t *server;
     struct MHD_Connection *connection;
     char target[WEB_TARGET_SIZE]; ///< As it was sent; empty: longer.
-    bool begun;                   ///< It was judged.
     uint64_t session;             ///< Number of the session that proved the token; 0: none.
     web_verdict_t verdict;
-    bool suspended;
     char *reply; ///< What it is answered, once it is known.
     size_t length;
     unsigned status;
@@ -111,7 +117,8 @@ enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection
 void web_call_completed(void *context, struct MHD_Connection *connection, void **place,
                         enum MHD_RequestTerminationCode why);
 
-/// Lets a suspended call go on.
+/// Lets a call wait. Lets a suspended one go on.
+void web_call_suspend(web_call_t *self);
 void web_call_resume(web_call_t *self);
 
 #endif

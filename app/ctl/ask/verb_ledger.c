@@ -23,12 +23,14 @@ static void explain(const char *name, json_t *entry) {
         return;
     }
     for (int state = 0; state <= (int)IW_LEDGER_CONTRADICTED; state++) {
-        const bool is_it = strcmp(text_word(entry, "state"), iwn_ledger_state_name((iw_ledger_state_t)state)) == 0;
-        known.state = is_it ? (iw_ledger_state_t)state : known.state;
+        if (strcmp(text_word(entry, "state"), iwn_ledger_state_name((iw_ledger_state_t)state)) == 0) {
+            known.state = (iw_ledger_state_t)state;
+        }
     }
     for (int evidence = 0; evidence <= (int)IW_EVIDENCE_OPERATOR; evidence++) {
-        const bool is_it = strcmp(text_word(entry, "evidence"), iwn_evidence_name((iw_evidence_t)evidence)) == 0;
-        known.evidence = is_it ? (iw_evidence_t)evidence : known.evidence;
+        if (strcmp(text_word(entry, "evidence"), iwn_evidence_name((iw_evidence_t)evidence)) == 0) {
+            known.evidence = (iw_evidence_t)evidence;
+        }
     }
     gw_assumption_evidence(item, &known, &(gw_word_t){"", ""}, text);
     if (known.evidence == IW_EVIDENCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
@@ -136,8 +138,10 @@ static void suggest(const char *item) {
     for (unsigned i = 0; i < (unsigned)IW_LEDGER_ITEMS; i++) {
         const char *name = iwn_ledger_item_name((iw_ledger_item_t)i);
         const size_t far = gw_word_distance(item, name);
-        best = (far < best_distance) ? name : best;
-        best_distance = (far < best_distance) ? far : best_distance;
+        if (far < best_distance) {
+            best = name;
+            best_distance = far;
+        }
     }
     if (best != NULL && strcmp(item, best) != 0) {
         (void)ctl_fail(CTL_NO, "did you mean %s?", best);

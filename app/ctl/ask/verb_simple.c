@@ -33,7 +33,9 @@ static void tell_state(const ctl_t *self, const json_t *reply) {
         const char *state = text_word(reply, "state");
         const char *text = state;
         for (size_t i = 0; i < sizeof meanings / sizeof meanings[0]; i++) {
-            text = (strcmp(meanings[i].state, state) == 0) ? meanings[i].meaning : text;
+            if (strcmp(meanings[i].state, state) == 0) {
+                text = meanings[i].meaning;
+            }
         }
         print_line(text);
     }

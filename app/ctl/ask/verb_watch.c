@@ -153,7 +153,9 @@ static int pump(ctl_t *self) {
         const bool event = json_object_get(line, "event") != NULL;
         json_decref(line);
         output = event ? write_lost(&self->client) : await_output(&self->client, false);
-        output = (event && output == OUTPUT_OPEN) ? write_line(&self->client) : output;
+        if (event && output == OUTPUT_OPEN) {
+            output = write_line(&self->client);
+        }
     }
     return (output == OUTPUT_BROKEN) ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno))
                                      : CTL_OK;

@@ -120,9 +120,6 @@ void trial_close(bringup_t *self);
 json_t *trial_status(bringup_t *self);
 /// Waits until both wheels are heard and stand, and no e-stop is pressed. False after telling.
 bool trial_wait_ready(bringup_t *self);
-
-/// Arms, drives, stops and waits until both stand. Any key stops at once.
-void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 /// The same, told to the operator before and after, and offered again when it went wrong. False: it was not done, and the
 /// operator wants no more of it.
 bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);

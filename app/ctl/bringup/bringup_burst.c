@@ -92,7 +92,9 @@ static void take_speeds(run_t *run, const json_t *state, int64_t now_us) {
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         int *peak = &run->outcome->peak_mm_s[side];
-        *peak = (abs(speed[side]) > abs(*peak)) ? speed[side] : *peak;
+        if (abs(speed[side]) > abs(*peak)) {
+            *peak = speed[side];
+        }
         run->sum_mm_s[side] += late ? speed[side] : 0;
     }
     run->enough = run->enough || is_enough(run->burst, run->outcome);
@@ -163,7 +165,9 @@ static bool ran_away(run_t *run, const json_t *why) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         int *peak = &run->outcome->peak_mm_s[side];
         const bool told = strcmp(side_word, text_side(side)) == 0 || strcmp(side_word, "both") == 0;
-        *peak = (told && abs(measured) > abs(*peak)) ? measured : *peak;
+        if (told && abs(measured) > abs(*peak)) {
+            *peak = measured;
+        }
     }
     run->enough = true;
     return true;
@@ -230,7 +234,8 @@ static json_t *arm(bringup_t *self) {
     return armed;
 }
 
-void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+/// Arms, drives, stops and waits until both are at standstill. Any key stops immediately.
+static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     run_t run = {.bringup = self, .burst = burst, .outcome = out_outcome};
     memset(out_outcome, 0, sizeof(*out_outcome));
     if (!trial_wait_ready(self)) {

@@ -49,8 +49,12 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
         if (json_is_integer(raw)) {
             const long long value = json_integer_value(raw);
             sum += (double)value;
-            force.low = (value < force.low) ? value : force.low;
-            force.high = (value > force.high) ? value : force.high;
+            if (value < force.low) {
+                force.low = value;
+            }
+            if (value > force.high) {
+                force.high = value;
+            }
             count++;
         }
         json_decref(status);

@@ -52,7 +52,9 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
 
 static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
     bool *invert = &self->config.core.invert[side];
-    *invert = forward ? *invert : !*invert;
+    if (!forward) {
+        *invert = !*invert;
+    }
     bringup_note(self, text_side(side), "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
                  "somebody saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
                  (forward ? *invert : !*invert) ? "yes" : "no");

@@ -154,7 +154,9 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
     for (unsigned rank = 0; rank < 4U; rank++) {
         unsigned best = 0;
         for (unsigned type = 1; type < TYPES; type++) {
-            best = (left[type] > left[best]) ? type : best;
+            if (left[type] > left[best]) {
+                best = type;
+            }
         }
         if (left[best] == 0U) {
             break;

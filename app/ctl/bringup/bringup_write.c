@@ -22,7 +22,9 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
         return;
     }
     bringup_note_t *note = &self->note[at];
-    self->notes = (at == self->notes) ? at + 1U : self->notes;
+    if (at == self->notes) {
+        self->notes = at + 1U;
+    }
     note->section = section;
     note->key = key;
     note->item = item;

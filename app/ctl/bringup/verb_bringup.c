@@ -108,7 +108,9 @@ int verb_bringup(ctl_t *self, int count, char **words) {
     words_t parsed;
     bringup.ctl = self;
     int code = parse_words(count, words, &parsed);
-    code = (code == CTL_OK) ? configure(&bringup, &parsed) : code;
+    if (code == CTL_OK) {
+        code = configure(&bringup, &parsed);
+    }
     if (code == CTL_OK) {
         signals_catch();
         for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {

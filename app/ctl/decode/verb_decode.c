@@ -150,7 +150,9 @@ int verb_decode(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && decode.csv && self->json) {
         return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");
     }
-    code = (code == CTL_OK) ? recording_open(&decode.recording, NULL, decode.path) : code;
+    if (code == CTL_OK) {
+        code = recording_open(&decode.recording, NULL, decode.path);
+    }
     if (code != CTL_OK) {
         return code;
     }

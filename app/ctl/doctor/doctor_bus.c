@@ -155,8 +155,12 @@ static void hear_gateway(doctor_t *self) {
     for (unsigned i = IW_BUS_OFF; i <= (unsigned)IW_BUS_PASSIVE; i++) {
         const iw_bus_state_t state = (iw_bus_state_t)i;
         if (strcmp(name, iwn_bus_state_name(state)) == 0) {
-            self->heard.worst = (state < self->heard.worst) ? state : self->heard.worst;
-            self->heard.last = (state < self->heard.last) ? state : self->heard.last;
+            if (state < self->heard.worst) {
+                self->heard.worst = state;
+            }
+            if (state < self->heard.last) {
+                self->heard.last = state;
+            }
         }
     }
     json_decref(status);

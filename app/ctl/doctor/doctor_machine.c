@@ -117,7 +117,9 @@ static int64_t worst_lateness_us(void) {
         const int64_t begin_us = client_now_us();
         (void)nanosleep(&nap, NULL);
         const int64_t late_us = client_now_us() - begin_us - NAP_NS / 1000;
-        worst_us = (late_us > worst_us) ? late_us : worst_us;
+        if (late_us > worst_us) {
+            worst_us = late_us;
+        }
     }
     return worst_us;
 }

@@ -238,7 +238,9 @@ int verb_doctor(ctl_t *self, int count, char **words) {
     int code = parse_words(count, words, &parsed);
     doctor = (doctor_t){.ctl = self, .listen_ms = (unsigned)(parsed.listen_us / 1000)};
     const doctor_named_t bus = {"IFACE", parsed.bus};
-    code = (code == CTL_OK) ? doctor_configure(&doctor.config, parsed.config, &bus, parsed.estop) : code;
+    if (code == CTL_OK) {
+        code = doctor_configure(&doctor.config, parsed.config, &bus, parsed.estop);
+    }
     if (code != CTL_OK) {
         return code;
     }

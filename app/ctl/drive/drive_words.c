@@ -24,7 +24,9 @@ static bool parse_for(const char *text, drive_words_t *drive, char *out_why) {
     static const duration_range_t range = {DRIVE_TIME_MIN_MS * INT64_C(1000), DRIVE_TIME_MAX_MS * INT64_C(1000)};
     int64_t us = 0;
     const bool good = duration_option("--for", text, range, &us, out_why);
-    drive->time_ms = good ? (int)(us / 1000) : drive->time_ms;
+    if (good) {
+        drive->time_ms = (int)(us / 1000);
+    }
     return good;
 }
 

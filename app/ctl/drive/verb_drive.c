@@ -311,7 +311,9 @@ static int finish(drive_t *self, end_t end) {
     }
     int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
     json_decref(reply);
-    code = (code == CTL_OK) ? wait_for_rest(self) : code;
+    if (code == CTL_OK) {
+        code = wait_for_rest(self);
+    }
     return (code == CTL_OK) ? judge(self, end, stop_us) : code;
 }
 
@@ -342,7 +344,9 @@ static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) 
         json_decref(*out_reply);
         *out_reply = NULL;
         code = wait_a_moment(self);
-        code = (code == CTL_OK) ? ctl_exchange(self->ctl, json_incref(request), out_reply) : code;
+        if (code == CTL_OK) {
+            code = ctl_exchange(self->ctl, json_incref(request), out_reply);
+        }
     }
     json_decref(request);
     return (code == CTL_OK) ? ctl_accept(self->ctl, out_reply) : code;

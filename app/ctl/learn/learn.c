@@ -29,8 +29,12 @@ static const uint32_t ids[LEARN_IDS] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOIN
 static const learn_range_t nothing = {INT32_MAX, INT32_MIN};
 
 static void widen(learn_range_t *range, int32_t value) {
-    range->low = (value < range->low) ? value : range->low;
-    range->high = (value > range->high) ? value : range->high;
+    if (value < range->low) {
+        range->low = value;
+    }
+    if (value > range->high) {
+        range->high = value;
+    }
 }
 
 static int32_t size_of(int32_t value) {
@@ -64,7 +68,9 @@ static void note_period(learn_period_t *period, int64_t at_us) {
         const int64_t ms = (gap_us + 500) / 1000;
         period->histogram[(ms < (int64_t)LEARN_PERIOD_MAX_MS) ? (size_t)ms : LEARN_PERIOD_MAX_MS]++;
         period->counted++;
-        period->longest_us = (gap_us > period->longest_us) ? gap_us : period->longest_us;
+        if (gap_us > period->longest_us) {
+            period->longest_us = gap_us;
+        }
     }
     period->last_us = at_us;
 }
@@ -294,7 +300,9 @@ static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t 
 void learn_frame(learn_t *self, const candump_t *frame) {
     iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t core = candump_to_core(frame);
-    self->first_us = (self->frames == 0U) ? frame->time_us : self->first_us;
+    if (self->frames == 0U) {
+        self->first_us = frame->time_us;
+    }
     self->backwards += (self->frames > 0U && frame->time_us < self->last_us) ? 1U : 0U;
     self->last_us = frame->time_us;
     self->frames++;
@@ -308,7 +316,9 @@ void learn_frame(learn_t *self, const candump_t *frame) {
     learn_id_t *id = (known < LEARN_IDS) ? &self->known[known] : NULL;
     self->strange += (kind == IW_CODEC_BAD_FORMAT) ? 1U : 0U;
     self->too_short += (kind == IW_CODEC_BAD_LENGTH) ? 1U : 0U;
-    id = (kind == IW_CODEC_UNKNOWN) ? find_other(self, frame) : id;
+    if (kind == IW_CODEC_UNKNOWN) {
+        id = find_other(self, frame);
+    }
     if (id != NULL) {
         note_id(id, frame);
     }

@@ -54,7 +54,9 @@ static void compare(learn_drives_t *self, int64_t now_us) {
     drive->judged_us += now_us - self->last_us;
     self->judged_us += now_us - self->last_us;
     drive->deviation_mm = (uint32_t)self->pair.largest_um / 1000U;
-    self->largest_mm = (drive->deviation_mm > self->largest_mm) ? drive->deviation_mm : self->largest_mm;
+    if (drive->deviation_mm > self->largest_mm) {
+        self->largest_mm = drive->deviation_mm;
+    }
 }
 
 /// A setpoint means the same in the machine's frame, as measured speeds do.

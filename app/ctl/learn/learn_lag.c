@@ -34,8 +34,12 @@ static void forget(learn_lag_t *self) {
 }
 
 static void take(learn_lag_t *self, double lag_ms) {
-    self->least_ms = (self->count == 0U || lag_ms < self->least_ms) ? lag_ms : self->least_ms;
-    self->most_ms = (self->count == 0U || lag_ms > self->most_ms) ? lag_ms : self->most_ms;
+    if (self->count == 0U || lag_ms < self->least_ms) {
+        self->least_ms = lag_ms;
+    }
+    if (self->count == 0U || lag_ms > self->most_ms) {
+        self->most_ms = lag_ms;
+    }
     self->sum_ms += lag_ms;
     self->count++;
 }

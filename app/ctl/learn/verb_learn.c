@@ -337,8 +337,12 @@ int verb_learn(ctl_t *self, int count, char **words) {
         code = ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
     }
     recording.even = true;
-    code = (code == CTL_OK) ? recording_open(&recording, NULL, path) : code;
-    code = (code == CTL_OK) ? read_all(&study, &recording) : code;
+    if (code == CTL_OK) {
+        code = recording_open(&recording, NULL, path);
+    }
+    if (code == CTL_OK) {
+        code = read_all(&study, &recording);
+    }
     if (code != CTL_OK || recording.refused) {
         return code;
     }

@@ -104,7 +104,9 @@ static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
     whole.time_us = at_us + self->wall_minus_us;
     (void)snprintf(whole.interface, sizeof whole.interface, "%s", self->interface);
     const size_t length = candump_write(&whole, line);
-    self->first_us = (self->frames == 0U) ? at_us : self->first_us;
+    if (self->frames == 0U) {
+        self->first_us = at_us;
+    }
     self->last_us = at_us;
     self->frames++;
     return fwrite(line, 1, length, self->file) == length;
@@ -327,7 +329,9 @@ int verb_record(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && json && parsed.path != NULL && strcmp(parsed.path, "-") == 0) {
         return ctl_fail(CTL_USAGE, "record writes the recording or --json to standard output, not both; name a FILE");
     }
-    code = (code == CTL_OK) ? open_file(&recorder, parsed.path) : code;
+    if (code == CTL_OK) {
+        code = open_file(&recorder, parsed.path);
+    }
     if (code != CTL_OK) {
         return code;
     }

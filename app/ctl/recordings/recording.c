@@ -217,7 +217,9 @@ static int64_t judge_jump(recording_t *self, int64_t stamp_us) {
     if (!wrong && jump_us >= 0 && jump_us <= PAUSE_MAX_US) {
         return stamp_us + self->shift_us;
     }
-    self->first_step = (self->steps + self->wrong_stamps == 0U) ? line : self->first_step;
+    if (self->steps + self->wrong_stamps == 0U) {
+        self->first_step = line;
+    }
     self->steps += wrong ? 0U : 1U;
     self->wrong_stamps += wrong ? 1U : 0U;
     self->shift_us -= wrong ? 0 : jump_us;

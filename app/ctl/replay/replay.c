@@ -155,7 +155,9 @@ static void echo_what_was_sent(replay_t *self) {
 }
 
 void replay_step(replay_t *self, iw_time_us_t at_us) {
-    self->now_us = (at_us > self->now_us) ? at_us : self->now_us;
+    if (at_us > self->now_us) {
+        self->now_us = at_us;
+    }
     self->next_us = iw_gateway_step(&self->gateway, self->now_us);
     self->frames = 0;
     self->received = 0;
@@ -316,10 +318,12 @@ static iw_time_us_t ramp_us(const iw_config_t *config, const blackbox_drive_t *d
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int64_t speed =
             (drive->speed_mm_s[side] < 0) ? -(int64_t)drive->speed_mm_s[side] : drive->speed_mm_s[side];
-        fastest = (speed > fastest) ? speed : fastest;
+        if (speed > fastest) {
+            fastest = speed;
+        }
     }
-    fastest = (fastest > config->max_speed_mm_s) ? config->max_speed_mm_s : fastest;
-    return (iw_time_us_t)fastest * 1000000U / config->accel_mm_s2;
+    const int64_t commanded = (fastest > config->max_speed_mm_s) ? config->max_speed_mm_s : fastest;
+    return (iw_time_us_t)commanded * 1000000U / config->accel_mm_s2;
 }
 
 static void keep_driving(replay_t *self, const blackbox_entry_t *state, iw_time_us_t at_us) {

@@ -280,7 +280,9 @@ int verb_replay(ctl_t *self, int count, char **words) {
         return code;
     }
     code = find_config(&replay);
-    code = (code == CTL_OK) ? find_events(&replay) : code;
+    if (code == CTL_OK) {
+        code = find_events(&replay);
+    }
     if (code != CTL_OK) {
         return code;
     }

@@ -248,7 +248,9 @@ json_t *near_ask(ctl_t *ctl, json_t *request) {
 void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway) {
     memset(out_gateway, 0, sizeof(*out_gateway));
     near_t result = choose(ctl, bus, out_gateway->path, sizeof out_gateway->path);
-    result = (result == NEAR_FOUND) ? look_at(ctl, out_gateway->path) : result;
+    if (result == NEAR_FOUND) {
+        result = look_at(ctl, out_gateway->path);
+    }
     if (result == NEAR_FOUND) {
         out_gateway->status = near_ask(ctl, json_pack("{s:s}", "cmd", "status"));
         result = (out_gateway->status != NULL) ? NEAR_FOUND : NEAR_MUTE;

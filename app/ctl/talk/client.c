@@ -35,7 +35,9 @@ iwc_result_t client_open(client_t *self, const char *path, int64_t deadline_us) 
     while (result == IWC_INTERRUPTED && signals_count() == self->seen_signals) {
         result = iwc_connect(self->gateway, path, left_ms(deadline_us));
     }
-    result = (result == IWC_NEWER) ? IWC_OK : result;
+    if (result == IWC_NEWER) {
+        result = IWC_OK;
+    }
     self->open = result == IWC_OK;
     return result;
 }

@@ -46,7 +46,8 @@ bool duration_parse(const char *text, int64_t *out_us) {
     return false;
 }
 
-void duration_write(int64_t us, char *out_text, size_t size) {
+/// In the largest unit in which it is a whole number.
+static void duration_write(int64_t us, char *out_text, size_t size) {
     size_t i = 0;
     while (i < UNITS - 1U && us % units[i].us != 0) {
         i++;

@@ -22,9 +22,6 @@ typedef struct {
 /// False, with `*out_us` untouched, if the text is no duration. Never more than some 114 years.
 bool duration_parse(const char *text, int64_t *out_us);
 
-/// In the largest unit in which it is a whole number.
-void duration_write(int64_t us, char *out_text, size_t size);
-
 /// The value of `option` (`text` may be null: there is none). False, with `*out_us` untouched and what is wrong and what to
 /// write in `out_why`, if it is none or out of range: `2` is refused with `write: --listen 2s`.
 bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us,

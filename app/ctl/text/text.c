@@ -128,13 +128,12 @@ const char *text_side(unsigned side) {
 }
 
 size_t text_cut(const char *text, size_t room) {
-    size_t cut = strlen(text);
-    if (cut > room) {
-        for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
-        }
-        cut = (cut == 0) ? room : cut;
+    const size_t length = strlen(text);
+    size_t cut = room;
+    while (cut > 0 && length > room && text[cut] != ' ') {
+        cut--;
     }
-    return cut;
+    return (length <= room) ? length : (cut == 0) ? room : cut;
 }
 
 void text_when(json_int_t wall_us, char out[TEXT_CELL]) {

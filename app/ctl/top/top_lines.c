@@ -27,7 +27,9 @@ int top_scale(int before_mm_s, const json_t *state) {
     for (unsigned i = 0; i < 6U; i++) {
         const json_t *value = get(get(state, (i < 3U) ? "left" : "right"), fields[i % 3U]);
         const int speed = json_is_integer(value) ? abs((int)json_integer_value(value)) : 0;
-        largest = (speed > largest) ? speed : largest;
+        if (speed > largest) {
+            largest = speed;
+        }
     }
     for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
         if (largest <= steps[i]) {
@@ -48,8 +50,8 @@ static void draw_bar(const top_model_t *model, int row, top_tone_t tone, const j
         return;
     }
     const long long speed = json_is_integer(value) ? json_integer_value(value) : 0;
-    long long length = (llabs(speed) * half + model->scale_mm_s / 2) / model->scale_mm_s;
-    length = (length > half) ? half : length;
+    const long long whole = (llabs(speed) * half + model->scale_mm_s / 2) / model->scale_mm_s;
+    const long long length = (whole > half) ? half : whole;
     for (int i = 1; i <= half; i++) {
         const bool left = speed < 0 && i <= length;
         const bool right = speed > 0 && i <= length;
@@ -180,7 +182,9 @@ static void draw_gaps(const top_model_t *model, int row) {
         (void)snprintf(worst, sizeof worst, "--");
     }
     json_array_foreach(counts, i, entry) {
-        largest = (json_integer_value(entry) > largest) ? json_integer_value(entry) : largest;
+        if (json_integer_value(entry) > largest) {
+            largest = json_integer_value(entry);
+        }
     }
     top_put(model, row, 1, TOP_PLAIN, "GAPS");
     json_array_foreach(counts, i, entry) {

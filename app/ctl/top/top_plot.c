@@ -66,7 +66,9 @@ static int32_t limit_of(const int32_t (*pair)[TOP_HISTORY], int32_t least, bool 
     for (int i = 0; i < 2 * TOP_HISTORY; i++) {
         const int32_t value = pair[i / TOP_HISTORY][i % TOP_HISTORY];
         const int64_t size = (value == UNKNOWN) ? 0 : llabs((long long)value);
-        largest = (size > largest) ? size : largest;
+        if (size > largest) {
+            largest = size;
+        }
         *out_negative = *out_negative || (value != UNKNOWN && value < -least / 20);
     }
     int64_t limit = least;
@@ -97,8 +99,12 @@ static bool reach(const plot_t *plot, int64_t slot, int x, int *out_top, int *ou
         const int32_t value = plot->values[(slot + 1 + i) % TOP_HISTORY];
         if (value != UNKNOWN) {
             const int row = dot_row(plot, value);
-            *out_top = (row < *out_top) ? row : *out_top;
-            *out_bottom = (row > *out_bottom) ? row : *out_bottom;
+            if (row < *out_top) {
+                *out_top = row;
+            }
+            if (row > *out_bottom) {
+                *out_bottom = row;
+            }
         }
     }
     return *out_bottom >= 0;

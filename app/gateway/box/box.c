@@ -68,7 +68,9 @@ gw_child_news_t gw_box_take(gw_box_t *self) {
     if (news == GW_CHILD_SAID && length != sizeof result) {
         return not_understood(&self->writer);
     }
-    self->last = (news == GW_CHILD_SAID) ? result : self->last;
+    if (news == GW_CHILD_SAID) {
+        self->last = result;
+    }
     return news;
 }
 

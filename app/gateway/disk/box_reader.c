@@ -77,7 +77,9 @@ static listed_t *place(list_t *list, const char *name, size_t stem) {
         if (strlen(entry->stem) == stem && memcmp(entry->stem, name, stem) == 0) {
             return entry;
         }
-        oldest = (entry->number < oldest->number) ? entry : oldest;
+        if (entry->number < oldest->number) {
+            oldest = entry;
+        }
     }
     if (list->count == GW_BOX_LISTED && number <= oldest->number) {
         return NULL;

@@ -87,9 +87,15 @@ static int write_over(const work_t *work, int directory, size_t length) {
     }
     const ssize_t count = write(fd, text, length);
     int error = (count < 0) ? errno : ((size_t)count < length) ? ENOSPC : 0;
-    error = (error == 0 && fsync(fd) != 0) ? errno : error;
-    error = (close(fd) != 0 && error == 0) ? errno : error;
-    error = (error == 0 && renameat(directory, work->fresh, directory, work->name) != 0) ? errno : error;
+    if (error == 0 && fsync(fd) != 0) {
+        error = errno;
+    }
+    if (close(fd) != 0 && error == 0) {
+        error = errno;
+    }
+    if (error == 0 && renameat(directory, work->fresh, directory, work->name) != 0) {
+        error = errno;
+    }
     if (error != 0) {
         (void)unlinkat(directory, work->fresh, 0);
     } else {

@@ -57,8 +57,8 @@ typedef struct {
 } gw_ledger_written_t;
 
 typedef struct gw_knowledge {
-    struct gw_wheels *wheels; ///< Of which it is known.
-    struct gw_log *log;       ///< Told what is learnt.
+    struct gw_wheels *wheels;  ///< Of which it is known.
+    struct gw_log *log;        ///< Told what is learnt.
     struct iwn_server *server; ///< By which clients are told.
     gw_configured_t configured;
     const char *bus;

@@ -23,7 +23,9 @@
 void gw_memory_name(const char *bus, char *out_name, size_t size) {
     (void)snprintf(out_name, size, "ledger-%s", bus);
     for (char *c = out_name; *c != '\0'; c++) {
-        *c = (isalnum((unsigned char)*c) != 0 || *c == '-' || *c == '.') ? *c : '_';
+        if (isalnum((unsigned char)*c) == 0 && *c != '-' && *c != '.') {
+            *c = '_';
+        }
     }
 }
 

@@ -50,7 +50,9 @@ static int open_file(const char *path) {
     int fd = open(path, flags);
     if (fd < 0 && errno == ENOENT) { // Asked for at once, a stranger's file in a folder like /tmp would be an error.
         fd = open(path, flags | O_CREAT | O_EXCL, 0600);
-        fd = (fd < 0 && errno == EEXIST) ? open(path, flags) : fd;
+        if (fd < 0 && errno == EEXIST) {
+            fd = open(path, flags);
+        }
     }
     return fd;
 }
@@ -143,7 +145,9 @@ int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory
     if (error == 0 && path != NULL && (self->error == ENOENT || self->error == ENOTDIR)) {
         error = self->error; // No bus can be there.
     }
-    error = (error != 0) ? error : gw_bus_names_take(&self->names, &self->holder, &self->stranger[1]);
+    if (error == 0) {
+        error = gw_bus_names_take(&self->names, &self->holder, &self->stranger[1]);
+    }
     if (error != 0) {
         gw_bus_lock_release(self);
     }

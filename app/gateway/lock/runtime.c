@@ -131,7 +131,9 @@ bool gw_runtime_mark(gw_runtime_t *self, bool sending) {
         return true;
     }
     const bool done = sending ? set_marker(self) : remove_markers(self);
-    self->marked = done ? sending : self->marked;
+    if (done) {
+        self->marked = sending;
+    }
     self->unsure = !done; // What has failed may have been done in part.
     return done;
 }

@@ -148,7 +148,9 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
         return;
     }
     const int directory = (error == 0) ? gw_folder_open_own(path) : -1;
-    error = (error != 0) ? error : (directory < 0) ? errno : write_error(directory);
+    if (error == 0) {
+        error = (directory < 0) ? errno : write_error(directory);
+    }
     if (directory >= 0) {
         (void)close(directory);
     }

@@ -22,7 +22,9 @@ void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent) {
         bucket++;
     }
     self->count[bucket]++;
-    self->worst_us = (gap_us > self->worst_us) ? gap_us : self->worst_us;
+    if (gap_us > self->worst_us) {
+        self->worst_us = gap_us;
+    }
 }
 
 void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json) {
@@ -59,7 +61,9 @@ iw_snapshot_t gw_wheels_look(const gw_wheels_t *self) {
 }
 
 void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us) {
-    self->now_us = (now_us > self->now_us) ? now_us : self->now_us;
+    if (now_us > self->now_us) {
+        self->now_us = now_us;
+    }
     self->time_used = false;
 }
 

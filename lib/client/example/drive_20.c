@@ -10,7 +10,9 @@ int main(int count, char **words) {
     iwc_t *gateway = iwc_new();
     iwc_terms_t terms = {.lease_ms = 0};
     iwc_result_t result = (gateway != NULL) ? iwc_connect(gateway, NULL, 1000) : IWC_INVALID;
-    result = (result == IWC_OK) ? iwc_arm(gateway, "drive_20", false, 1000, &terms) : result;
+    if (result == IWC_OK) {
+        result = iwc_arm(gateway, "drive_20", false, 1000, &terms);
+    }
     const int seconds = (count > 1) ? (int)strtol(words[1], NULL, 10) : 2;
     for (int left_ms = seconds * 1000; result == IWC_OK && left_ms > 0; left_ms -= terms.lease_ms / 3 + 1) {
         result = iwc_drive(gateway, &(iwc_drive_t){.left_mm_s = 200, .right_mm_s = 200}, 100, NULL);

@@ -167,7 +167,9 @@ static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
     iwc_result_t result = IWC_OK;
     while (!iwc_queue_take(self, &hello) && result == IWC_OK) {
         result = iwc_fill(self);
-        result = (result == IWC_TIMEOUT) ? iwc_await(self, POLLIN, deadline_us) : result;
+        if (result == IWC_TIMEOUT) {
+            result = iwc_await(self, POLLIN, deadline_us);
+        }
         if (self->over != IWC_OK && !iwc_pending(self)) {
             result = self->over;
         }
@@ -231,7 +233,9 @@ static iwc_result_t call(iwc_t *self, int64_t deadline_us) {
         const int64_t now_us = iwc_now_us();
         if (error == EAGAIN && now_us < deadline_us) {
             result = iwc_await(self, 0, now_us + RETRY_US);
-            result = (result == IWC_TIMEOUT) ? IWC_OK : result;
+            if (result == IWC_TIMEOUT) {
+                result = IWC_OK;
+            }
         } else if (error != EINTR) {
             self->error_number = (error == EAGAIN) ? ETIMEDOUT : error;
             result = meaning_of(error);

@@ -28,7 +28,9 @@ static bool is_odd(int64_t id) {
 /// The gateway has taken this drive command from its socket.
 static void note_driven(iwc_t *self, int64_t id) {
     for (size_t i = 0; i < IWC_DRIVES_MAX; i++) {
-        self->driven[i] = (self->driven[i] == id) ? 0 : self->driven[i];
+        if (self->driven[i] == id) {
+            self->driven[i] = 0;
+        }
     }
 }
 
@@ -88,7 +90,9 @@ bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message) {
             *out_message = (iwc_message_t){.text = self->line, .length = length, .skipped = self->skipped};
             out_message->is_event = iwc_json_find(span, "event").at != NULL;
             (void)iwc_json_integer(iwc_json_find(span, "id"), &out_message->id);
-            out_message->id = out_message->is_event ? 0 : out_message->id;
+            if (out_message->is_event) {
+                out_message->id = 0;
+            }
             self->skipped = 0;
             self->answer = 0;
             return true;
@@ -115,7 +119,9 @@ static uint64_t kind_of(iwc_span_t line) {
     for (size_t i = 0; i < sizeof(DISTINCTIONS) / sizeof(DISTINCTIONS[0]); i++) {
         for (size_t k = 0; iwc_json_is_text(event, DISTINCTIONS[i].event) && k < 2; k++) {
             const char *field = DISTINCTIONS[i].fields[k];
-            kind = (field != NULL) ? mix(kind, iwc_json_find(line, field)) : kind;
+            if (field != NULL) {
+                kind = mix(kind, iwc_json_find(line, field));
+            }
         }
     }
     return kind;

@@ -113,7 +113,9 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     self->awaited = 2 * self->requests;
     self->answer = 0;
     iwc_result_t result = send_as(self, request, self->awaited, deadline_us);
-    result = (result == IWC_OK) ? await_answer(self, deadline_us) : result;
+    if (result == IWC_OK) {
+        result = await_answer(self, deadline_us);
+    }
     self->awaited = 0;
     iwc_message_t reply;
     if (result != IWC_OK || !iwc_reply(self, &reply)) {

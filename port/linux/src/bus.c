@@ -95,7 +95,9 @@ void iw_bus_lose(iw_bus_t *bus, int error) {
 /// It is looked at again while bus-off: with a forged or a lost error frame nothing else would end it.
 void iw_bus_note(iw_bus_t *bus, iw_bus_state_t state) {
     bus->present = state;
-    bus->unheeded = (state < IW_BUS_PASSIVE) ? state : bus->unheeded;
+    if (state < IW_BUS_PASSIVE) {
+        bus->unheeded = state;
+    }
     bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IW_BUS_RETRY_US : IW_NEVER;
 }
 
@@ -104,7 +106,9 @@ void iw_bus_note(iw_bus_t *bus, iw_bus_state_t state) {
 static void hear_error(iw_bus_t *bus, iw_can_error_t error, bool forged) {
     if (error == IW_CAN_ERROR_BUS_OFF) {
         bus->unheeded = IW_BUS_OFF;
-        bus->present = forged ? bus->present : IW_BUS_OFF;
+        if (!forged) {
+            bus->present = IW_BUS_OFF;
+        }
         bus->look_us = bus->now_us + (forged ? 0U : IW_BUS_RETRY_US);
     } else if (forged) {
         return;

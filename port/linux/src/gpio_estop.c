@@ -68,8 +68,12 @@ static int gpio_open(void *self, const iw_estop_wish_t *wish) {
                             .debounce_us = (uint32_t)wish->debounce_ms * IW_US_PER_MS,
                             .active_high = wish->active_high};
     int error = iw_gpio_address_parse(wish->name, &estop->address);
-    error = (error != 0) ? error : expect(estop->address.expected.chip, wish->chip);
-    error = (error != 0) ? error : expect(estop->address.expected.line, wish->chip_line);
+    if (error == 0) {
+        error = expect(estop->address.expected.chip, wish->chip);
+    }
+    if (error == 0) {
+        error = expect(estop->address.expected.line, wish->chip_line);
+    }
     if (error != 0) {
         return error;
     }

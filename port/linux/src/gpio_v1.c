@@ -20,7 +20,9 @@ static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_
         const char *own = (line == NULL) ? NULL : gpiod_line_name(line);
         if (own != NULL && strcmp(own, name) == 0) {
             second = *found != NULL;
-            *found = second ? *found : line;
+            if (!second) {
+                *found = line;
+            }
         }
     }
     return second;
@@ -65,10 +67,9 @@ static struct gpiod_line *find(const iw_gpio_address_t *address) {
 
 /// The line with what it is called; NULL with an errno.
 static struct gpiod_line *find_and_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
-    errno = 0;
+    errno = ENOENT; // Unless a call below says otherwise.
     struct gpiod_line *line = find(address);
     if (line == NULL) {
-        errno = (errno != 0) ? errno : ENOENT;
         return NULL;
     }
     iw_gpio_note(out_seen, gpiod_chip_label(gpiod_line_get_chip(line)), gpiod_line_name(line));

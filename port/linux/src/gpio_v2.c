@@ -22,7 +22,9 @@ static unsigned count_named(struct gpiod_chip *chip, const char *name, unsigned 
         struct gpiod_line_info *info = gpiod_chip_get_line_info(chip, offset);
         const char *own = (info == NULL) ? NULL : gpiod_line_info_get_name(info);
         if (own != NULL && strcmp(own, name) == 0) {
-            *out_offset = (count == 0U) ? offset : *out_offset;
+            if (count == 0U) {
+                *out_offset = offset;
+            }
             count++;
         }
         gpiod_line_info_free(info);
@@ -52,7 +54,9 @@ static struct gpiod_chip *search(const char *name, unsigned *out_offset) {
         (void)snprintf(path, sizeof path, "/dev/%s", entry->d_name);
         unsigned offset = 0;
         struct gpiod_chip *chip = open_chip(path);
-        refusal = (chip == NULL && (errno == EACCES || errno == EPERM)) ? errno : refusal;
+        if (chip == NULL && (errno == EACCES || errno == EPERM)) {
+            refusal = errno;
+        }
         const unsigned here = (chip == NULL) ? 0U : count_named(chip, name, &offset);
         count += here;
         if (here > 0U && found == NULL) {
@@ -123,10 +127,9 @@ static void see(struct gpiod_chip *chip, unsigned offset, iw_estop_seen_t *out_s
 /// The chip with what the line is called; NULL with an errno.
 static struct gpiod_chip *find_and_see(const iw_gpio_address_t *address, unsigned *out_offset,
                                        iw_estop_seen_t *out_seen) {
-    errno = 0;
+    errno = ENOENT; // Unless a call below says otherwise.
     struct gpiod_chip *chip = find(address, out_offset);
     if (chip == NULL) {
-        errno = (errno != 0) ? errno : ENOENT;
         return NULL;
     }
     see(chip, *out_offset, out_seen);

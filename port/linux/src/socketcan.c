@@ -45,7 +45,9 @@ static void close_sockets(socketcan_t *can) {
 
 /// The interface is gone or was down. Going down, the kernel emptied its queue; what our sockets still hold is old.
 static void can_lost(iw_bus_t *bus, int error) {
-    can_of(bus)->interface = (error == ENODEV) ? 0 : can_of(bus)->interface;
+    if (error == ENODEV) {
+        can_of(bus)->interface = 0;
+    }
 }
 
 /// Takes over what the kernel reports; what this file counts itself stays.
@@ -93,7 +95,9 @@ static void drop_old(socketcan_t *can) {
     }
     const int error = iw_socketcan_socket_drop(&can->bus.ours);
     (void)iw_socketcan_socket_drop(&can->bus.others);
-    can->interface = (error == ENODEV) ? 0 : can->interface;
+    if (error == ENODEV) {
+        can->interface = 0;
+    }
 }
 
 /// Looks whether the interface is back, and if so goes on with the sockets there are, or opens new ones.
@@ -132,7 +136,9 @@ static int open_descriptors(socketcan_t *can) {
         return errno;
     }
     int error = iw_netlink_open(&can->netlink);
-    error = (error != 0) ? error : iw_netlink_open_events(&can->events);
+    if (error == 0) {
+        error = iw_netlink_open_events(&can->events);
+    }
     if (error != 0) {
         return error;
     }

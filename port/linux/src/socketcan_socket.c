@@ -143,7 +143,9 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
     int last = 0;
     for (int i = 0; i < DROP_BATCHES_MAX; i++) {
         const int error = iw_socketcan_socket_fill(self);
-        last = (error != 0) ? error : last;
+        if (error != 0) {
+            last = error;
+        }
         if (error == 0 && self->drained) {
             break;
         }

@@ -5,9 +5,9 @@
 ///     bench_status anew ROUNDS    something has, each time
 ///
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
+#include "answers/answers.h"
 #include "daemon_rig.h"
 #include "sockets/clients.h"
-#include "answers/answers.h"
 
 #include "unity.h"
 

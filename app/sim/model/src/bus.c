@@ -19,7 +19,9 @@ void sim_bus_open(sim_bus_t *self, uint8_t port, uint8_t depth, bool needs_ack) 
 
 static void abort_frame(sim_bus_t *self, iw_time_us_t now_us) {
     self->sending = SIM_BUS_NONE;
-    self->free_us = (now_us > self->free_us) ? now_us : self->free_us;
+    if (now_us > self->free_us) {
+        self->free_us = now_us;
+    }
     self->done_us = IW_NEVER;
 }
 

@@ -41,8 +41,11 @@ static bool add_name(check_t *self) {
         if (order == 0) {
             return fail(self, "duplicate object key");
         }
-        low = (order > 0) ? middle + 1U : low;
-        high = (order < 0) ? middle : high;
+        if (order > 0) {
+            low = middle + 1U;
+        } else {
+            high = middle;
+        }
     }
     if (self->names == IWN_NAMES_MAX) {
         return fail(self, "too many names");
@@ -214,7 +217,9 @@ iwn_json_t iwn_json_inside(iwn_json_t container) {
 
 bool iwn_json_next(iwn_json_t *rest, iwn_json_t *out_name, iwn_json_t *out_value) {
     const char *at = skip_blanks(rest->at);
-    at = (*at == ',') ? skip_blanks(at + 1) : at;
+    if (*at == ',') {
+        at = skip_blanks(at + 1);
+    }
     if (*at == '}' || *at == ']') {
         return false;
     }

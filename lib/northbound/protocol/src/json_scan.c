@@ -240,7 +240,9 @@ static int32_t read_exponent(const char *c, const char *end) {
     const bool negative = *c == '-';
     int32_t exponent = 0;
     for (c += (iwn_scan_is_digit(*c) ? 0 : 1); c < end; c++) {
-        exponent = (exponent < EXPONENT_FAR) ? exponent * 10 + (*c - '0') : exponent;
+        if (exponent < EXPONENT_FAR) {
+            exponent = exponent * 10 + (*c - '0');
+        }
     }
     return negative ? -exponent : exponent;
 }
@@ -302,7 +304,9 @@ static int scan_real(iwn_scan_t *self, int c) {
     }
     if (c == 'e' || c == 'E') {
         c = step(self);
-        c = (c == '+' || c == '-') ? step(self) : c;
+        if (c == '+' || c == '-') {
+            c = step(self);
+        }
         if (!skip_digits(self, &c)) {
             return IWN_TOKEN_INVALID;
         }

@@ -180,7 +180,9 @@ iwn_line_verdict_t iwn_receiver_put(iwn_receiver_t *self, char byte, iwn_line_t 
     if (byte != '\n') {
         // The newline counts too: a line that needs the whole buffer and has no end yet is too long.
         if (self->length + 1U >= self->size) {
-            self->fault = (self->fault == IWN_LINE_NOTHING) ? IWN_LINE_TOO_BIG : self->fault;
+            if (self->fault == IWN_LINE_NOTHING) {
+                self->fault = IWN_LINE_TOO_BIG;
+            }
         } else {
             self->data[self->length++] = byte;
         }

@@ -25,7 +25,7 @@ static bool would_move(const iw_config_t *config, const iw_drive_t *wanted) {
 static void refuse_unjudged(iwn_server_t *self, iwn_client_t *client, const iw_drive_t *wanted) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
-    if (would_move(&self->core->config, wanted)) {
+    if (would_move(iwn_server_look(self)->config, wanted)) {
         (void)judge(self, client, self->now_us, &unknown, &applied);
     }
     iwn_server_refuse(self, client, &self->request.id);
@@ -82,11 +82,12 @@ static int64_t limit(int64_t value) {
 void iwn_server_twist(iwn_server_t *self, iwn_client_t *client) {
     const int64_t v_mm_s = limit(self->request.v_mm_s);
     const int64_t yaw_mrad_s = limit(self->request.yaw_mrad_s);
-    if (yaw_mrad_s != 0 && iwn_server_look(self)->assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
+    const iw_snapshot_t *const seen = iwn_server_look(self);
+    if (yaw_mrad_s != 0 && seen->assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
         refuse_turn(self, client);
         return;
     }
-    const int64_t rim_mm_s = yaw_mrad_s * (int64_t)self->core->config.track_mm / 2000;
+    const int64_t rim_mm_s = yaw_mrad_s * (int64_t)seen->config->track_mm / 2000;
     const iw_drive_t wanted = {.speed_mm_s = {saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)}};
     drive(self, client, &wanted);
 }

@@ -23,7 +23,6 @@
 #define IWN_LINE_PREFIX    23U  ///< The most that stands before the JSON: channel, stamp and two spaces.
 #define IWN_LINE_SUFFIX    10U  ///< What stands behind it: `*`, CRC and newline.
 #define IWN_LINE_BOOT      16U  ///< Hexadecimal digits that name a start of the board.
-#define IWN_LINE_ALIVE_MS  100U ///< The relay says at least this often that it is there.
 #define IWN_LINE_SILENT_MS 500U ///< A board that hears no good line for so long ends all channels.
 
 /// What has been received. NOTHING and GOOD are no faults.
