@@ -80,7 +80,7 @@ void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *reques
         .stopped_by = name_stopper(&status->stopped_by, texts.stopped_by),
         .estopped_by = name_stopper(&status->estopped_by, texts.estopped_by),
         .estopped_us = status->estopped_by.at_us,
-        .estop = wheels->estop,
+        .estop = gw_wheels_estop(wheels),
         .estop_answer = wheels->hal.estop_last,
         .bus = wheels->bus.name,
         .bus_cure = texts.bus_cure,
