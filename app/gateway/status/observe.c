@@ -246,6 +246,9 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
     }
     if (take_rolling_fault(observed, seen->rolling_fault, self->wheels->now_us)) {
         tell_fault(self, "rolling", seen->rolling_fault);
+        if (seen->rolling_fault) {
+            gw_record_rolling(self->box, self->log, seen);
+        }
     }
     if (seen->left_behind != observed->left_behind) {
         observed->left_behind = seen->left_behind;
