@@ -131,7 +131,7 @@ static void test_host_first_item_is_kept_like_the_others(void) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
     const iw_snapshot_t seen = gateway_rig_look(&rig);
     iw_learnt_t learnt;
-    iw_learnt_note(&learnt, &seen, &host.place.settings, host.zero);
+    iw_learnt_note(&learnt, &seen, &host.settings, host.zero);
     TEST_ASSERT_EQUAL_UINT8(IW_LEDGER_CONFIRMED, learnt.item[IW_LEDGER_SETPOINT_TYPE] & 0x0FU);
 }
 

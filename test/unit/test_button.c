@@ -245,6 +245,26 @@ static void test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
 }
 
+/// One contact is stuck: at the next start both read released, and only what is kept can warn.
+static void test_button_whose_contacts_disagree_is_void_until_both_were_tried_again(void) {
+    set_up_two();
+    (void)hold_both(0, 0, 10);
+    (void)hold_both(1, 1, 100);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 100));
+    hal.estop_last = IW_ESTOP_DISAGREES; // By time alone.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_BROKEN, hold_both(1, 0, 100));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+    (void)hold_both(1, 1, 100);
+    (void)hold_both(1, 0, 300); // It shows the fault again.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    (void)hold_both(1, 1, 100);
+    hal.estop_last = 0;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+}
+
 static void test_button_stored_without_a_second_contact_is_that_of_one(void) {
     press();
     tried.contact[1].line[0] = '\0';
@@ -333,6 +353,7 @@ int main(void) {
     RUN_TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing);
     RUN_TEST(test_button_with_another_second_contact_is_void);
     RUN_TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round);
+    RUN_TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again);
     RUN_TEST(test_button_stored_without_a_second_contact_is_that_of_one);
     RUN_TEST(test_button_that_says_the_same_is_not_asked_for_its_names);
     RUN_TEST(test_button_is_stored_and_read_back);

@@ -72,9 +72,12 @@ static bool follow(gw_button_t *self, answer_t answer, iw_time_us_t now_us) {
     return shown;
 }
 
-/// The answers of the last look, and no time, decide what a look shows.
+/// The answers of the last look, and no time but that of the contacts' own judge, decide what a look shows.
 static bool is_news(gw_button_t *self, const iw_linux_hal_t *hal) {
-    const bool news = !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0;
+    const bool disagrees = hal->estop_last == IW_ESTOP_DISAGREES;
+    const bool news =
+        !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0 || disagrees != self->disagreed;
+    self->disagreed = disagrees;
     self->looked = true;
     memcpy(self->last, hal->contact_last, sizeof self->last);
     return news;
@@ -86,9 +89,14 @@ gw_button_news_t gw_button_look(gw_button_t *self, const iw_linux_hal_t *hal, iw
         return GW_BUTTON_NO_NEWS;
     }
     const bool known = see(hal, seen);
-    if (follow(self, known ? said_by_all(hal) : UNREADABLE, now_us)) {
+    if (follow(self, known ? said_by_all(hal) : UNREADABLE, now_us) && !self->disagreed) {
         note(self, seen, tried);
         return GW_BUTTON_TRIED;
+    }
+    // A contact that is stuck reads released at the next start: only what was kept can tell of it then.
+    if (self->disagreed && tried->wall_us != 0) {
+        memset(tried, 0, sizeof *tried);
+        return GW_BUTTON_BROKEN;
     }
     const bool same = is_same_contact(self, &seen[0], tried, 0) && is_same_contact(self, &seen[1], tried, 1);
     if (known && tried->wall_us != 0 && !same) {
