@@ -132,7 +132,19 @@ static void test_release_is_refused_to_who_only_watches_and_while_somebody_drive
     assert_held(IW_STATE_STOPPING, 5000);
     daemon_rig_arm(client);
     assert_reply("{\"cmd\":\"release\"}", "\"error\":\"not_at_rest\"");
+    assert_reply("{\"cmd\":\"release\"}", " holds the lease for another ");
+    assert_reply("{\"cmd\":\"release\"}", " ms at least; let it stop first\"");
     (void)close(watcher);
+}
+
+static void test_release_in_the_ramp_is_told_to_wait_for_its_end(void) {
+    drive_and_stop();
+    daemon_rig_arm(client);
+    (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
+    daemon_rig_run(150);
+    (void)daemon_rig_ask(client, "{\"cmd\":\"stop\"}");
+    assert_reply("{\"cmd\":\"release\"}",
+                 "\"error\":\"not_at_rest\",\"message\":\"the wheels turn or are told to: left ");
 }
 
 int main(void) {
@@ -144,5 +156,6 @@ int main(void) {
     RUN_TEST(test_release_that_is_too_old_changes_nothing);
     RUN_TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing);
     RUN_TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives);
+    RUN_TEST(test_release_in_the_ramp_is_told_to_wait_for_its_end);
     return UNITY_END();
 }

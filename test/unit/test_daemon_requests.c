@@ -292,12 +292,12 @@ static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair));
     daemon_rig.daemon->box.reader.fd = pair[0];
     for (unsigned i = 0; i < 4U; i++) {
-        clients->client[i].reading = true;
+        clients->client[i].owed = true;
     }
     (void)close(pair[1]);
     TEST_ASSERT_FALSE(gw_recordings_take(&daemon_rig.daemon->answers));
     for (unsigned i = 0; i < 4U; i++) {
-        TEST_ASSERT_FALSE(clients->client[i].reading);
+        TEST_ASSERT_FALSE(clients->client[i].owed);
     }
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         (void)close(others[i]);
