@@ -128,6 +128,37 @@ static void test_stop_is_told_with_the_request_that_asks_for_it(void) {
     TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
 }
 
+static void test_arm_that_an_estop_ends_is_refused_with_its_id_and_why(void) {
+    static const char estop[] = "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n";
+    const int other = daemon_rig_connect();
+    daemon_rig_run(20);
+    daemon_rig_keep_log();
+    static const char arm[] = "{\"id\":41,\"cmd\":\"arm\"}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof arm - 1, (int)send(client, arm, sizeof arm - 1U, MSG_NOSIGNAL));
+    TEST_ASSERT_EQUAL_INT((int)sizeof estop - 1, (int)send(other, estop, sizeof estop - 1U, MSG_NOSIGNAL));
+    const char *said = said_after("");
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(said, "\"id\":41,\"ok\":false,\"error\":\"cause_present\",\"message\":\"estop_software"), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "smoke"), daemon_rig_log());
+    (void)close(other);
+}
+
+static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
+    static const char *const sides[IW_SIDES] = {"left", "right"};
+    char told[64];
+    daemon_rig_run(3000);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"tare\"}");
+    const iw_force_quality_t *kept = daemon_rig.daemon->knowledge.tare;
+    const iw_force_t *force = daemon_rig.daemon->wheels.core.force;
+    TEST_ASSERT_NOT_EQUAL_INT(kept[IW_LEFT].deviation_mN, kept[IW_RIGHT].deviation_mN);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_INT(iw_force_measure(&force[side]).deviation_mN, kept[side].deviation_mN);
+        (void)snprintf(told, sizeof told, "\"%s\":{\"offset_mN\":%d,\"samples\":%d,\"deviation_mN\":%d,", sides[side],
+                       (int)force[side].offset_mN, (int)kept[side].samples, (int)kept[side].deviation_mN);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, told), reply);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
@@ -138,5 +169,7 @@ int main(void) {
     RUN_TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later);
     RUN_TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence);
     RUN_TEST(test_stop_is_told_with_the_request_that_asks_for_it);
+    RUN_TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why);
+    RUN_TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window);
     return UNITY_END();
 }
