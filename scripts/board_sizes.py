@@ -40,9 +40,9 @@ def core_stack(build):
 
 
 def image_stack(build, image):
-    objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_stm32_driver", image)
+    objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_northbound_server", "iwheel_stm32_driver", image)
     known = read_graph(objects)[0]
-    tabled = [name for name in known if THROUGH_TABLE in name and "iw_answer" in known]
+    tabled = [name for name in known if THROUGH_TABLE in name and "iw_host_take" in known]
     size, depth = depth_of(objects, (*HAL, *tabled))
     handlers = (*HANDLERS, *(name for name in SERIAL_HANDLERS if name in size))
     missing = [name for name in (*HAL, *HANDLERS) if name not in size]

@@ -154,7 +154,7 @@ def main(arguments):
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
     print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
-    findings = [*private, *parts, *fact_of_arrows("app/gateway", 45), *fact_of_arrows("app/ctl", 40)]
+    findings = [*private, *parts, *fact_of_arrows("app/gateway", 42), *fact_of_arrows("app/ctl", 40)]
     findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
     findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []

@@ -33,7 +33,7 @@ FIELDS = os.path.join("lib", "northbound", "protocol", "src", "request_fields.h"
 DOCUMENT = os.path.join("docs", "northbound.md")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
 FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least", "most", "default", "bytes"}
-# Where the words are kept: the function whose texts they are, and what else is among them.
+# Where the words are kept: the function whose texts they are, and what else is among them; or several of these.
 SOURCES = {
     "error": ("lib/northbound/protocol/src/words.c", "iwn_error_name", {"ok"}),
     "topic": ("lib/northbound/protocol/src/words.c", "iwn_topic_name", set()),
@@ -51,7 +51,8 @@ SOURCES = {
     "evidence": ("lib/northbound/protocol/src/words.c", "iwn_evidence_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
     "memory_state": ("app/gateway/ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
-    "fault_alone": ("app/gateway/status/observe.c", "observe_faults", set()),
+    "fault_alone": [("lib/northbound/server/src/observe.c", "observe_faults", set()), ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),
+                    ("app/gateway/answers/told.c", "observe_health", set())],
 }
 
 
@@ -460,15 +461,15 @@ def differences(what, told, wanted):
 
 def gateway_words(description):
     """What words a source of ours knows and the description does not, or the other way round."""
-    for kind, (path, function, others) in SOURCES.items():
-        match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
-        if match is None:
-            yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
-            continue
-        known = set(re.findall(r'"([^"]*)"', match.group(0))) - others
-        wanted = set(description.words[kind])
-        yield from (f"share/northbound.json: {kind} lacks {word}, which {path} has" for word in sorted(known - wanted))
-        yield from (f"share/northbound.json: {kind} has {word}, which {path} has not" for word in sorted(wanted - known))
+    for kind, sources in SOURCES.items():
+        known, wanted = {}, set(description.words[kind])
+        for path, function, others in sources if isinstance(sources, list) else [sources]:
+            match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
+            if match is None:
+                yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
+            known.update({word: path for word in set(re.findall(r'"([^"]*)"', match[0] if match else "")) - others})
+        yield from (f"share/northbound.json: {kind} lacks {word}, which {known[word]} has" for word in sorted(known.keys() - wanted))
+        yield from (f"share/northbound.json: {kind} has {word}, which {path} has not" for word in sorted(wanted - known.keys()))
 
 
 def c_limits(description):

@@ -118,7 +118,8 @@ def deviations(folder, fault):
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
-    sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)), *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
+    sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
+               "lib/northbound/server/src/observe.c", *(f"app/gateway/{name}.c" for name in ("answers/told", "bus/bus_facts", "ledger/knowledge_json"))]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
@@ -421,7 +422,7 @@ CASES = [
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
     (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
-    (northbound, "python3", "a fault that is no cause", ("app/gateway/status/observe.c", '"still_moving", true', '"still_rolling", true'), True),
+    (northbound, "python3", "a fault that is no cause", ("lib/northbound/server/src/observe.c", '"still_moving", true', '"still_rolling", true'), True),
     (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
     (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
@@ -452,8 +453,8 @@ CASES = [
     (dialect, "python3", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
     (dialect, "python3", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
     (faults, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
-    (faults, "python3", "a function is renamed that no fault is in", ("app/gateway/answers/dispatch.c", "void carry_out(", "void carry_it_out("), False),
-    (faults, "python3", "a function is renamed that faults are in", ("app/gateway/answers/dispatch.c", "void do_twist(", "void do_turn("), False),
+    (faults, "python3", "a function is renamed that no fault is in", ("lib/northbound/server/src/requests.c", "void carry_out(", "void carry_it_out("), False),
+    (faults, "python3", "a function is renamed that faults are in", ("lib/northbound/server/src/drive.c", "void iwn_server_twist(", "void iwn_server_turn("), False),
     (faults, "python3", "a file has another name and place", ("app/gateway/loop.c", "#include", "#include", "app/cycle.c"), False),
     (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
     (faults, "python3", "the code of a fault occurs twice", ("core/src/sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side]; const bool invert = config->invert[side];"), True),
@@ -467,7 +468,7 @@ CASES = [
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
     (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),
-    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "status/observe.h"', '#include "observe.h"'), True),
+    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'), True),
     (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/keeper.h"\n#include "box/box.h"'), True),
     (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
     (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "ledger/memory.h"'), True),

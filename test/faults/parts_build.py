@@ -6,6 +6,7 @@ compiled for the program that judges, and one link: the changed object stands be
 own. The tree and the build are never touched.
 """
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -58,11 +59,12 @@ class Parts:
     def link(self, program, source, changed, out, flags=("-O1",)):
         """None, or why that program cannot be had with the changed file."""
         folder, words = self.link_of(program)
-        inside = {(folder / word) for word in words if word.endswith(".o")}
+        place = {word: Path(os.path.normpath(folder / word)) for word in words if word.endswith(".o")}
+        inside = set(place.values())
         chosen, changed_object, said = self.compile(source, changed, inside, flags)
         if said:
             return f"does not compile: {said}"
-        words = [str(changed_object) if folder / word == chosen else word for word in words]
+        words = [str(changed_object) if place.get(word) == chosen else word for word in words]
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
             words.insert(1, str(changed_object))

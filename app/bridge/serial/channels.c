@@ -38,11 +38,10 @@ static relay_channel_t *free_channel(relay_t *self) {
 
 static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
     gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
-    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
     iwn_refusal_t refusal = {.error = IWN_BUS_DOWN};
     iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
     IWN_TEXT_JOIN(&text, "no board on the serial line: ", why);
-    gw_clients_refuse(&self->clients, client, &nobody, &refusal);
+    gw_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
     gw_client_finish(client, self->now_us);
 }
 
