@@ -3,7 +3,7 @@
 
 #include "config/gateway_config.h"
 #include "config/similar.h"
-#include "talk/words.h"
+#include "talk/ctl_words.h"
 #include "text/duration.h"
 
 #include "iwheel_northbound/text.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "daemon.h"
 
-#include "start/report.h"
+#include "start/start_report.h"
 
 _Static_assert(GW_PATH_SIZE >= GATEWAY_PATH_SIZE && GW_ADDRESS_SIZE >= GATEWAY_ADDRESS_SIZE,
                "what can be configured has room");

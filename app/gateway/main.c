@@ -2,7 +2,7 @@
 #include "daemon.h"
 #include "sockets/clients.h"
 #include "start/options.h"
-#include "start/report.h"
+#include "start/start_report.h"
 
 #include "begin/begin.h"
 

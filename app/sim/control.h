@@ -6,7 +6,7 @@
 #define SIM_CONTROL_H
 
 #include "loop.h"
-#include "words.h"
+#include "sim_words.h"
 
 #define SIM_CONTROL_CLIENTS 8U
 

@@ -7,10 +7,10 @@
 #ifndef SIM_PANEL_H
 #define SIM_PANEL_H
 
-#include "button.h"
 #include "hub.h"
 #include "iwheel_sim/world.h"
-#include "words.h"
+#include "sim_button.h"
+#include "sim_words.h"
 
 /// Long enough for the longest answer, `help`.
 #define SIM_ANSWER_BYTES 8192U

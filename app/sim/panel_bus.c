@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Commands that concern the bus, other nodes, the button and the simulator itself.
-#include "command.h"
+#include "sim_command.h"
 
 #include <stdio.h>
 #include <string.h>

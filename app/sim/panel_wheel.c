@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Commands that concern the wheels.
-#include "command.h"
+#include "sim_command.h"
 
 #define RUNAWAY_DEFAULT_MM_S 1000
 

@@ -12,7 +12,7 @@
 #ifndef SIM_SCRIPT_H
 #define SIM_SCRIPT_H
 
-#include "words.h"
+#include "sim_words.h"
 
 #define SIM_SCRIPT_STEPS 512U
 

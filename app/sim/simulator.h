@@ -8,14 +8,14 @@
 #define SIM_SIMULATOR_H
 
 #include "bus_log.h"
-#include "button.h"
 #include "control.h"
 #include "hub.h"
 #include "keys.h"
 #include "panel.h"
 #include "script.h"
+#include "sim_button.h"
+#include "sim_words.h"
 #include "socketcan.h"
-#include "words.h"
 
 // --- the command line (options.c) --------------------------------------------------------------------------------
 

@@ -3,9 +3,9 @@
 // the gateway; what is read of a file is whole; what the console shows moves no terminal and names no file of its own choice.
 #include "fuzz.h"
 
-#include "command.h"
 #include "fetch.h"
 #include "history.h"
+#include "mqtt_command.h"
 #include "spool.h"
 
 #include "iwheel_northbound/line.h"

@@ -5,8 +5,8 @@
 //
 // libmosquitto and its socket live in real time: what is sent over loopback has come when send() returns, so nothing is waited for but the
 // thread that connects.
-#include "bridge.h"
 #include "hours_rig.h"
+#include "mqtt_bridge.h"
 
 #include "unity.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A lost broker while an MQTT client drives: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). There is no broker; the
 // commands and the loss are handed to the bridge as its connection hands them over.
-#include "bridge.h"
 #include "hours_rig.h"
+#include "mqtt_bridge.h"
 
 #include "unity.h"
 

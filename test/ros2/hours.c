@@ -5,8 +5,8 @@
 // Virtual is what hours_rig.h says. DDS itself lives in real time; between two
 // participants of one process it delivers within the call, so nothing waits for it. What participants that come and go cost, over sockets, is
 // seen in real time (rides.py, publishers_come_and_go): DDS lets go of them after seconds that cannot be hurried.
-#include "bridge.h"
 #include "hours_rig.h"
+#include "ros2_bridge.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 

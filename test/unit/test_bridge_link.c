@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A bridge's connections to the gateway: questions wait in the bridge, stops do not.
-#include "common/link.h"
+#include "common/bridge_link.h"
 
 #include "../support/fake_gateway.h"
 #include "unity.h"

@@ -392,6 +392,7 @@ static void end_by(int number) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     TEST_ASSERT_FALSE(daemon_rig_is_told_zero());
     const iw_time_us_t told_us = daemon_rig.now_us;
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "shutting down"));
     daemon_rig_run(10000);
     TEST_ASSERT_TRUE(daemon_rig.ended);
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());

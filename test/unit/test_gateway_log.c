@@ -2,7 +2,7 @@
 // What the gateway writes for people.
 #include "config/gateway_config.h"
 #include "sockets/log.h"
-#include "start/report.h"
+#include "start/start_report.h"
 
 #include "unity.h"
 

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 static size_t length;
@@ -21,6 +22,15 @@ static gw_keeper_t keeper;
 static const char *heard;
 static int error;
 static char second[128];
+static int fsync_error; ///< Of the disk, for a keeper that is opened after it is set; 0: none.
+
+int fsync(int fd) {
+    if (fsync_error != 0) {
+        errno = fsync_error;
+        return -1;
+    }
+    return (int)syscall(SYS_fsync, fd);
+}
 
 void setUp(void) {}
 
@@ -140,6 +150,28 @@ static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
     TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
 }
 
+static void test_keeper_reports_a_failed_fsync_and_a_failed_rename(void) {
+    put_file("file", "old");
+    fsync_error = EIO;
+    open_keeper(folder, GW_KEEPER_READ);
+    fsync_error = 0;
+    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(EIO, error);
+    assert_file("file", "old");
+    gw_keeper_close(&keeper);
+    (void)unlink(in_folder("file"));
+    open_keeper(folder, GW_KEEPER_ABSENT);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file"), 0700));
+    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(EISDIR, error);
+    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
+    gw_keeper_close(&keeper);
+    (void)rmdir(in_folder("file"));
+    put_file("file", "old");
+}
+
 static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
     put_file("other", "precious");
     name_again("other", "file.new");
@@ -225,6 +257,7 @@ int main(void) {
     RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);
     RUN_TEST(test_keeper_takes_no_link_pipe_or_giant_for_its_file);
     RUN_TEST(test_keeper_that_cannot_write_keeps_the_old_file);
+    RUN_TEST(test_keeper_reports_a_failed_fsync_and_a_failed_rename);
     RUN_TEST(test_keeper_never_writes_into_a_file_that_is_there_already);
     RUN_TEST(test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger);
     RUN_TEST(test_keeper_uses_no_folder_in_which_others_can_put_things);

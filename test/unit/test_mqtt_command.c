@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which commands by MQTT count, by their age on this machine's clock and their sender's count; and what is told of them.
-#include "command.h"
-#include "tell.h"
+#include "mqtt_command.h"
+#include "mqtt_tell.h"
 
 #include "unity.h"
 

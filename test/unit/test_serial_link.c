@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the relay knows of the board: which start of it, which stamp was heard when, and what is wrong with a line that says nothing right.
-#include "link.h"
+#include "serial_link.h"
 
 #include "unity.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The simulated bus: time on the wire, arbitration, acknowledgement, adapters' queues.
-#include "iwheel_sim/bus.h"
+#include "iwheel_sim/sim_bus.h"
 
 #include "unity.h"
 

@@ -2,8 +2,8 @@
 // What readers of the web bridge's stream get; its metrics, settings and token.
 #include "feed.h"
 #include "metrics.h"
-#include "settings.h"
 #include "token.h"
+#include "web_settings.h"
 
 #include "unity.h"
 

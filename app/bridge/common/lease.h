@@ -11,7 +11,7 @@
 #ifndef IW_BRIDGE_LEASE_H
 #define IW_BRIDGE_LEASE_H
 
-#include "line.h"
+#include "bridge_line.h"
 #include "secret.h"
 
 /// Longest name of a person with its terminator.

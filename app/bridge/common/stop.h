@@ -7,7 +7,7 @@
 #ifndef IW_BRIDGE_STOP_H
 #define IW_BRIDGE_STOP_H
 
-#include "line.h"
+#include "bridge_line.h"
 
 /// A stop that has no reply by then was not delivered. The connection is dropped and made again.
 #define BRIDGE_STOP_US 400000U

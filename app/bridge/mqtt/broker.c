@@ -4,7 +4,7 @@
 #include "credentials.h"
 #include "reasons.h"
 
-#include "common/link.h"
+#include "common/bridge_link.h"
 
 #include <errno.h>
 #include <mqtt_protocol.h>

@@ -11,8 +11,8 @@
 #ifndef IW_MQTT_BROKER_H
 #define IW_MQTT_BROKER_H
 
+#include "mqtt_settings.h"
 #include "peer.h"
-#include "settings.h"
 
 #include <mosquitto.h>
 #include <pthread.h>

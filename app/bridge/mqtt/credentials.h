@@ -3,7 +3,7 @@
 #ifndef IW_MQTT_CREDENTIALS_H
 #define IW_MQTT_CREDENTIALS_H
 
-#include "settings.h"
+#include "mqtt_settings.h"
 
 /// Checks the files of TLS, and reads user and password, which are the caller's to free; NULL: none. A file with a secret that others may read
 /// is refused. 0, or an exit code of sysexits with a line on stderr.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the bridge hands to the broker, in order, and what becomes of a message that the broker does not accept.
-#include "bridge.h"
+#include "mqtt_bridge.h"
 
 #include <string.h>
 

@@ -12,8 +12,8 @@
 #ifndef IW_MQTT_FETCH_H
 #define IW_MQTT_FETCH_H
 
-#include "command.h"
-#include "settings.h"
+#include "mqtt_command.h"
+#include "mqtt_settings.h"
 
 #include "iwheel_client/client.h"
 

@@ -5,7 +5,7 @@
 #ifndef IW_MQTT_FLEET_H
 #define IW_MQTT_FLEET_H
 
-#include "settings.h"
+#include "mqtt_settings.h"
 
 #include "iwheel_client/client.h"
 #include "iwheel_northbound/json_in.h"

@@ -4,7 +4,7 @@
 
 #include "broker.h"
 #include "fetch.h"
-#include "tell.h"
+#include "mqtt_tell.h"
 
 #include "common/service.h"
 #include "iwheel_northbound/json_out.h"

@@ -12,8 +12,8 @@
 #ifndef IW_MQTT_HISTORY_H
 #define IW_MQTT_HISTORY_H
 
-#include "command.h"
 #include "fleet.h"
+#include "mqtt_command.h"
 
 /// What is to be told. Wall clock in microseconds.
 typedef struct {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Commands of the bridge: judged, asked of the gateway, answered.
-#include "bridge.h"
+#include "mqtt_bridge.h"
 
 #include "iwheel_northbound/json_out.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sensors for Home Assistant, and whether the broker passes them on.
-#include "bridge.h"
+#include "mqtt_bridge.h"
 
 #include <string.h>
 

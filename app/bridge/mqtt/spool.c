@@ -2,7 +2,7 @@
 #include "spool.h"
 
 #include "folder.h"
-#include "settings.h"
+#include "mqtt_settings.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -6,7 +6,7 @@
 #ifndef IW_MQTT_STREAM_H
 #define IW_MQTT_STREAM_H
 
-#include "settings.h"
+#include "mqtt_settings.h"
 
 /// Its name at the servers.
 #define STREAM_NAME     "iwheel"

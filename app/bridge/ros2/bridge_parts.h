@@ -3,7 +3,7 @@
 #ifndef ROS2_BRIDGE_PARTS_H
 #define ROS2_BRIDGE_PARTS_H
 
-#include "bridge.h"
+#include "ros2_bridge.h"
 
 #include <time.h>
 

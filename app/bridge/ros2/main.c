@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bridge.h"
+#include "ros2_bridge.h"
 
 #include "common/program.h"
 #include "common/reach.h"

@@ -15,10 +15,10 @@
 #ifndef IW_SERIAL_RELAY_H
 #define IW_SERIAL_RELAY_H
 
-#include "link.h"
 #include "port.h"
 #include "queue.h"
-#include "settings.h"
+#include "serial_link.h"
+#include "serial_settings.h"
 
 #include "common/service.h"
 #include "sockets/clients.h"

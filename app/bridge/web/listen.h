@@ -6,7 +6,7 @@
 #define IW_WEB_LISTEN_H
 
 #include "door.h"
-#include "settings.h"
+#include "web_settings.h"
 
 /// 0 with the sockets (-1: none); or an exit code, with a line on stderr. The addresses are read from the kernel.
 int web_listen(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]);

@@ -8,11 +8,11 @@
 
 #include "door.h"
 #include "driver.h"
-#include "link.h"
 #include "metrics.h"
 #include "proof.h"
-#include "settings.h"
 #include "token.h"
+#include "web_link.h"
+#include "web_settings.h"
 
 #include <microhttpd.h>
 

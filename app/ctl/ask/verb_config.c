@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The configuration of a gateway that keeps it itself, which is a board behind iwheel-serial.
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include <string.h>
 

@@ -3,8 +3,8 @@
 #include "config/similar.h"
 #include "inspect/assumption.h"
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/words.h"
 

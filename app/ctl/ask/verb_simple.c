@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Verbs that are one request and one answer.
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/text.h"
 

@@ -12,7 +12,7 @@
 #define BRINGUP_H
 
 #include "doctor/doctor.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 /// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
 #define BRINGUP_SPEED_MM_S  100

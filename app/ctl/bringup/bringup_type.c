@@ -5,7 +5,7 @@
 // no torque whichever role is right. The other way round, a zero with full current could be full torque.
 #include "bringup.h"
 #include "learn/learn.h"
-#include "recordings/recording.h"
+#include "recordings/ctl_recording.h"
 
 #include <inttypes.h>
 #include <stdio.h>

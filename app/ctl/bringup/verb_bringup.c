@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "bringup.h"
-#include "talk/words.h"
+#include "talk/ctl_words.h"
 
 #include <errno.h>
 #include <stdio.h>

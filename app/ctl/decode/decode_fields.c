@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #define PERCENT_MAX     100
 #define MN_PER_CN       10

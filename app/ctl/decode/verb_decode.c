@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 #include "frame.h"
-#include "recordings/recording.h"
+#include "recordings/ctl_recording.h"
 #include "talk/ctl.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <jansson.h>

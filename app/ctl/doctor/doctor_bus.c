@@ -3,7 +3,7 @@
 #include "doctor.h"
 #include "inspect/assumption.h"
 #include "status/advice.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/words.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "doctor.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include <poll.h>
 #include <stdio.h>

@@ -9,7 +9,7 @@
 // waited for, a second at the most.
 #include "drive_words.h"
 #include "talk/ctl.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "learn_findings.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <stdarg.h>

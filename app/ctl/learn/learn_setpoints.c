@@ -2,7 +2,7 @@
 // What the setpoints of the recording tell: type, role of the current, length. Where a wheel's behaviour belongs to the
 // claim, it was seen as well.
 #include "learn_findings.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/text.h"
 

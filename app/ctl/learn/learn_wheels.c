@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the wheels of the recording showed: signs, scale, ticks, units of force, byte order.
 #include "learn_findings.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "learn_drives.h"
-#include "recordings/recording.h"
+#include "recordings/ctl_recording.h"
 #include "talk/ctl.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <jansson.h>
@@ -171,7 +171,7 @@ static void report(const study_t *study, const char *name) {
 }
 
 // The same as the report, for programs: what was counted (evidence), what it tells, what it suggests.
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <jansson.h>

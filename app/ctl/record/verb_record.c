@@ -2,8 +2,8 @@
 #include "candump.h"
 #include "decode/frame.h"
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_linux/backend.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "replay.h"
 
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/why.h"
 #include "iwheel_northbound/words.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include "recordings/ctl_recording.h"
 #include "recordings/events.h"
-#include "recordings/recording.h"
 #include "replay.h"
 #include "talk/ctl.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <errno.h>
 #include <inttypes.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "advice.h"
 
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <stdarg.h>
 #include <stdio.h>

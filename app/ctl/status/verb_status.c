@@ -2,8 +2,8 @@
 // The answer of `status`, drawn for a human: at most 80 columns, every number with its unit, `--` for what is unknown.
 #include "advice.h"
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include "iwheel_northbound/text.h"
 

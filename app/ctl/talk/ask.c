@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ctl.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <errno.h>
 #include <grp.h>

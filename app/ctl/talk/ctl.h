@@ -6,7 +6,7 @@
 #ifndef CTL_H
 #define CTL_H
 
-#include "client.h"
+#include "ctl_client.h"
 
 /// Exit codes of all programs (sysexits).
 enum {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What stands where.
 #include "status/advice.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 #include "top.h"
 
 #include <ctype.h>

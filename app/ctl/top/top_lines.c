@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Both wheels: what they are told and what they do, as bars on one scale, and the rest in numbers. Below them bus, send gaps,
 // ledger, stop budget, warnings.
-#include "text/text.h"
+#include "text/ctl_text.h"
 #include "top.h"
 
 #include "iwheel_northbound/text.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "top.h"
 
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <curses.h>
 #include <stdarg.h>

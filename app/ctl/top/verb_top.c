@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The live screen: snapshots come ten times a second, keys go out as requests. It never arms.
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 #include "top.h"
 
 #include <curses.h>

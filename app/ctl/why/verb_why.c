@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include "ctl_why.h"
 #include "decode/frame.h"
 #include "status/advice.h"
 #include "talk/ctl.h"
-#include "talk/words.h"
-#include "text/text.h"
-#include "why.h"
+#include "talk/ctl_words.h"
+#include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "why.h"
+#include "ctl_why.h"
 
+#include "recordings/ctl_recording.h"
 #include "recordings/events.h"
-#include "recordings/recording.h"
-#include "text/text.h"
+#include "text/ctl_text.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report.h"
+#include "start_report.h"
 
 #include "config/gateway_config.h"
 #include "sockets/owners.h"

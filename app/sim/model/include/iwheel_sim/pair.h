@@ -21,7 +21,7 @@
 
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
-#include "iwheel_sim/wheel.h"
+#include "iwheel_sim/sim_wheel.h"
 
 typedef struct {
     sim_wheel_config_t wheel[IW_SIDES];

@@ -18,8 +18,8 @@
 #ifndef IWHEEL_SIM_WORLD_H
 #define IWHEEL_SIM_WORLD_H
 
-#include "iwheel_sim/bus.h"
 #include "iwheel_sim/pair.h"
+#include "iwheel_sim/sim_bus.h"
 
 /// Ports of the bus. Clients have the rest.
 #define SIM_PORT_LEFT     0U

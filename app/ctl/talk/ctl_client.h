@@ -3,8 +3,8 @@
 ///
 /// Nothing here blocks longer than the deadline it is given (CLOCK_MONOTONIC, microseconds). IWC_INTERRUPTED: a signal caught by
 /// `signals_catch` that `seen_signals` does not count yet.
-#ifndef CLIENT_H
-#define CLIENT_H
+#ifndef CTL_CLIENT_H
+#define CTL_CLIENT_H
 
 #include "iwheel_client/client.h"
 

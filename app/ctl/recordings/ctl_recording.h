@@ -5,12 +5,12 @@
 /// A file of a recording is read where it lies or, if it is not there or may not be read, fetched from the gateway, which reads it
 /// for whoever may ask it. Only a file whose name is one of the gateway's own recordings is asked for, by that name alone; the
 /// folder before it is ours.
-#ifndef RECORDING_H
-#define RECORDING_H
+#ifndef CTL_RECORDING_H
+#define CTL_RECORDING_H
 
 #include "candump_reader.h"
 #include "talk/ctl.h"
-#include "talk/words.h"
+#include "talk/ctl_words.h"
 
 #include "iwheel/config.h"
 

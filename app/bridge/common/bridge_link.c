@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "link.h"
+#include "bridge_link.h"
 
 #include <stdio.h>
 #include <string.h>

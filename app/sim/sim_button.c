@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "button.h"
+#include "sim_button.h"
 
 #include <errno.h>
 #include <sys/socket.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "link.h"
+#include "serial_link.h"
 
 #include <string.h>
 

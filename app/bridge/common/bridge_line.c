@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "line.h"
+#include "bridge_line.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "link.h"
+#include "web_link.h"
 
 #include <stdio.h>
 #include <stdlib.h>

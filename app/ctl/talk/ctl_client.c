@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "client.h"
+#include "ctl_client.h"
 
 #include <limits.h>
 #include <stddef.h>

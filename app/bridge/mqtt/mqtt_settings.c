@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "settings.h"
+#include "mqtt_settings.h"
 
-#include "command.h"
+#include "mqtt_command.h"
 
 #include <arpa/inet.h>
 #include <ctype.h>

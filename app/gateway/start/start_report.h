@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What people read about the gateway: what it tells of itself at start, and `--check`.
-#ifndef GATEWAY_REPORT_H
-#define GATEWAY_REPORT_H
+#ifndef START_REPORT_H
+#define START_REPORT_H
 
 #include "sockets/listener.h"
 

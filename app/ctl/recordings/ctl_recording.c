@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "recording.h"
+#include "ctl_recording.h"
 
 #include "config/gateway_config.h"
 

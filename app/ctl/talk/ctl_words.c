@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "words.h"
+#include "ctl_words.h"
 
 #include "ctl.h"
 

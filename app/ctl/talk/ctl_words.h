@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The words behind a verb: options, with a value or without, and at most one word that is none.
-#ifndef WORDS_H
-#define WORDS_H
+#ifndef CTL_WORDS_H
+#define CTL_WORDS_H
 
 #include "text/duration.h"
 

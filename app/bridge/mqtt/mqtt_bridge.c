@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bridge.h"
+#include "mqtt_bridge.h"
 
 #include "folder.h"
 

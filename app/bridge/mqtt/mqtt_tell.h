@@ -5,8 +5,8 @@
 #ifndef IW_MQTT_TELL_H
 #define IW_MQTT_TELL_H
 
-#include "command.h"
-#include "settings.h"
+#include "mqtt_command.h"
+#include "mqtt_settings.h"
 
 #include "iwheel_client/client.h"
 

@@ -3,8 +3,8 @@
 #ifndef IW_WEB_LINK_H
 #define IW_WEB_LINK_H
 
+#include "common/bridge_link.h"
 #include "common/lease.h"
-#include "common/link.h"
 #include "feed.h"
 
 #define WEB_STOPS_KEPT 16U

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "command.h"
+#include "mqtt_command.h"
 
-#include "settings.h"
+#include "mqtt_settings.h"
 
 #include "iwheel_northbound/json_out.h"
 

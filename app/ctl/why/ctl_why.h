@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The stops that were: told by the gateway, or recorded on disk. Private to why.
-#ifndef WHY_H
-#define WHY_H
+#ifndef CTL_WHY_H
+#define CTL_WHY_H
 
 #include "candump.h"
 #include "talk/ctl.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel_sim/wheel.h"
+#include "iwheel_sim/sim_wheel.h"
 
 #define TEMPERATURE_AMBIENT_degC 28
 /// 2000 mA end 40 K above ambient, after some minutes of this time constant in status frames of 40 ms.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "settings.h"
+#include "web_settings.h"
 
 #include <arpa/inet.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "text.h"
+#include "ctl_text.h"
 
 #include "iwheel_northbound/text.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Text for people: safe on a terminal, with units, `--` for what is not known.
-#ifndef TEXT_H
-#define TEXT_H
+#ifndef CTL_TEXT_H
+#define CTL_TEXT_H
 
 #include "iwheel/config.h"
 

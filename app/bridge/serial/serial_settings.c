@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "settings.h"
+#include "serial_settings.h"
 
 #include "port.h"
 

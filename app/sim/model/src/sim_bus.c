@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel_sim/bus.h"
+#include "iwheel_sim/sim_bus.h"
 
 IW_STATIC_ASSERT(SIM_BUS_PORTS < 32U, ports_fit_the_mask);
 

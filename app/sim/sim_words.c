@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "words.h"
+#include "sim_words.h"
 
 #include "candump.h"
 

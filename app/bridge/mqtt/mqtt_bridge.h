@@ -7,11 +7,11 @@
 #define IW_MQTT_BRIDGE_H
 
 #include "broker.h"
+#include "mqtt_tell.h"
 #include "spool.h"
-#include "tell.h"
 
+#include "common/bridge_link.h"
 #include "common/lease.h"
-#include "common/link.h"
 
 /// How long who has armed may take for the first command, and who drives between two.
 #define MQTT_FIRST_US  1000000U

@@ -4,7 +4,7 @@
 ///     STARTING --no gateway--> AWAY --subscribed--> HERE --lost--> AWAY, tried again after 0.1 s to 2 s
 ///        '--------------subscribed-----------------^
 ///
-/// The log reports an absent gateway once, when the link becomes AWAY. Connection and greeting are states of the line (line.h).
+/// The log reports an absent gateway once, when the link becomes AWAY. Connection and greeting are states of the line (bridge_line.h).
 ///
 /// Questions go over the connection that watches: at most BRIDGE_LINE_MAX of them have no reply, the others wait here in their order.
 /// Stops go over a connection of their own (stop.h) and never behind a question. No call waits. No question is sent twice.

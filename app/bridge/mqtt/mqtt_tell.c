@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "tell.h"
+#include "mqtt_tell.h"
 
 #include "iwheel_northbound/json_out.h"
 
