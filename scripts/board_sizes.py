@@ -77,7 +77,7 @@ def lines(builds):
             "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
             "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
             "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
-            "is the worst of main loop and interrupt, of the 2000 that sections.ld keeps for it; in emulation at least 256 of them stay unused.", "",
+            "is the worst of main loop and interrupt, of the 1792 that sections.ld keeps for it; in emulation at least 256 of them stay unused.", "",
             "| image             |    flash   |     RAM    |    stack   |", "|-------------------|-----------:|-----------:|-----------:|"]
     for board, (image, which, more) in BOARDS.items():
         for kind in ("listen", "demo", "gateway"):

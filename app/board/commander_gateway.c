@@ -93,6 +93,10 @@ void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t
     }
 }
 
+iw_snapshot_t *iw_report_room(void) {
+    return &host.server.seen;
+}
+
 void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     (void)iw_host_tell(&host, seen, estop_pressed);
     if (iw_host_wants_restart(&host)) {

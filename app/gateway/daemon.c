@@ -18,8 +18,9 @@ void gw_daemon_compose(gw_daemon_t *self) {
     self->knowledge.log = &self->log;
     self->knowledge.server = &self->answers.server;
     self->knowledge.configured = (gw_configured_t){&config->core, config->core.track_mm};
-    self->knowledge.button = (gw_button_t){.contact = {{config->estop.line, config->estop.active_high},
-                                                       {config->estop.line2, config->estop.active2_high}}};
+    self->knowledge.button = (gw_button_t){
+        .contact = {{config->estop.line, config->estop.active_high}, {config->estop.line2, config->estop.active2_high}},
+        .debounce_us = config->estop.debounce_ms * IW_US_PER_MS};
     self->knowledge.bus = config->bus.interface;
     self->answers.wheels = wheels;
     self->answers.knowledge = &self->knowledge;

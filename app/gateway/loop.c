@@ -80,7 +80,8 @@ void gw_loop_close(gw_daemon_t *daemon) {
 
 /// Leaves SERVES.
 static void shut_down(gw_daemon_t *daemon, gw_loop_phase_t phase) {
-    if (gw_wheels_look(&daemon->wheels).holding) {
+    // Whatever is sent now would have become a hold: a ramp, and the zeros for a process that died.
+    if (daemon->config.core.hold && gw_wheels_are_sent_to(&daemon->wheels)) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
                "parking brake");

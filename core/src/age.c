@@ -3,5 +3,8 @@
 
 uint32_t iw_age_us(iw_time_us_t then_us, iw_time_us_t now_us) {
     const iw_time_us_t age_us = now_us - then_us;
-    return (then_us <= now_us && age_us < UINT32_MAX) ? (uint32_t)age_us : UINT32_MAX;
+    if (then_us > now_us || age_us > UINT32_MAX) {
+        return UINT32_MAX;
+    }
+    return (uint32_t)age_us;
 }

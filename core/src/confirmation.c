@@ -13,8 +13,11 @@ void iw_confirmation_clear(iw_confirmation_t *self) {
 
 /// R6: one setpoint without echo, and one zero behind it. A longer queue would be played to a wheel that
 /// regains power; without the second place a stop would wait for an echo that may never come.
-bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero) {
-    return self->pending[side] < (zero ? 2U : 1U);
+uint32_t iw_confirmation_may_send(const iw_confirmation_t *self, bool zero) {
+    const uint32_t places = zero ? 2U : 1U;
+    const uint32_t left = (self->pending[IW_LEFT] < places) ? IW_SIDES_LEFT : IW_SIDES_NONE;
+    const uint32_t right = (self->pending[IW_RIGHT] < places) ? IW_SIDES_RIGHT : IW_SIDES_NONE;
+    return left + right;
 }
 
 /// Speed and current as they stand in the frame: the four bytes behind the type tell one setpoint from the next.

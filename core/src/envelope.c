@@ -9,15 +9,20 @@
 /// A setpoint means its speed at this radius: written here again, so that no error is shared.
 #define SETPOINT_RADIUS_MM 192U
 
+/// How much of the time since then counts.
+static IW_APART uint32_t counted_us(iw_time_us_t last_us, iw_time_us_t now_us) {
+    const uint32_t elapsed_us = iw_age_us(last_us, now_us);
+    return (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
+}
+
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
 static uint32_t allowance(uint32_t slope_mm_s2, uint32_t elapsed_us) {
-    const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
-    const uint32_t change_um_s = slope_mm_s2 * (elapsed / 1000U) + slope_mm_s2 * (elapsed % 1000U) / 1000U;
+    const uint32_t change_um_s = slope_mm_s2 * (elapsed_us / 1000U) + slope_mm_s2 * (elapsed_us % 1000U) / 1000U;
     return 1U + change_um_s / 1000U;
 }
 
 /// A reversal must pass through a zero that was sent, even where both slopes together would allow the step.
-static bool slew_ok(const iw_envelope_t *self, iw_side_t side, uint32_t elapsed_us, int32_t speed_mm_s) {
+static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t now_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
     const uint32_t to = (uint32_t)iw_magnitude(speed_mm_s);
@@ -29,6 +34,7 @@ static bool slew_ok(const iw_envelope_t *self, iw_side_t side, uint32_t elapsed_
     }
     const uint32_t slope_mm_s2 = (to > from) ? self->config->accel_mm_s2 : self->config->decel_mm_s2;
     const uint32_t change = (to > from) ? to - from : from - to;
+    const uint32_t elapsed_us = counted_us(self->last_us[side], now_us);
     return change <= allowance(slope_mm_s2, elapsed_us);
 }
 
@@ -70,8 +76,7 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
         return IW_ENVELOPE_SPEED;
     }
     // R8: a stop is never held up by its own slope.
-    if (!is_zero(config, setpoint) &&
-        !slew_ok(self, side, iw_age_us(self->last_us[side], now_us), setpoint->speed_mm_s)) {
+    if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us, setpoint->speed_mm_s)) {
         return IW_ENVELOPE_SLEW;
     }
     return IW_ENVELOPE_PASS;
@@ -103,26 +108,28 @@ static uint32_t turn_of(const iw_config_t *config, int32_t left_mm_s, int32_t ri
 
 /// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A
 /// pair that turns no more than the last one passes, as every stop does.
-static bool turn_ok(const iw_envelope_t *self, uint32_t elapsed_us, uint32_t turn_mm_s) {
+static bool turn_ok(const iw_envelope_t *self, iw_time_us_t now_us, uint32_t turn_mm_s) {
     const iw_config_t *const config = self->config;
-    const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
     const uint32_t span_mm2 = config->track_mm * SETPOINT_RADIUS_MM;
     const uint32_t most = turn_of(config, self->last_mm_s[IW_LEFT], self->last_mm_s[IW_RIGHT]) + TURN_ROUNDING_MM_S;
     if ((uint64_t)turn_mm_s * config->radius_mm * 1000U > (uint64_t)span_mm2 * config->max_yaw_mrad_s) {
         return false;
     }
-    return turn_mm_s <= most || (uint64_t)((turn_mm_s - most) * config->radius_mm) * 1000000000U <=
-                                    (uint64_t)(span_mm2 * config->yaw_accel_mrad_s2) * elapsed;
+    if (turn_mm_s <= most) {
+        return true;
+    }
+    // A zero may have passed for one wheel alone: what the pair does counts from the later of both.
+    const iw_time_us_t last_us =
+        (self->last_us[IW_LEFT] > self->last_us[IW_RIGHT]) ? self->last_us[IW_LEFT] : self->last_us[IW_RIGHT];
+    return (uint64_t)((turn_mm_s - most) * config->radius_mm) * 1000000000U <=
+           (uint64_t)(span_mm2 * config->yaw_accel_mrad_s2) * counted_us(last_us, now_us);
 }
 
 iw_envelope_verdict_t iw_envelope_check_pair(iw_envelope_t *self, const iw_can_frame_t frame[IW_SIDES],
                                              iw_time_us_t now_us) {
     const uint32_t turn_mm_s = turn_of(self->config, as_the_wheel_reads(frame[IW_LEFT].data).speed_mm_s,
                                        as_the_wheel_reads(frame[IW_RIGHT].data).speed_mm_s);
-    // A zero may have passed for one wheel alone: what the pair does counts from the later of both.
-    const iw_time_us_t last_us =
-        (self->last_us[IW_LEFT] > self->last_us[IW_RIGHT]) ? self->last_us[IW_LEFT] : self->last_us[IW_RIGHT];
-    if (!turn_ok(self, iw_age_us(last_us, now_us), turn_mm_s)) {
+    if (!turn_ok(self, now_us, turn_mm_s)) {
         self->stopped++;
         return IW_ENVELOPE_YAW;
     }

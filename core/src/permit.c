@@ -49,11 +49,12 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->diverged_us[0] = IW_NEVER;
     self->diverged_us[1] = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
+    self->keeps = config->hold;
     // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
     if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
-        self->kept = config->hold;
+        self->kept = self->keeps;
         self->stop.cause = IW_CAUSE_RESTART;
         self->stop.at_once = true;
         self->stop.at_us = now_us;
@@ -135,6 +136,8 @@ static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_u
     const bool silent = self->phase == IW_PHASE_LISTENING;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
+    // Who released the hold before did not know of it.
+    self->kept = self->keeps;
     self->at_once = is_at_once(event);
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
@@ -318,7 +321,8 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
     self->phase = (self->phase == IW_PHASE_LISTENING) ? IW_PHASE_ARMING : IW_PHASE_REARMING;
     self->arming_us = now_us;
     self->arm_refusal = IW_REFUSE_NONE;
-    self->kept = self->config->hold;
+    self->keeps = self->config->hold;
+    self->kept = self->keeps;
 }
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
@@ -359,23 +363,30 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
     return refusal;
 }
 
-void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
+/// Whoever drives or arms does so no longer.
+static IW_APART void end_holder(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us) {
     if (self->phase == IW_PHASE_ARMED) {
         brake_after(self, cause, now_us, 0);
-        self->stop.client = client;
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
-    self->kept = self->kept && cause != IW_CAUSE_SHUTDOWN;
+}
+
+void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
+    const bool armed = self->phase == IW_PHASE_ARMED;
+    end_holder(self, cause, now_us);
+    if (armed) {
+        self->stop.client = client;
+    }
+    if (cause == IW_CAUSE_SHUTDOWN) {
+        self->keeps = false;
+        self->kept = false;
+    }
 }
 
 void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
-    if (client != self->holder) {
-        return;
+    if (client == self->holder) {
+        end_holder(self, IW_CAUSE_CLIENT_GONE, now_us);
     }
-    if (self->phase == IW_PHASE_ARMED) {
-        brake_after(self, IW_CAUSE_CLIENT_GONE, now_us, 0);
-    }
-    end_arming(self, IW_REFUSE_NOT_ARMED);
 }
 
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {

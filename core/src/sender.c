@@ -16,9 +16,8 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
 
 /// A nonzero pair leaves whole or not at all (R5); a zero must not wait for the other wheel's echo (R6).
 bool iw_sender_ready(const iw_sender_t *self, bool zero) {
-    const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
-    const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
-    return zero ? left || right : left && right;
+    const uint32_t sides = iw_confirmation_may_send(&self->confirmation, zero);
+    return zero ? sides != IW_SIDES_NONE : sides == IW_SIDES_BOTH;
 }
 
 /// The frame for one wheel, in the wheel's own direction.
@@ -89,17 +88,16 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
 
 /// Both, or of a zero pair the one that may leave (`iw_sender_ready`).
 static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
-    const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
-    const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
+    const uint32_t sides = iw_confirmation_may_send(&self->confirmation, zero);
     bool accepted = true;
-    if (left && right) {
+    if (sides == IW_SIDES_BOTH) {
         accepted = hand_over_as_one(self, now_us, zero);
         if (accepted) {
             measure_gap(self, now_us);
         }
-    } else if (left) {
+    } else if (sides == IW_SIDES_LEFT) {
         accepted = hand_over(self, IW_LEFT, now_us);
-    } else if (right) {
+    } else if (sides == IW_SIDES_RIGHT) {
         accepted = hand_over(self, IW_RIGHT, now_us);
     }
     return accepted;

@@ -62,7 +62,7 @@ static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side
     out_wheel->speed_mm_s = wheel->speed_mm_s;
     out_wheel->um_s_per_rpm = wheel->um_s_per_rpm;
     out_wheel->reboots = wheel->reboots;
-    out_wheel->heard = rest_us > 0U || iw_wheel_heard(wheel, now_us);
+    out_wheel->heard = iw_wheel_heard(wheel, now_us);
     out_wheel->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
 }
 

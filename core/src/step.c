@@ -317,11 +317,12 @@ static IW_APART void watch_rolling(iw_gateway_t *self) {
     iw_rolling_step(&self->rolling, self->now_us, alone && (turns(self, IW_LEFT) || turns(self, IW_RIGHT)));
 }
 
-/// How long both wheels have been at rest; 0: one turns, or is not heard.
+/// How long both wheels, which are heard, have been at rest; 0: one turns.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
-    const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], self->now_us);
-    const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], self->now_us);
-    return (left_us < right_us) ? left_us : right_us;
+    const iw_time_us_t left_us = self->wheel[IW_LEFT].rest_since_us;
+    const iw_time_us_t right_us = self->wheel[IW_RIGHT].rest_since_us;
+    const iw_time_us_t since_us = (left_us > right_us) ? left_us : right_us;
+    return (since_us == IW_NEVER) ? 0U : iw_age_us(since_us, self->now_us);
 }
 
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
@@ -330,7 +331,6 @@ static void judge_wheels(iw_gateway_t *self) {
     iw_permit_view_t *const view = &self->permit.view;
     const bool heard =
         iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
-    const uint32_t rest_us = both_rest_us(self);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
@@ -343,17 +343,17 @@ static void judge_wheels(iw_gateway_t *self) {
         }
         watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
         watch_wheel(self, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
-        iw_watch_pair(self, heard);
+        iw_watch_pair(self, &applied, heard);
         watch_rolling(self);
     }
+    const uint32_t rest_us = heard ? both_rest_us(self) : 0U;
     view->heard = heard;
     view->applied = applied;
     view->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
     view->settled = rest_us >= IW_PERMIT_SETTLED_US;
     view->output_zero = iw_setpoint_is_zero(&self->setpoint);
     view->timing_ok = !self->facts.timing_contradicted;
-    view->can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
-                     iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
+    view->can_send = iw_confirmation_may_send(&self->sender.confirmation, true) == IW_SIDES_BOTH;
     // Sent at or after the request: the echo of an older zero pair does not arm.
     view->proven = iw_permit_arming(&self->permit) &&
                    iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;

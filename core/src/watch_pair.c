@@ -9,10 +9,10 @@ int32_t iw_watch_own_mm_s(const iw_gateway_t *self, size_t side) {
     return (self->config.invert[side] ? -speed_um_s : speed_um_s) / 1000;
 }
 
-static void compare(iw_gateway_t *self) {
+static void compare(iw_gateway_t *self, const iw_pair_t *applied) {
     iw_diverge_t *const diverge = &self->diverge;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
+        diverge->applied_mm_s[side] = applied->wheel[side].speed_mm_s;
     }
     const iw_diverge_verdict_t verdict = iw_diverge_step(diverge, self->now_us);
     if (verdict != IW_DIVERGE_NOT) {
@@ -29,12 +29,12 @@ static bool has_ended(const iw_gateway_t *self) {
     return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));
 }
 
-void iw_watch_pair(iw_gateway_t *self, bool heard) {
+void iw_watch_pair(iw_gateway_t *self, const iw_pair_t *applied, bool heard) {
     iw_diverge_t *const diverge = &self->diverge;
     iw_diverge_begin(diverge, self->permit.armed_us);
     if (has_ended(self) || !heard || self->setpoint.from_zero) {
         iw_diverge_restart(diverge, self->now_us);
     } else {
-        compare(self);
+        compare(self, applied);
     }
 }

@@ -191,6 +191,8 @@ static const settings_key_t keys[] = {
      "The button's second contact, as line: pressed if either says so, released only if both do. none: there is none.",
      TEXT(estop.line2, settings_wrong_address)},
     {"estop", "line2_active", "", "Level of line2 that means pressed, as active.", WORD(estop.active2_high, low_high)},
+    {"estop", "chip2", "", "Of line2, as chip.", TEXT(estop.chip2, settings_wrong_address)},
+    {"estop", "chip2_line", "", "Of line2, as chip_line.", TEXT(estop.chip2_line, settings_wrong_address)},
     {"estop", "estop_discrepancy_ms", " ms",
      "If the contacts differ for longer, the stop latches until both were seen pressed, then released.",
      NUMBER(estop.discrepancy_ms, 50, 1000)},
@@ -347,7 +349,7 @@ IW_STATIC_ASSERT(sizeof keys / sizeof keys[0] <= SETTINGS_KEYS_MAX, keys_fit);
 void gateway_config_default(gateway_config_t *out_config) {
     static const gateway_config_t standard = {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
-        .estop = {"ESTOP", true, 5U, "any", "any", "none", true, 200U},
+        .estop = {"ESTOP", true, 5U, "any", "any", "none", true, "any", "any", 200U},
         .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U, 1000U},
         .record = {30U, "/var/lib/iwheel", 200U},
     };

@@ -44,6 +44,8 @@ typedef struct gateway_config {
         char chip_line[32];               ///< The line's own name, as seen at bringup; `any`: not compared.
         char line2[GATEWAY_ADDRESS_SIZE]; ///< The button's second contact, as `line`; `none`: it has one.
         bool active2_high;                ///< As `active_high`.
+        char chip2[32];                   ///< As `chip`.
+        char chip2_line[32];              ///< As `chip_line`.
         uint16_t discrepancy_ms;          ///< The contacts may differ for so long, 50..1000; more than `debounce_ms`.
     } estop;
     struct {

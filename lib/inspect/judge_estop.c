@@ -29,10 +29,13 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
         return has_gpio() ? "there is no such line; gpioinfo lists them"
                           : "this machine has no GPIO chip (/dev/gpiochip*): load its driver, or use another input";
     case ENOTUNIQ:
-        return "two lines have this name; set [estop] line to gpiochipN:OFFSET of the wired one (gpioinfo lists them)";
+        return "two lines have this name; write the wired one as gpiochipN:OFFSET under [estop] (gpioinfo lists them)";
     case EREMCHG:
-        return "the line is of another chip, or has another name, than [estop] chip and chip_line say: find the wired "
-               "one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor";
+        return (first != 0)
+                   ? "the line is of another chip, or has another name, than [estop] chip and chip_line say: find "
+                     "the wired one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor"
+                   : "line2 is of another chip, or has another name, than [estop] chip2 and chip2_line say: find "
+                     "the wired one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor";
     case EBUSY:
         return "the line is busy: another program has it; gpioinfo names that program";
     case EACCES:
@@ -67,7 +70,8 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
         inspect_cure(findings, "wire a button and set [estop] line");
     } else if (estop->level < 0) {
         inspect_say(findings, "estop", estop->no_gpio ? findings->absent : INSPECT_FAIL,
-                    "e-stop %s: unreadable, which counts as pressed", estop->line);
+                    "e-stop %s: unreadable%s%s, which counts as pressed", estop->line,
+                    (estop->pressed_at != NULL) ? " at " : "", (estop->pressed_at != NULL) ? estop->pressed_at : "");
         inspect_cure(findings, "%s", estop->trouble);
     } else if (estop->level == IW_ESTOP_DISAGREES) {
         inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: its two contacts disagree, pressed at %s", estop->line,

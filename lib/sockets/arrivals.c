@@ -96,7 +96,7 @@ static gw_client_t *older(gw_client_t *known, gw_client_t *other) {
 static void look_at_taken(places_t *seen, gw_client_t *place, uid_t uid) {
     const bool own = place->uid == uid;
     seen->held += own ? 1U : 0U;
-    if (!place->said && !place->closing) {
+    if (!place->said && !gw_client_is_closing(place)) {
         seen->oldest = older(seen->oldest, place);
         if (own) {
             seen->own = older(seen->own, place);
@@ -145,7 +145,7 @@ static void hear_stop(gw_clients_t *self, const newcomer_t *newcomer, gw_right_t
     client->close_us = self->now_us + GW_STOP_US;
     client->readable = true;
     gw_service_serve(self, client);
-    if (place == NULL && !client->closing && !client->said) {
+    if (place == NULL && !gw_client_is_closing(client) && !client->said) {
         turn_away(self, client);
     }
     (void)gw_service_flush_one(self, client);
@@ -216,7 +216,7 @@ void gw_service_tend_arrivals(gw_clients_t *self) {
     uint32_t i = (self->count[GW_STOP] > 0U) ? gw_clients_from(self, gw_parts[GW_STOP].first) : GW_CLIENTS_MAX;
     for (; i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         gw_client_t *client = &self->client[i];
-        if (client->closing || self->now_us < client->close_us) {
+        if (gw_client_is_closing(client) || self->now_us < client->close_us) {
             continue;
         }
         if (client->said) {

@@ -10,7 +10,7 @@
 
 void gw_client_read(gw_client_t *self) {
     const size_t room = sizeof self->in - self->in_length;
-    if (room == 0U || self->closing || self->ended) {
+    if (room == 0U || self->phase != GW_OPEN) {
         return;
     }
     const ssize_t count = recv(self->fd, &self->in[self->in_length], room, MSG_DONTWAIT);
@@ -18,9 +18,9 @@ void gw_client_read(gw_client_t *self) {
     if (count > 0) {
         self->in_length += (size_t)count;
     } else if (count == 0) {
-        self->ended = true;
+        self->phase = GW_ENDED;
     } else if (errno != EAGAIN && errno != EINTR) {
-        self->failed = true;
+        gw_client_break(self);
     }
 }
 
@@ -83,8 +83,8 @@ static bool queue(gw_client_t *self, const char *line, size_t length, size_t res
 }
 
 void gw_client_reply(gw_client_t *self, const char *line, size_t length) {
-    if (!self->failed && !queue(self, line, length, 0U)) {
-        self->failed = true;
+    if (!gw_client_is_broken(self) && !queue(self, line, length, 0U)) {
+        gw_client_break(self);
     }
 }
 
@@ -100,7 +100,7 @@ static bool tell_lost(gw_client_t *self) {
 }
 
 void gw_client_event(gw_client_t *self, const char *line, size_t length) {
-    if (self->closing || self->failed || self->ended) {
+    if (self->phase != GW_OPEN) {
         return;
     }
     if (self->lost > 0U && tell_lost(self)) {
@@ -112,7 +112,7 @@ void gw_client_event(gw_client_t *self, const char *line, size_t length) {
 }
 
 void gw_client_flush(gw_client_t *self) {
-    if (self->failed || self->out_start == self->out_end) {
+    if (gw_client_is_broken(self) || self->out_start == self->out_end) {
         return;
     }
     const ssize_t count =
@@ -120,7 +120,7 @@ void gw_client_flush(gw_client_t *self) {
     if (count > 0) {
         self->out_start += (size_t)count;
     } else if (count < 0 && errno != EAGAIN && errno != EINTR) {
-        self->failed = true;
+        gw_client_break(self);
     }
     if (self->out_start == self->out_end) {
         self->out_start = 0;
@@ -129,12 +129,16 @@ void gw_client_flush(gw_client_t *self) {
 }
 
 bool gw_client_flushed(const gw_client_t *self) {
-    return self->failed || self->out_start == self->out_end;
+    return gw_client_is_broken(self) || self->out_start == self->out_end;
+}
+
+void gw_client_break(gw_client_t *self) {
+    self->phase = gw_client_is_closing(self) ? GW_GONE : GW_BROKEN;
 }
 
 void gw_client_finish(gw_client_t *self, iw_time_us_t now_us) {
-    if (!self->closing) {
-        self->closing = true;
+    if (!gw_client_is_closing(self)) {
+        self->phase = (self->phase == GW_BROKEN) ? GW_GONE : GW_CLOSING;
         self->close_us = now_us + GW_CLOSING_US;
     }
 }

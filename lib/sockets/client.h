@@ -5,7 +5,10 @@
 /// there is room again); half of it is kept for replies, and a client that does not take even those is dropped.
 /// Nothing here waits.
 ///
-///     FREE --accept--> OPEN --end of file, error, line too long--> CLOSING (flush, at most GW_CLOSING_US) --> FREE
+///     FREE --accept--> OPEN --end of file--> ENDED
+///     OPEN, ENDED --gw_client_finish--> CLOSING --all is sent, or GW_CLOSING_US have passed--> FREE
+///     OPEN, ENDED --an error--> BROKEN --gw_client_finish--> GONE --> FREE
+///     CLOSING --an error, or nobody reads--> GONE
 #ifndef GATEWAY_CLIENT_H
 #define GATEWAY_CLIENT_H
 
@@ -23,6 +26,14 @@
 /// A request carried out this soon after its client had nothing waiting counts as sent when it is carried out.
 #define GW_PROMPT_US 25000U
 
+typedef enum {
+    GW_OPEN = 0,
+    GW_ENDED,   ///< Nothing more comes; complete lines that came before still count.
+    GW_BROKEN,  ///< It cannot be read or written; nobody has been told yet.
+    GW_CLOSING, ///< Nothing more is read; what is queued is sent.
+    GW_GONE,    ///< Neither; its slot can be freed.
+} gw_phase_t;
+
 typedef struct gw_client {
     iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
     int fd;
@@ -30,15 +41,15 @@ typedef struct gw_client {
     uid_t uid; ///< Of its user.
     gw_right_t right;
     uint32_t interest; ///< What epoll was told to watch.
-    bool readable;     ///< epoll says so, in this cycle.
+    gw_phase_t phase;
+    // What the wait has found: each may be true in every phase.
+    bool readable; ///< In this cycle.
     bool leaving;  ///< The other side will send nothing more, though lines of it may be waiting: it can hold no lease.
     bool hung_up;  ///< It reads nothing more either.
-    bool ended;    ///< End of file: complete lines before it still count.
-    bool closing;  ///< Nothing more is read.
-    bool failed;   ///< Cannot be written to any more.
-    bool said;     ///< Beyond the maximum: its one line was carried out.
-    bool arming;   ///< An arm waits for its reply; later lines wait behind it.
-    bool reading;  ///< A question about recordings has no answer yet; later lines do not wait for it.
+    // What its lines wait for: both may be true at once, for only the first holds up later lines.
+    bool held;     ///< Its next line waits: an arm is not decided, or the relay has no room.
+    bool owed;     ///< An answer is still to come; until then the connection is kept though it has ended.
+    bool said;     ///< Beyond the maximum: its one line was carried out. True until it is freed, whatever the phase.
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
     bool drained;  ///< The last read took all there was.
     iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
@@ -85,6 +96,19 @@ void gw_client_event(gw_client_t *self, const char *line, size_t length);
 /// Sends what is queued, as far as it goes. One system call.
 void gw_client_flush(gw_client_t *self);
 bool gw_client_flushed(const gw_client_t *self);
+
+/// It cannot be read or written any more.
+void gw_client_break(gw_client_t *self);
+
+/// It is being closed.
+static inline bool gw_client_is_closing(const gw_client_t *self) {
+    return self->phase == GW_CLOSING || self->phase == GW_GONE;
+}
+
+/// It cannot be written.
+static inline bool gw_client_is_broken(const gw_client_t *self) {
+    return self->phase == GW_BROKEN || self->phase == GW_GONE;
+}
 
 /// Nothing more is read; it is closed when it has taken what is queued.
 void gw_client_finish(gw_client_t *self, iw_time_us_t now_us);

@@ -68,7 +68,7 @@ static void refuse_long_line(gw_clients_t *self, gw_client_t *client) {
 
 static bool has_line(const gw_client_t *client) {
     size_t length;
-    return !client->closing && !client->arming && !client->said && gw_client_line(client, &length) != NULL;
+    return !gw_client_is_closing(client) && !client->held && !client->said && gw_client_line(client, &length) != NULL;
 }
 
 /// A line of it may be carried out now. One that has hung up is done with at once.
@@ -85,7 +85,7 @@ static void pace(gw_client_t *client, iw_time_us_t now_us) {
 }
 
 static void carry_out_lines(gw_clients_t *self, gw_client_t *client) {
-    for (unsigned i = 0; i < GW_LINES_PER_CYCLE && !client->failed && has_turn(self, client); i++) {
+    for (unsigned i = 0; i < GW_LINES_PER_CYCLE && !gw_client_is_broken(client) && has_turn(self, client); i++) {
         size_t length;
         const char *line = gw_client_line(client, &length);
         self->servant.carry_out(self->servant.context, client, line, length);
@@ -97,8 +97,8 @@ static void carry_out_lines(gw_clients_t *self, gw_client_t *client) {
 
 /// Nothing of it is left to be done, but for a recording that it waits for and can take.
 static bool has_ended(const gw_client_t *client) {
-    const bool waits = client->reading && !client->hung_up;
-    return client->ended && (client->arming || (!has_line(client) && !waits));
+    const bool waits = client->owed && !client->hung_up;
+    return client->phase == GW_ENDED && (client->held || (!has_line(client) && !waits));
 }
 
 void gw_service_serve(gw_clients_t *self, gw_client_t *client) {
@@ -109,16 +109,16 @@ void gw_service_serve(gw_clients_t *self, gw_client_t *client) {
         gw_client_read(client);
     }
     carry_out_lines(self, client);
-    if (!client->closing && !client->arming && gw_client_line_too_long(client)) {
+    if (!gw_client_is_closing(client) && !client->held && gw_client_line_too_long(client)) {
         refuse_long_line(self, client);
     }
-    const bool done = client->said && !client->reading; // Its one line is answered.
-    const bool gone = client->failed || done || has_ended(client);
-    if (gone && !client->closing) {
+    const bool done = client->said && !client->owed; // Its one line is answered.
+    const bool over = client->phase == GW_BROKEN || done || has_ended(client);
+    if (over && !gw_client_is_closing(client)) {
         gw_service_finish(self, client);
     }
-    if (client->hung_up && client->closing) {
-        client->failed = true; // Nobody reads any more.
+    if (client->hung_up && client->phase == GW_CLOSING) {
+        gw_client_break(client); // Nobody reads any more.
     }
     client->readable = false;
 }
@@ -198,7 +198,7 @@ void gw_service_clients(gw_clients_t *self, iw_client_t holder) {
 /// Reading is wanted unless there is no room or no use (a watcher whose next line has to wait wakes nobody with more of them);
 /// writing only while something waits.
 static void update_interest(gw_clients_t *self, gw_client_t *client) {
-    const bool reading = !client->closing && !client->ended && client->in_length < sizeof client->in &&
+    const bool reading = client->phase == GW_OPEN && client->in_length < sizeof client->in &&
                          (client->right != GW_WATCH || !has_line(client));
     const uint32_t wanted =
         (reading ? (uint32_t)(EPOLLIN | EPOLLRDHUP) : 0U) | (gw_client_flushed(client) ? 0U : (uint32_t)EPOLLOUT);
@@ -214,10 +214,10 @@ static void update_interest(gw_clients_t *self, gw_client_t *client) {
 bool gw_service_flush_one(gw_clients_t *self, gw_client_t *client) {
     const bool waiting = !gw_client_flushed(client);
     gw_client_flush(client);
-    if (client->failed && !client->closing) {
+    if (client->phase == GW_BROKEN) {
         gw_service_finish(self, client);
     }
-    if (client->closing && (gw_client_flushed(client) || self->now_us >= client->close_us)) {
+    if (gw_client_is_closing(client) && (gw_client_flushed(client) || self->now_us >= client->close_us)) {
         gw_service_release(self, client);
     } else {
         update_interest(self, client);
@@ -248,7 +248,7 @@ iw_time_us_t gw_service_next_us(const gw_clients_t *self) {
     }
     for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         const gw_client_t *client = &self->client[i];
-        if ((client->closing || client->right == GW_STOP) && client->close_us < next_us) {
+        if ((gw_client_is_closing(client) || client->right == GW_STOP) && client->close_us < next_us) {
             next_us = client->close_us;
         }
         if (client->right == GW_WATCH && client->line_us < next_us && has_line(client)) {

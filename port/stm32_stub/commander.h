@@ -2,17 +2,20 @@
 /// Where the commands come from. **This is the place for a product's own command source**: a joystick, a serial line, a
 /// planner.
 ///
-/// A source is one file with three functions. CMakeLists.txt chooses one of three that come with this port:
+/// A source is one file, which CMake chooses. The first is beside this file, the others are in app/board:
 ///
-/// | file             | chosen by                                    | does                                          |
-/// |------------------|----------------------------------------------|-----------------------------------------------|
-/// | commander_none.c | nothing configured                           | nothing: the image listens, silently          |
-/// | commander_zero.c | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE | arms when it may, holds both wheels at 0/0    |
-/// | commander_demo.c | these and IWHEEL_DEMO                        | as zero; a press of PA1 starts a slow profile |
+/// | file                | chosen by                                    | does                                        |
+/// |---------------------|----------------------------------------------|---------------------------------------------|
+/// | commander_none.c    | nothing configured                           | nothing: the image listens, silently        |
+/// | commander_zero.c    | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE | arms when it may, holds both wheels at 0/0  |
+/// | commander_demo.c    | these and IWHEEL_DEMO                        | as zero; pressing PA1 starts a slow profile |
+/// | commander_gateway.c | IWHEEL_GATEWAY                               | what a host asks over the serial line       |
 ///
-/// There is no host that could reset a latch, so in all of them a press of the button at PA1 does: let go and pressed
-/// again after what latched, refused as any reset (safety: cause gone for a second, e-stop released, both wheels heard
-/// and at rest), and never the beginning of motion. Power off and on does it too.
+/// The first three have commander.c, console.c and report.c beside them; the last one brings what these do.
+///
+/// Without a host nobody else could reset a latch, so in these three a press of the button at PA1 does: let go and
+/// pressed again after what latched, refused as any reset (safety: cause gone for a second, e-stop released, both
+/// wheels heard and at rest), and never the beginning of motion. Power off and on does it too.
 ///
 /// Rules for one's own: call `iw_gateway_drive` only with a value that somebody wants *now*, since each accepted call
 /// feeds the lease and the lease is what stops the wheels when nobody is there any more. Do not repeat an old value, do

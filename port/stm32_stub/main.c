@@ -112,11 +112,11 @@ static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
     iw_commander_step(commander, gateway, now_us);
     const iw_time_us_t next_us = iw_gateway_step(gateway, now_us);
     const bool estop_high = iw_pins_estop_high();
-    static iw_snapshot_t seen; // Not on the stack, which it would nearly double.
-    iw_gateway_snapshot(gateway, now_us, &seen);
-    iw_marker_step(&seen);
-    iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(&seen, estop_high), now_us));
-    iw_report_step(&seen, estop_high);
+    iw_snapshot_t *const seen = iw_report_room(); // Not on the stack, which it would nearly double.
+    iw_gateway_snapshot(gateway, now_us, seen);
+    iw_marker_step(seen);
+    iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(seen, estop_high), now_us));
+    iw_report_step(seen, estop_high);
     const bool more = iw_console_step();
     iw_watchdog_feed();
     iw_sleep_until((more && next_us > now_us + CHARACTER_US) ? now_us + CHARACTER_US : next_us);

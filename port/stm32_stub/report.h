@@ -17,6 +17,9 @@ void iw_report_no_crystal(void);
 /// The first line. `restarted`: the run before was sending, so zeros come first.
 void iw_report_start(bool restarted);
 
+/// Where the loop puts the snapshot after each step: whoever reports has one anyway.
+iw_snapshot_t *iw_report_room(void);
+
 /// After each step: a line when state, cause, bus or e-stop changed, or somebody asks.
 void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed);
 

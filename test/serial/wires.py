@@ -273,6 +273,20 @@ class Damage:
         return bytes(data)
 
 
+class FirstAnswer:
+    """The first piece with an answer has one wrong byte."""
+
+    def __init__(self):
+        self.done = False
+
+    def __call__(self, data):
+        at = -1 if self.done else data.find(b'"id":')
+        if at < 0:
+            return data
+        self.done = True
+        return data[:at] + b"!" + data[at + 1:]
+
+
 @scenario("a wire that damages one line in thirty to the board: what is lost is not obeyed, and a stop always arrives", 12)
 def noisy(t):
     rig, client = begin(t)
@@ -299,6 +313,9 @@ def noisy(t):
 @scenario("a wire that damages one line in thirty from the board: a client is told what has no answer, and a stop is said again", 8)
 def deaf(t):
     rig, client = begin(t)
+    client.timeout = 5.0  # After 3 s the relay says that there is no answer.
+    rig.cable.down = FirstAnswer()
+    t.expect(client.request("status"), "internal")
     rig.cable.down = Damage(random.Random(4))
     for _ in range(4):
         for _ in range(8):

@@ -506,6 +506,7 @@ static bool latches_with_a_ramp(const oracle_t *self) {
 static void begin_latch(oracle_t *self, iw_time_us_t now_us) {
     self->latched_us = self->held_us = now_us;
     self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
+    oracle_hold_latched(self, now_us);
     if (latches_with_a_ramp(self)) {
         oracle_soft_stop(self, now_us);
     } else {

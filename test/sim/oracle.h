@@ -55,7 +55,8 @@ typedef struct {
     bool hard;  ///< Nothing but zero until armed anew.
     bool broken_pair;
     bool restarting;
-    bool kept; ///< With after_stop = hold: nothing has ended it since arm or the restart.
+    bool kept;  ///< With after_stop = hold: nothing has ended it since arm, a latch or the restart.
+    bool ended; ///< The process ends: a latch brings no hold any more.
     iw_time_us_t released_us;
     bool kept_unsure; ///< Frames of the dead process, or of another master: nobody can tell.
     bool proven;      ///< Echoes prove something in this run.

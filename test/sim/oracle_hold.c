@@ -8,6 +8,17 @@
 void oracle_hold_asked(oracle_t *self) {
     self->kept = self->config->hold;
     self->kept_unsure = false;
+    self->ended = false;
+}
+
+/// Whoever released the zeros before it did not know of the latch.
+void oracle_hold_latched(oracle_t *self, iw_time_us_t now_us) {
+    iw_snapshot_t seen;
+    iw_gateway_snapshot(self->gateway, now_us, &seen);
+    self->kept = self->config->hold && !self->ended && self->foreign_us != now_us;
+    if (self->kept && !self->latched_silent && !seen.holding) {
+        oracle_break(self, now_us, 823, "latched while zeros were sent, and no hold is told");
+    }
 }
 
 void oracle_hold_ended(oracle_t *self) {

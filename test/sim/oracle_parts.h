@@ -59,8 +59,9 @@ bool oracle_turns_too_fast(const oracle_t *self, int32_t left_mm_s, int32_t righ
 /// Right after the step: what was sent turns the machine no faster, and not faster too soon.
 void oracle_judge_turn(oracle_t *self, iw_time_us_t now_us);
 
-/// The hold of after_stop: arm asks for it; release and shutdown end it; another master may.
+/// The hold of after_stop: arm asks for it, and a latch; release and shutdown end it; another master may.
 void oracle_hold_asked(oracle_t *self);
+void oracle_hold_latched(oracle_t *self, iw_time_us_t now_us);
 void oracle_hold_ended(oracle_t *self);
 void oracle_hold_foreign(oracle_t *self);
 /// Zeros must go on, whatever the time.

@@ -139,6 +139,7 @@ void oracle_stop(oracle_t *self, iw_time_us_t now_us, bool matters) {
 
 void oracle_shutdown(oracle_t *self, iw_time_us_t now_us) {
     self->released_us = now_us;
+    self->ended = true;
     oracle_hold_ended(self);
 }
 

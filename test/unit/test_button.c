@@ -74,6 +74,16 @@ static void test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
 }
 
+/// A release is told late, by the debounce time: that is no part of the press.
+static void test_button_press_is_not_longer_by_its_debounce_time(void) {
+    button.debounce_us = MS(100);
+    (void)hold(0, 10);
+    (void)hold(1, 140);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
+    (void)hold(1, 150);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
+}
+
 static void test_button_pressed_at_the_start_shows_nothing(void) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
@@ -168,6 +178,34 @@ static void test_button_of_two_contacts_is_tried_by_a_press_of_both(void) {
     TEST_ASSERT_TRUE(tried.contact[1].active_high);
 }
 
+/// The time of both counts, not that of whichever is released last.
+static void test_button_of_two_contacts_is_not_tried_by_a_moment_of_both(void) {
+    for (int first = 0; first < 2; first++) {
+        set_up_two();
+        (void)hold_both(0, 0, 10);
+        (void)hold_both(1, 1, 40);
+        (void)hold_both(first, 1 - first, 1000);
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+        (void)hold_both(1, 1, 40);
+        (void)hold_both(first, 1 - first, 100);
+        (void)hold_both(1, 1, 40); // Again, and no longer.
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+        (void)hold_both(1, 1, 50);
+        (void)hold_both(first, 1 - first, 10);
+        (void)hold_both(1, 1, 10); // It has been long enough once.
+        TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+    }
+}
+
+/// Pressed at the start, both shows nothing, whatever one of them does.
+static void test_button_of_two_contacts_pressed_at_the_start_shows_nothing(void) {
+    set_up_two();
+    (void)hold_both(1, 1, 1000);
+    (void)hold_both(0, 1, 100);
+    (void)hold_both(1, 1, 1000);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+}
+
 static void test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing(void) {
     set_up_two();
     (void)hold_both(0, 0, 10);
@@ -205,6 +243,26 @@ static void test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_
     button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", true}}};
     hal.two_contacts = false;
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
+}
+
+/// One contact is stuck: at the next start both read released, and only what is kept can warn.
+static void test_button_whose_contacts_disagree_is_void_until_both_were_tried_again(void) {
+    set_up_two();
+    (void)hold_both(0, 0, 10);
+    (void)hold_both(1, 1, 100);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 100));
+    hal.estop_last = IW_ESTOP_DISAGREES; // By time alone.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_BROKEN, hold_both(1, 0, 100));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+    (void)hold_both(1, 1, 100);
+    (void)hold_both(1, 0, 300); // It shows the fault again.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
+    TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
+    (void)hold_both(1, 1, 100);
+    hal.estop_last = 0;
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
 }
 
 static void test_button_stored_without_a_second_contact_is_that_of_one(void) {
@@ -283,15 +341,19 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_button_pressed_and_released_is_tried_on_this_wiring);
     RUN_TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise);
+    RUN_TEST(test_button_press_is_not_longer_by_its_debounce_time);
     RUN_TEST(test_button_pressed_at_the_start_shows_nothing);
     RUN_TEST(test_button_unreadable_or_gone_breaks_the_press);
     RUN_TEST(test_button_that_is_simulated_or_absent_is_never_tried);
     RUN_TEST(test_button_of_any_other_wiring_is_void);
     RUN_TEST(test_button_whose_line_cannot_be_read_is_not_void);
     RUN_TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both);
+    RUN_TEST(test_button_of_two_contacts_is_not_tried_by_a_moment_of_both);
+    RUN_TEST(test_button_of_two_contacts_pressed_at_the_start_shows_nothing);
     RUN_TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing);
     RUN_TEST(test_button_with_another_second_contact_is_void);
     RUN_TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round);
+    RUN_TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again);
     RUN_TEST(test_button_stored_without_a_second_contact_is_that_of_one);
     RUN_TEST(test_button_that_says_the_same_is_not_asked_for_its_names);
     RUN_TEST(test_button_is_stored_and_read_back);

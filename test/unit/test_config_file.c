@@ -112,7 +112,7 @@ static void test_parse_every_key_reaches_its_field(void) {
         "60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
         "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\npair_mm=61\npair_leak_ms=1001\nwheel_lag_ms=62\n[estop]"
         "\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip=pinctrl-bcm2711\nchip_line=GPIO4\nline2=gpiochip0:"
-        "5\nline2_active=low\n"
+        "5\nline2_active=low\nchip2=expander\nchip2_line=P7\n"
         "estop_discrepancy_ms=150\n"
         "[northbound]\nsocket=/tmp/s\nmode=0600\ngroup=dialout\nmax_clients=4\n[record]\nblackbox_s=0\ndirectory=/"
         "tmp\n");
@@ -151,6 +151,8 @@ static void test_parse_every_key_reaches_its_field(void) {
     TEST_ASSERT_FALSE(config.estop.active_high);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:5", config.estop.line2);
     TEST_ASSERT_FALSE(config.estop.active2_high);
+    TEST_ASSERT_EQUAL_STRING("expander", config.estop.chip2);
+    TEST_ASSERT_EQUAL_STRING("P7", config.estop.chip2_line);
     TEST_ASSERT_EQUAL_UINT16(150, config.estop.discrepancy_ms);
     TEST_ASSERT_EQUAL_UINT16(7, config.estop.debounce_ms);
     TEST_ASSERT_EQUAL_STRING("/tmp/s", config.northbound.socket);

@@ -13,18 +13,21 @@ int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
 
 static bringup_t bringup;
 static iw_estop_seen_t seen;
+static iw_estop_seen_t seen2;
 static int error;
 
 int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
-    TEST_ASSERT_EQUAL_STRING("ESTOP", name);
-    *out_seen = seen;
-    return error;
+    const bool second = strcmp(name, "ESTOP2") == 0;
+    TEST_ASSERT_EQUAL_STRING(second ? "ESTOP2" : "ESTOP", name);
+    *out_seen = second ? seen2 : seen;
+    return second ? 0 : error;
 }
 
 void setUp(void) {
     memset(&bringup, 0, sizeof bringup);
     gateway_config_default(&bringup.config);
     seen = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "ESTOP"};
+    seen2 = (iw_estop_seen_t){.chip = "expander", .line = "P7"};
     error = 0;
 }
 
@@ -35,6 +38,8 @@ static void stored(const char *chip, const char *line, unsigned notes) {
     TEST_ASSERT_EQUAL_STRING(chip, bringup.config.estop.chip);
     TEST_ASSERT_EQUAL_STRING(line, bringup.config.estop.chip_line);
     TEST_ASSERT_EQUAL_UINT(notes, bringup.notes);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2_line);
 }
 
 static void test_wiring_is_stored_with_a_note_for_each_name(void) {
@@ -56,9 +61,26 @@ static void test_wiring_that_a_configuration_cannot_hold_is_left_out(void) {
     stored("any", "ESTOP", 1);
 }
 
+static void use_two_contacts(void) {
+    strcpy(bringup.config.estop.line2, "ESTOP2");
+}
+
+static void test_wiring_of_both_contacts_is_stored(void) {
+    use_two_contacts();
+    bringup_store_wiring(&bringup);
+    TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", bringup.config.estop.chip);
+    TEST_ASSERT_EQUAL_STRING("ESTOP", bringup.config.estop.chip_line);
+    TEST_ASSERT_EQUAL_STRING("expander", bringup.config.estop.chip2);
+    TEST_ASSERT_EQUAL_STRING("P7", bringup.config.estop.chip2_line);
+    TEST_ASSERT_EQUAL_UINT(4, bringup.notes);
+}
+
 static void test_wiring_of_an_earlier_bringup_is_forgotten(void) {
+    use_two_contacts();
     bringup_store_wiring(&bringup);
     bringup_forget_wiring(&bringup);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2_line);
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip);
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip_line);
 }
@@ -69,6 +91,7 @@ int main(void) {
     RUN_TEST(test_wiring_of_a_line_without_a_name_is_that_of_its_chip);
     RUN_TEST(test_wiring_that_cannot_be_read_is_not_stored);
     RUN_TEST(test_wiring_that_a_configuration_cannot_hold_is_left_out);
+    RUN_TEST(test_wiring_of_both_contacts_is_stored);
     RUN_TEST(test_wiring_of_an_earlier_bringup_is_forgotten);
     return UNITY_END();
 }

@@ -327,6 +327,34 @@ static void test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disag
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
 }
 
+static void test_refusal_names_the_contact_that_is_meant(void) {
+    static const struct {
+        int first;
+        int second;
+        const char *said;
+    } cases[] = {{0, -1, "the e-stop SECOND cannot be read"}, {1, -1, "the e-stop SECOND cannot be read"},
+                 {-1, 0, "the e-stop FIRST cannot be read"},  {-1, 1, "the e-stop FIRST cannot be read"},
+                 {-1, -1, "the e-stop FIRST cannot be read"}, {0, 1, "the e-stop SECOND is pressed"},
+                 {1, 0, "the e-stop FIRST is pressed"},       {1, 1, "the e-stop FIRST is pressed"}};
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    wheels->hal.two_contacts = true;
+    wheels->estop = "FIRST";
+    wheels->estop2 = "SECOND";
+    iw_estop_pair_init(&wheels->hal.pair, 200000U);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        daemon_rig.estop = cases[i].first;
+        daemon_rig.estop2 = cases[i].second;
+        daemon_rig_run(20);
+        const char *reply = daemon_rig_ask(client, "{\"cmd\":\"reset\"}");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, cases[i].said), reply);
+    }
+    wheels->hal.two_contacts = false; // What the second said last is worth nothing then.
+    TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
+    daemon_rig.estop2 = -1;
+    wheels->hal.contact_last[1] = -1;
+    TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
+}
+
 static void test_warning_that_goes_on_is_said_once(void) {
     static iw_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
@@ -359,6 +387,7 @@ int main(void) {
     RUN_TEST(test_purge_by_the_port_is_told_once_in_the_log);
     RUN_TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link);
     RUN_TEST(test_warning_that_goes_on_is_said_once);
+    RUN_TEST(test_refusal_names_the_contact_that_is_meant);
     RUN_TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree);
     return UNITY_END();
 }

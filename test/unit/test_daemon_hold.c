@@ -102,6 +102,36 @@ static void test_hold_ends_with_the_process_which_warns(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
+static void test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns(void) {
+    for (unsigned crashed = 0; crashed < 2U; crashed++) {
+        if (crashed != 0U) {
+            drive_and_stop();
+            daemon_rig_crash();
+            daemon_rig_start();
+            daemon_rig_run(100);
+        } else {
+            begin_again();
+            daemon_rig_arm(client);
+        }
+        TEST_ASSERT_FALSE(gw_wheels_look(&daemon_rig.daemon->wheels).holding);
+        daemon_rig_keep_log();
+        TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+        daemon_rig_run(3000);
+        TEST_ASSERT_TRUE(daemon_rig.ended);
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "use its parking brake"));
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_process_that_sends_nothing_ends_without_a_warning(void) {
+    daemon_rig_keep_log();
+    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+    daemon_rig_run(200);
+    TEST_ASSERT_TRUE(daemon_rig.ended);
+    TEST_ASSERT_NULL(strstr(daemon_rig_log(), "use its parking brake"));
+}
+
 static void test_release_that_is_too_old_changes_nothing(void) {
     static const int64_t late_ms[] = {1001, 1100, 60000};
     drive_and_stop();
@@ -132,7 +162,19 @@ static void test_release_is_refused_to_who_only_watches_and_while_somebody_drive
     assert_held(IW_STATE_STOPPING, 5000);
     daemon_rig_arm(client);
     assert_reply("{\"cmd\":\"release\"}", "\"error\":\"not_at_rest\"");
+    assert_reply("{\"cmd\":\"release\"}", " holds the lease for another ");
+    assert_reply("{\"cmd\":\"release\"}", " ms at least; let it stop first\"");
     (void)close(watcher);
+}
+
+static void test_release_in_the_ramp_is_told_to_wait_for_its_end(void) {
+    drive_and_stop();
+    daemon_rig_arm(client);
+    (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
+    daemon_rig_run(150);
+    (void)daemon_rig_ask(client, "{\"cmd\":\"stop\"}");
+    assert_reply("{\"cmd\":\"release\"}",
+                 "\"error\":\"not_at_rest\",\"message\":\"the wheels turn or are told to: left ");
 }
 
 int main(void) {
@@ -141,8 +183,11 @@ int main(void) {
     RUN_TEST(test_hold_of_a_latch_outlives_its_reset);
     RUN_TEST(test_hold_is_resumed_by_the_next_start);
     RUN_TEST(test_hold_ends_with_the_process_which_warns);
+    RUN_TEST(test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns);
+    RUN_TEST(test_process_that_sends_nothing_ends_without_a_warning);
     RUN_TEST(test_release_that_is_too_old_changes_nothing);
     RUN_TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing);
     RUN_TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives);
+    RUN_TEST(test_release_in_the_ramp_is_told_to_wait_for_its_end);
     return UNITY_END();
 }

@@ -307,12 +307,12 @@ static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair));
     daemon_rig.daemon->box.reader.fd = pair[0];
     for (unsigned i = 0; i < 4U; i++) {
-        clients->client[i].reading = true;
+        clients->client[i].owed = true;
     }
     (void)close(pair[1]);
     TEST_ASSERT_FALSE(gw_recordings_take(&daemon_rig.daemon->answers));
     for (unsigned i = 0; i < 4U; i++) {
-        TEST_ASSERT_FALSE(clients->client[i].reading);
+        TEST_ASSERT_FALSE(clients->client[i].owed);
     }
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         (void)close(others[i]);
@@ -424,8 +424,46 @@ static void test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute(void) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, fault));
 }
 
+/// How many recordings were ordered since the last call, and the last of them.
+static unsigned take_orders(int writer, gw_box_order_t *out_last) {
+    unsigned orders = 0;
+    while (recv(writer, out_last, sizeof *out_last, MSG_DONTWAIT) == (ssize_t)sizeof *out_last) {
+        orders++;
+    }
+    return orders;
+}
+
+static void test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told(void) {
+    static gw_box_order_t order;
+    gw_box_t *box = &daemon_rig.daemon->box;
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends));
+    box->wish.blackbox_s = 1;
+    box->writer.fd = ends[0];
+    (void)count_told(true, false, "rolling");
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes it.
+    (void)count_told(true, true, "rolling");
+    TEST_ASSERT_EQUAL_UINT(1, take_orders(ends[1], &order));
+    TEST_ASSERT_EQUAL_STRING("rolling", order.cause);
+    TEST_ASSERT_EQUAL_STRING("listening", order.from);
+    TEST_ASSERT_EQUAL_UINT32(0, order.note.stop.number);
+    TEST_ASSERT_NOT_NULL(strstr(order.note.sentence, "parking brake"));
+    (void)count_told(false, false, "rolling");
+    daemon_rig_run(1000);
+    (void)count_told(true, true, "rolling");
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // The second within a minute.
+    (void)close(ends[1]);
+    (void)count_told(false, false, "rolling");
+    daemon_rig_run(60000);
+    (void)count_told(true, true, "rolling"); // Nobody writes: the loop goes on.
+    box->wish.blackbox_s = 0;
+    box->writer.fd = -1;
+    (void)close(ends[0]);
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told);
     RUN_TEST(test_end_of_zeros_is_told_before_it_comes);
     RUN_TEST(test_rolling_is_told_when_it_begins_and_when_it_ends);
     RUN_TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute);

@@ -542,6 +542,29 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
     TEST_ASSERT_NOT_NULL(strstr(text, "the last ones left 300 mm/s and right 0 mm/s"));
 }
 
+/// Of a machine that rolls away: no stop, so that the recording of the last stop stays the last stop's.
+static void test_rolling_is_recorded_and_is_no_stop(void) {
+    static char text[16384];
+    static const iw_codec_wheel_t told;
+    iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iw_clock_now_us() - GW_BOX_AFTER_US};
+    gw_log_t log;
+    start();
+    record("estop_line", 0);
+    gw_log_open(&log, GW_LOG_ERROR);
+    seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = 1500};
+    seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = -101, .heard = true};
+    gw_record_rolling(&box, &log, &seen);
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(0, box.last.number);
+    TEST_ASSERT_EQUAL(0, box.last.error);
+    TEST_ASSERT_EQUAL(3, box.stop.number);
+    TEST_ASSERT_TRUE(is_there("stop-000002-rolling.log") && is_there("stop-000002-rolling.conf"));
+    read_file("stop-000002-rolling.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"cause\":\"rolling\",\"side\":\"right\","), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "use its parking brake"), text);
+    gw_log_close(&log);
+}
+
 static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
     config.record.blackbox_s = 0;
     start();
@@ -554,6 +577,7 @@ static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_rolling_is_recorded_and_is_no_stop);
     RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
     RUN_TEST(test_what_happens_after_the_stop_is_written_too);
     RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);

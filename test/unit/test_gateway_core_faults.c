@@ -235,6 +235,25 @@ static void test_gateway_both_wheels_silent_are_both_named(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop()->sides);
 }
 
+/// Its last frames showed standstill. Zeros that ended after `zero_hold_ms` would rely on frames that no longer come.
+static void test_gateway_wheel_offline_at_standstill_is_not_at_rest(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        gateway_rig_arm(&rig);
+        (void)gateway_rig_cruise(&rig, 0, 0, MS(1000));
+        TEST_ASSERT_TRUE(rig.gateway.permit.view.settled);
+        rig.wheel[side].mute = true;
+        gateway_rig_run(&rig, MS(5000));
+        assert_latched(IW_CAUSE_WHEEL_LOST);
+        TEST_ASSERT_FALSE(rig.gateway.permit.view.at_rest);
+        TEST_ASSERT_EQUAL_INT(IW_PHASE_CUT, rig.gateway.permit.phase);
+        rig.wheel[side].mute = false;
+        gateway_rig_run(&rig, MS(1000));
+        TEST_ASSERT_EQUAL_INT(IW_PHASE_LATCHED, rig.gateway.permit.phase);
+        tearDown();
+    }
+}
+
 static void test_gateway_never_heard_wheels_refuse_arm(void) {
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(1000));
@@ -407,6 +426,7 @@ int main(void) {
     RUN_TEST(test_gateway_second_master_while_arming_ends_it);
     RUN_TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period);
     RUN_TEST(test_gateway_both_wheels_silent_are_both_named);
+    RUN_TEST(test_gateway_wheel_offline_at_standstill_is_not_at_rest);
     RUN_TEST(test_gateway_never_heard_wheels_refuse_arm);
     RUN_TEST(test_gateway_rebooted_wheel_latches);
     RUN_TEST(test_gateway_wheel_against_its_command_latches);

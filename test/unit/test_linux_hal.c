@@ -160,6 +160,21 @@ static void test_one_line_under_two_names_is_no_second_contact(void) {
     TEST_ASSERT_EQUAL_INT(0, open_with("D", "A"));
 }
 
+static void test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first(void) {
+    static const char too_long[] = "01234567890123456789012345678901";
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    if (iw_gpio_estop_ops == NULL) {
+        TEST_IGNORE_MESSAGE("without libgpiod");
+    }
+    const iw_estop_wish_t chip = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2 = too_long};
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, "unix:/nowhere/bus", &chip, &culprit));
+    TEST_ASSERT_EQUAL_STRING("B", culprit);
+    const iw_estop_wish_t line = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2_line = too_long};
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, "unix:/nowhere/bus", &line, &culprit));
+    TEST_ASSERT_EQUAL_STRING("B", culprit);
+}
+
 static void test_second_contact_is_read_whatever_the_first_says(void) {
     set_up_two();
     answer = 1;
@@ -238,6 +253,7 @@ int main(void) {
     RUN_TEST(test_last_answer_is_kept);
     RUN_TEST(test_next_time_is_the_sooner_of_bus_and_estop);
     RUN_TEST(test_one_line_under_two_names_is_no_second_contact);
+    RUN_TEST(test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first);
     RUN_TEST(test_second_contact_is_read_whatever_the_first_says);
     RUN_TEST(test_contacts_are_judged_at_the_time_of_the_round);
     RUN_TEST(test_each_contact_is_watched_tended_and_told_of);

@@ -87,7 +87,7 @@ static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
     say("stop");
     (void)shutdown(peer, SHUT_WR);
     gw_client_read(&client);
-    TEST_ASSERT_TRUE(client.ended);
+    TEST_ASSERT_EQUAL_INT(GW_ENDED, client.phase);
     expect_no_line();
 }
 
@@ -120,7 +120,7 @@ static void test_client_that_does_not_read_loses_events_and_is_told_how_many(voi
         gw_client_flush(&client);
         TEST_ASSERT_LESS_THAN_UINT(10000, sent++);
     }
-    TEST_ASSERT_FALSE(client.failed);
+    TEST_ASSERT_FALSE(gw_client_is_broken(&client));
     (void)drain(NULL, 0);
     gw_client_event(&client, "after\n", 6);
     char text[128] = "";
@@ -134,9 +134,9 @@ static void test_client_room_for_the_longest_reply_is_kept_free_of_events(void) 
         gw_client_event(&client, big, 1000);
     }
     gw_client_reply(&client, big, GW_REPLY_MAX);
-    TEST_ASSERT_FALSE(client.failed);
+    TEST_ASSERT_FALSE(gw_client_is_broken(&client));
     gw_client_reply(&client, big, GW_REPLY_MAX);
-    TEST_ASSERT_TRUE(client.failed);
+    TEST_ASSERT_TRUE(gw_client_is_broken(&client));
 }
 
 static void test_client_event_to_one_that_is_leaving_is_dropped(void) {
@@ -152,7 +152,7 @@ static void test_client_gone_is_noticed_when_written_to(void) {
     (void)close(peer);
     gw_client_reply(&client, "x\n", 2);
     gw_client_flush(&client);
-    TEST_ASSERT_TRUE(client.failed);
+    TEST_ASSERT_TRUE(gw_client_is_broken(&client));
     peer = -1;
 }
 
@@ -227,10 +227,10 @@ static void test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ende
     }
     TEST_ASSERT_EQUAL_INT(1, (int)send(peer, "x", 1, MSG_NOSIGNAL));
     gw_client_read(&client);
-    TEST_ASSERT_FALSE(client.ended);
+    TEST_ASSERT_NOT_EQUAL_INT(GW_ENDED, client.phase);
     TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
     client.in_length = 0;
-    client.closing = true;
+    client.phase = GW_CLOSING;
     gw_client_read(&client);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
 }

@@ -166,6 +166,31 @@ static void test_permit_keep_reset_ends_the_latch_and_not_the_hold(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
+/// Whoever released the zeros of a stop did not know of the button that is pressed since.
+static void test_permit_keep_latch_after_release_is_held_again(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    release();
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    assert_held_for_a_day(IW_STATE_LATCHED);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    assert_held_for_a_day(IW_STATE_STOPPING);
+    release();
+    assert_silent(IW_STATE_LISTENING);
+}
+
+static void test_permit_keep_latch_after_release_is_not_held_unless_configured(void) {
+    rig.config.hold = false;
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    release();
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
+}
+
 static void test_permit_keep_no_other_request_ends_it(void) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
@@ -208,6 +233,19 @@ static void test_permit_keep_ends_with_the_gateway(void) {
     iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
     permit_rig_step(&rig);
     assert_silent(IW_STATE_LISTENING);
+}
+
+/// Of a gateway that did not end after all.
+static void test_permit_keep_comes_back_with_arm_after_the_gateways_end(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    calm();
+    iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    permit_rig_wait(&rig, MS(1500));
+    assert_silent(IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    assert_held_for_a_day(IW_STATE_LATCHED);
 }
 
 static void test_permit_keep_gives_way_to_a_second_master(void) {
@@ -305,9 +343,12 @@ int main(void) {
     RUN_TEST(test_permit_keep_release_in_silence_changes_nothing);
     RUN_TEST(test_permit_keep_latch_out_of_silence_is_silent);
     RUN_TEST(test_permit_keep_reset_ends_the_latch_and_not_the_hold);
+    RUN_TEST(test_permit_keep_latch_after_release_is_held_again);
+    RUN_TEST(test_permit_keep_latch_after_release_is_not_held_unless_configured);
     RUN_TEST(test_permit_keep_no_other_request_ends_it);
     RUN_TEST(test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails);
     RUN_TEST(test_permit_keep_ends_with_the_gateway);
+    RUN_TEST(test_permit_keep_comes_back_with_arm_after_the_gateways_end);
     RUN_TEST(test_permit_keep_gives_way_to_a_second_master);
     RUN_TEST(test_permit_keep_lasts_through_every_other_fault);
     RUN_TEST(test_permit_keep_is_resumed_by_a_restart);

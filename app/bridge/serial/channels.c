@@ -154,7 +154,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
     iwn_request_t request;
     iwn_refusal_t refusal;
     iwn_json_t root;
-    if (channel == NULL || client->closing) {
+    if (channel == NULL || gw_client_is_closing(client)) {
         return;
     }
     iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
@@ -169,7 +169,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
         forward(self, channel, &request, root, gw_client_sent_us(client, self->now_us, since_us));
     }
-    client->arming = serial_queue_is_full(&channel->queue); // The next line stays where it is.
+    client->held = serial_queue_is_full(&channel->queue); // The next line stays where it is.
 }
 
 gw_servant_t relay_servant(relay_t *self) {
@@ -301,7 +301,7 @@ void relay_drop_clients(relay_t *self) {
 
 static void tend(relay_t *self, relay_channel_t *channel) {
     gw_client_t *client = gw_clients_find(&self->clients, channel->client);
-    if (client == NULL || client->closing || client->failed) {
+    if (client == NULL || gw_client_is_closing(client) || gw_client_is_broken(client)) {
         release(channel);
         return;
     }
@@ -317,9 +317,9 @@ static void tend(relay_t *self, relay_channel_t *channel) {
         return;
     }
     tell_answered(self, channel, client);
-    client->reading = channel->queue.count > 0U; // Who has said all it has to say is kept for its answers.
-    if (client->arming && !serial_queue_is_full(&channel->queue)) {
-        client->arming = false;
+    client->owed = channel->queue.count > 0U; // Who has said all it has to say is kept for its answers.
+    if (client->held && !serial_queue_is_full(&channel->queue)) {
+        client->held = false;
         gw_client_check_caught_up(client, self->now_us);
     }
 }

@@ -47,7 +47,7 @@ static bool forward_stop(relay_t *self, gw_client_t *client, const iwn_request_t
         return false;
     }
     serial_queue_put(&channel->queue);
-    client->reading = true; // Until the board has answered, or its time is over.
+    client->owed = true; // Until the board has answered, or its time is over.
     return true;
 }
 
@@ -70,7 +70,7 @@ gw_client_t *relay_guest_or(relay_t *self, gw_client_t *client, const serial_req
     }
     gw_client_t *guest = gw_clients_find(&self->clients, request->guest);
     if (guest != NULL) {
-        guest->reading = false;
+        guest->owed = false;
     }
     return guest;
 }

@@ -1,30 +1,45 @@
 // SPDX-License-Identifier: MIT
-// What the line is called whose button was seen to work.
+// What the lines are called whose button was seen to work.
 #include "bringup.h"
 
 #include <stdio.h>
+#include <string.h>
+
+static const char *const keys[IW_ESTOP_CONTACTS][2] = {{"chip", "chip_line"}, {"chip2", "chip2_line"}};
+
+static int set(bringup_t *self, const char *name, const char *value, FILE *complaints) {
+    char key[32];
+    (void)snprintf(key, sizeof key, "estop.%s", name);
+    return gateway_config_override(&self->config, key, value, "bringup", complaints);
+}
 
 void bringup_forget_wiring(bringup_t *self) {
-    (void)gateway_config_override(&self->config, "estop.chip", "any", "bringup", stderr);
-    (void)gateway_config_override(&self->config, "estop.chip_line", "any", "bringup", stderr);
+    for (size_t i = 0; i < IW_ESTOP_CONTACTS; i++) {
+        (void)set(self, keys[i][0], "any", stderr);
+        (void)set(self, keys[i][1], "any", stderr);
+    }
+}
+
+static void store_contact(bringup_t *self, size_t contact, const char *line, FILE *nowhere) {
+    iw_estop_seen_t seen;
+    if (strcmp(line, "none") == 0 || iw_estop_see(line, &seen) != 0) {
+        return;
+    }
+    const char *const found[] = {seen.chip, seen.line};
+    for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {
+        const char *key = keys[contact][i];
+        if (found[i][0] != '\0' && set(self, key, found[i], nowhere) == 0) {
+            bringup_note(self, "estop", key, NULL, "of the line whose press and release were seen");
+        }
+    }
 }
 
 void bringup_store_wiring(bringup_t *self) {
-    iw_estop_seen_t seen;
     FILE *const nowhere = fopen("/dev/null", "we");
-    if (nowhere == NULL || iw_estop_see(self->config.estop.line, &seen) != 0) {
-        seen = (iw_estop_seen_t){.chip = ""};
+    if (nowhere == NULL) {
+        return;
     }
-    const char *const found[][2] = {{"chip", seen.chip}, {"chip_line", seen.line}};
-    for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {
-        char key[32];
-        (void)snprintf(key, sizeof key, "estop.%s", found[i][0]);
-        if (found[i][1][0] != '\0' &&
-            gateway_config_override(&self->config, key, found[i][1], "bringup", nowhere) == 0) {
-            bringup_note(self, "estop", found[i][0], NULL, "of the line whose press and release were seen");
-        }
-    }
-    if (nowhere != NULL) {
-        (void)fclose(nowhere);
-    }
+    store_contact(self, 0, self->config.estop.line, nowhere);
+    store_contact(self, 1, self->config.estop.line2, nowhere);
+    (void)fclose(nowhere);
 }

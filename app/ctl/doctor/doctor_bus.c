@@ -139,6 +139,8 @@ static bool open_hal(doctor_t *self) {
                                   .chip_line = self->config.estop.chip_line,
                                   .name2 = is_occupied(self) ? NULL : self->config.estop.line2,
                                   .active_high2 = self->config.estop.active2_high,
+                                  .chip2 = self->config.estop.chip2,
+                                  .chip2_line = self->config.estop.chip2_line,
                                   .discrepancy_ms = self->config.estop.discrepancy_ms};
     const inspect_opened_t opened = inspect_open(&self->hal, self->bus, &line, &self->findings);
     self->open = opened.hal;

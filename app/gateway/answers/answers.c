@@ -143,12 +143,12 @@ void iwn_target_granted(iwn_server_t *server, iwn_client_t *client) {
     gw_served_t *served = (gw_served_t *)client;
     memcpy(served->key, self->key, sizeof served->key);
     served->arm_id = server->request.id;
-    gw_answers_connection(self, client)->arming = true;
+    gw_answers_connection(self, client)->held = true;
 }
 
 const iwn_id_t *iwn_target_settled(iwn_server_t *server, iwn_client_t *client) {
     gw_client_t *connection = gw_answers_connection(gw_answers_of(server), client);
-    connection->arming = false;
+    connection->held = false;
     gw_client_check_caught_up(connection, server->now_us);
     return &((const gw_served_t *)client)->arm_id;
 }
@@ -205,7 +205,7 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
 /// closed.
 static bool may_be_carried_out(gw_answers_t *self, const gw_client_t *connection, iwn_client_t *client, bool is_right) {
     const bool stops = is_right && iwn_cmd_stops(self->server.request.cmd);
-    if (connection->closing && !stops) {
+    if (gw_client_is_closing(connection) && !stops) {
         return false;
     }
     if (connection->right == GW_STOP && !stops) {
@@ -236,7 +236,7 @@ static void leave(void *context, gw_client_t *connection) {
     gw_served_t *served = gw_answers_served(self, connection);
     gw_wheels_time_request(self->wheels);
     gw_wheels_leave(self->wheels, connection->id);
-    connection->arming = false;
+    connection->held = false;
     served->client.arming = false;
     const iw_snapshot_t seen = gw_wheels_look(self->wheels);
     gw_answers_observe(self, &seen);

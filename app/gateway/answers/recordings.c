@@ -20,7 +20,7 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
     gw_box_question_t question = {
         .client = client->id, .list = request->cmd == IWN_CMD_RECORDINGS, .offset = request->offset};
     memcpy(question.name, request->file, sizeof question.name);
-    if (connection->reading) {
+    if (connection->owed) {
         why = "the recording asked for before is still being read; wait for that reply, then ask again";
     } else if (self->box->wish.blackbox_s == 0U) {
         why = "nothing is recorded: [record] blackbox_s is 0; set it, then restart the gateway";
@@ -30,22 +30,22 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
     if (why != NULL) {
         refuse(self, client, &request->id, IWN_DENIED, why);
     } else {
-        connection->reading = true;
+        connection->owed = true;
         gw_answers_served(self, connection)->read_id = request->id;
     }
 }
 
 /// Its question is answered. A client that has ended is looked at again: it was kept for this only.
 static void settle(gw_client_t *connection) {
-    connection->reading = false;
-    if (connection->ended) {
+    connection->owed = false;
+    if (connection->phase == GW_ENDED) {
         connection->readable = true;
     }
 }
 
 static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
     gw_client_t *connection = gw_clients_find(self->clients, answer->client);
-    if (connection == NULL || !connection->reading) {
+    if (connection == NULL || !connection->owed) {
         return; // It did not wait for it.
     }
     gw_served_t *served = gw_answers_served(self, connection);
@@ -63,7 +63,7 @@ static void give_up(gw_answers_t *self) {
     gw_clients_t *clients = self->clients;
     for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         gw_client_t *connection = &clients->client[i];
-        if (connection->reading) {
+        if (connection->owed) {
             settle(connection);
             refuse(self, &self->served[i].client, &self->served[i].read_id, IWN_DENIED,
                    "the process that reads recordings has ended; ask again after 10 s");

@@ -69,6 +69,7 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->stale_client = texts->stale_client;
     context->stopped_by = name_stopper(&self->stopped_by, server->stopped_us, texts->stopped_by);
     context->estopped_by = name_stopper(&self->estopped_by, server->estopped_us, texts->estopped_by);
+    context->estop = gw_wheels_estop(wheels);
     context->bus_cure = texts->bus_cure;
     context->stalled_cure = texts->stalled_cure;
     context->timing = texts->timing;

@@ -84,6 +84,11 @@ void iwn_target_changed(iwn_server_t *server, const iw_snapshot_t *seen, iwn_cha
         gw_log(self->log, GW_LOG_INFO, "%s",
                present ? "rolling: a wheel turns although nothing is sent to it" : "rolling: no longer");
         break;
+    case IWN_CHANGE_ROLLS_AWAY:
+        if (present) {
+            gw_record_rolling(self->box, self->log, seen);
+        }
+        break;
     case IWN_CHANGE_STOP:
         log_stop(self);
         break;

@@ -4,11 +4,14 @@
 #include "disk/box_files.h"
 #include "sockets/log.h"
 
+#include "iwheel/gateway.h"
+#include "iwheel_linux/clock.h"
 #include "iwheel_northbound/words.h"
 
 #include <errno.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <sys/mman.h>
 
 /// The motors come before the diary.
@@ -70,6 +73,9 @@ gw_child_news_t gw_box_take(gw_box_t *self) {
     }
     if (news == GW_CHILD_SAID) {
         self->last = result;
+        if (result.number != 0U) {
+            self->stop = result;
+        }
     }
     return news;
 }
@@ -92,22 +98,44 @@ gw_child_news_t gw_box_hear(gw_box_t *self) {
     return news;
 }
 
-void gw_record_stop(gw_box_t *box, gw_log_t *log, const iwn_stop_note_t *note, iw_time_us_t now_us) {
+/// False if it cannot be ordered; without a box there is nothing to order.
+static bool order_recording(gw_box_t *box, const iwn_stop_note_t *note, const char *cause, iw_time_us_t now_us) {
     const char *side = iwn_sides_name(note->stop.sides);
     if (box->wish.blackbox_s == 0U) {
-        return;
+        return true;
     }
     gw_box_order_t order = {
         .note = *note, .wall_minus_us = note->wall_us - (int64_t)now_us, .mark = blackbox_ring_written(box->ring)};
-    (void)snprintf(order.cause, sizeof order.cause, "%s", iwn_cause_name(note->stop.cause));
+    (void)snprintf(order.cause, sizeof order.cause, "%s", cause);
     (void)snprintf(order.side, sizeof order.side, "%s", (side != NULL) ? side : "");
     (void)snprintf(order.from, sizeof order.from, "%s", iwn_state_name(note->stop.from));
-    if (!gw_box_write(box, &order)) {
+    return gw_box_write(box, &order);
+}
+
+static const char *why_not(const gw_box_t *box) {
+    return (box->writer.fd < 0) ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)";
+}
+
+void gw_record_stop(gw_box_t *box, gw_log_t *log, const iwn_stop_note_t *note, iw_time_us_t now_us) {
+    if (!order_recording(box, note, iwn_cause_name(note->stop.cause), now_us)) {
         gw_log(log, GW_LOG_WARNING,
                "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
                "memory: iwheelctl why",
-               (unsigned)note->stop.number,
-               (box->writer.fd < 0) ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)");
+               (unsigned)note->stop.number, why_not(box));
+    }
+}
+
+void gw_record_rolling(gw_box_t *box, gw_log_t *log, const iw_snapshot_t *seen) {
+    iwn_stop_note_t note = {.stop = {.at_us = seen->at_us, .from = seen->state}, .wall_us = iw_clock_wall_us()};
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const bool turns = seen->wheel[side].heard && abs(seen->wheel[side].speed_mm_s) > IW_ROLLING_MM_S;
+        note.stop.sides |= turns ? (uint8_t)(IW_SIDES_LEFT << side) : 0U;
+    }
+    (void)snprintf(note.sentence, sizeof note.sentence,
+                   "a wheel turns although nothing is sent to it, and soon after the last setpoint: the machine rolls "
+                   "away; use its parking brake");
+    if (!order_recording(box, &note, "rolling", seen->at_us)) {
+        gw_log(log, GW_LOG_WARNING, "that is not recorded: the process that writes recordings is %s", why_not(box));
     }
 }
 
@@ -147,7 +175,7 @@ void gw_record_take(gw_box_t *box, gw_log_t *log) {
 }
 
 void gw_record_write(const gw_box_t *box, uint32_t number, iwn_out_t *json) {
-    const gw_box_result_t *last = &box->last;
+    const gw_box_result_t *last = &box->stop;
     const bool known = number != 0U && last->number == number;
     iwn_out_text(json, "directory", box->wish.directory);
     iwn_out_text(json, "recording", (known && last->error == 0) ? last->path : NULL);

@@ -26,7 +26,8 @@ typedef struct gw_box {
     gw_box_wish_t wish;
     gw_child_t writer;
     gw_child_t reader;
-    gw_box_result_t last;   ///< The last result; number 0: none.
+    gw_box_result_t last;   ///< The last result; number 0: none, or not of a stop.
+    gw_box_result_t stop;   ///< The last one of a stop; number 0: none.
     gw_box_answer_t answer; ///< The last one taken.
 } gw_box_t;
 
@@ -55,6 +56,9 @@ gw_child_news_t gw_box_take(gw_box_t *self);
 ///
 /// Orders a recording of a stop that has just been seen, if stops are recorded.
 void gw_record_stop(gw_box_t *box, struct gw_log *log, const iwn_stop_note_t *note, iw_time_us_t now_us);
+
+/// The same of wheels that roll although nothing is sent to them: a recording without a stop, with the cause `rolling`.
+void gw_record_rolling(gw_box_t *box, struct gw_log *log, const iw_snapshot_t *seen);
 
 /// Takes what the writer tells, to the log.
 void gw_record_take(gw_box_t *box, struct gw_log *log);

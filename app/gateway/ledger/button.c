@@ -32,37 +32,52 @@ static void note(const gw_button_t *self, const iw_estop_seen_t seen[IW_ESTOP_CO
     }
 }
 
-/// What all contacts say together; `before` while they differ.
-static int said_by_all(const iw_linux_hal_t *hal, int before) {
+typedef enum { UNREADABLE, NONE_PRESSED, SOME_PRESSED, ALL_PRESSED } answer_t;
+
+/// What all contacts say together.
+static answer_t said_by_all(const iw_linux_hal_t *hal) {
     const int first = hal->contact_last[0];
     const int second = hal->two_contacts ? hal->contact_last[1] : first;
     if (first < 0 || second < 0) {
-        return -1;
+        return UNREADABLE;
     }
-    return ((first > 0) == (second > 0)) ? first : before;
+    if ((first > 0) != (second > 0)) {
+        return SOME_PRESSED;
+    }
+    return (first > 0) ? ALL_PRESSED : NONE_PRESSED;
 }
 
 /// True if the answer ends a press.
-static bool follow(gw_button_t *self, int answer, iw_time_us_t now_us) {
-    const gw_button_state_t before = self->state;
-    if (answer < 0) {
+static bool follow(gw_button_t *self, answer_t answer, iw_time_us_t now_us) {
+    if (answer == UNREADABLE) {
         self->state = GW_BUTTON_UNKNOWN;
         return false;
     }
-    if (answer == 0) {
-        self->state = GW_BUTTON_RELEASED;
-        return before == GW_BUTTON_PRESSED && now_us - self->pressed_us >= GW_BUTTON_PRESS_US;
+    if (answer == ALL_PRESSED) {
+        if (self->state == GW_BUTTON_RELEASED) {
+            self->state = GW_BUTTON_PRESSED;
+            self->pressed_us = now_us;
+        }
+        return false;
     }
-    if (before == GW_BUTTON_RELEASED) {
-        self->state = GW_BUTTON_PRESSED;
-        self->pressed_us = now_us;
+    if (self->state == GW_BUTTON_PRESSED) {
+        const bool lasted = now_us - self->pressed_us >= GW_BUTTON_PRESS_US + self->debounce_us;
+        self->state = lasted ? GW_BUTTON_SHOWN : GW_BUTTON_RELEASED;
     }
-    return false;
+    if (answer == SOME_PRESSED) {
+        return false;
+    }
+    const bool shown = self->state == GW_BUTTON_SHOWN;
+    self->state = GW_BUTTON_RELEASED;
+    return shown;
 }
 
-/// The answers of the last look, and no time, decide what a look shows.
+/// The answers of the last look, and no time but that of the contacts' own judge, decide what a look shows.
 static bool is_news(gw_button_t *self, const iw_linux_hal_t *hal) {
-    const bool news = !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0;
+    const bool disagrees = hal->estop_last == IW_ESTOP_DISAGREES;
+    const bool news =
+        !self->looked || memcmp(self->last, hal->contact_last, sizeof self->last) != 0 || disagrees != self->disagreed;
+    self->disagreed = disagrees;
     self->looked = true;
     memcpy(self->last, hal->contact_last, sizeof self->last);
     return news;
@@ -74,10 +89,14 @@ gw_button_news_t gw_button_look(gw_button_t *self, const iw_linux_hal_t *hal, iw
         return GW_BUTTON_NO_NEWS;
     }
     const bool known = see(hal, seen);
-    const int before = (self->state == GW_BUTTON_UNKNOWN) ? -1 : (int)(self->state == GW_BUTTON_PRESSED);
-    if (follow(self, known ? said_by_all(hal, before) : -1, now_us)) {
+    if (follow(self, known ? said_by_all(hal) : UNREADABLE, now_us) && !self->disagreed) {
         note(self, seen, tried);
         return GW_BUTTON_TRIED;
+    }
+    // A contact that is stuck reads released at the next start: only what was kept can tell of it then.
+    if (self->disagreed && tried->wall_us != 0) {
+        memset(tried, 0, sizeof *tried);
+        return GW_BUTTON_BROKEN;
     }
     const bool same = is_same_contact(self, &seen[0], tried, 0) && is_same_contact(self, &seen[1], tried, 1);
     if (known && tried->wall_us != 0 && !same) {

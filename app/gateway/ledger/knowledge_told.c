@@ -127,6 +127,9 @@ void gw_knowledge_tell_button(gw_knowledge_t *self, gw_button_news_t news) {
     const char *line = self->wheels->estop;
     if (news == GW_BUTTON_TRIED) {
         gw_log(self->log, GW_LOG_INFO, "e-stop %s: its button was pressed and released, it works", line);
+    } else if (news == GW_BUTTON_BROKEN) {
+        gw_log(self->log, GW_LOG_WARNING, "e-stop %s: its contacts disagree, so that what was tried counts no more",
+               line);
     } else {
         gw_log(self->log, GW_LOG_WARNING, "e-stop %s: its wiring is not the one on which its button was tried", line);
     }

@@ -73,6 +73,8 @@ iw_estop_wish_t gw_report_estop(const gateway_config_t *config) {
                              .chip_line = config->estop.chip_line,
                              .name2 = config->estop.line2,
                              .active_high2 = config->estop.active2_high,
+                             .chip2 = config->estop.chip2,
+                             .chip2_line = config->estop.chip2_line,
                              .discrepancy_ms = config->estop.discrepancy_ms};
 }
 

@@ -74,6 +74,13 @@ void gw_wheels_time_request(gw_wheels_t *self) {
     self->time_used = true;
 }
 
+const char *gw_wheels_estop(const gw_wheels_t *self) {
+    const int first = self->hal.contact_last[0];
+    const int second = self->hal.contact_last[1];
+    const bool worse = first >= 0 && (second < 0 || (first == 0 && second > 0));
+    return (self->hal.two_contacts && worse) ? self->estop2 : self->estop;
+}
+
 bool gw_wheels_are_sent_to(const gw_wheels_t *self) {
     return iw_gateway_is_sending(&self->core);
 }

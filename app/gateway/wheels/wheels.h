@@ -78,6 +78,9 @@ void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us);
 /// Before each request: the first one after a reading of the clock is carried out at that time, each other at a time of its own.
 void gw_wheels_time_request(gw_wheels_t *self);
 
+/// The line of the e-stop's contact that says most: one that cannot be read, else one that is pressed, else the first.
+const char *gw_wheels_estop(const gw_wheels_t *self);
+
 /// True while setpoints are sent, or about to be.
 bool gw_wheels_are_sent_to(const gw_wheels_t *self);
 

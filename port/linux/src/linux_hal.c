@@ -33,8 +33,11 @@ static bool are_one_line(const char *name, const char *other) {
 
 /// The first contact is open.
 static int open_second(iw_linux_hal_t *self, const iw_estop_wish_t *wish) {
-    const iw_estop_wish_t second = {
-        .name = wish->name2, .active_high = wish->active_high2, .debounce_ms = wish->debounce_ms};
+    const iw_estop_wish_t second = {.name = wish->name2,
+                                    .active_high = wish->active_high2,
+                                    .debounce_ms = wish->debounce_ms,
+                                    .chip = wish->chip2,
+                                    .chip_line = wish->chip2_line};
     int error = 0;
     if (estop_kind(wish->name2) != self->estop_ops) {
         error = EXDEV;

@@ -449,7 +449,7 @@ class RecordingEntry(TypedDict):
     name: str
     """of its files, without .log, .jsonl or .conf"""
     cause: str
-    """a cause, or gateway_died"""
+    """a cause, gateway_died or rolling"""
     wall_us: Optional[int]
     """when its .conf was written, at the stop"""
     log_bytes: Optional[int]

@@ -29,7 +29,7 @@
 ///
 /// With `iw_config_t::hold` (R19) time ends neither HOLDING nor CUT; held RESTARTING becomes HOLDING, and `reset` leads
 /// from CUT to HOLDING. Another sender's setpoint ends that, `iw_permit_release`, and the end of the gateway: from then
-/// on time ends the zeros as without it.
+/// on time ends the zeros as without it. A latch after a release, while zeros are still sent, is held again.
 ///
 /// The lease is fed by accepted drive commands and by nothing else.
 #ifndef IW_PERMIT_H
@@ -84,6 +84,7 @@ typedef struct {
     bool quiet;                 ///< No latching cause is there or happened lately: nothing to look for.
     bool at_once;               ///< BRAKING, CUT and what follows: zero without ramp.
     bool kept;                  ///< Time does not end the zeros that follow: not before release.
+    bool keeps;                 ///< What `kept` becomes with the next latch: false once the gateway ends.
     iw_permit_view_t view;      ///< Of the last step, by the owner: requests are judged by it.
     iw_client_t stale_client;   ///< Who sent the last nonzero drive.
     iw_client_t holder;         ///< Of the lease; IW_CLIENT_NONE: nobody.

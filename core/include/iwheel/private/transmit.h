@@ -85,8 +85,8 @@ typedef struct {
 /// Forgets what is unconfirmed and what was confirmed: after a purge or a loss of the bus no echo is owed any more.
 void iw_confirmation_clear(iw_confirmation_t *self);
 
-/// True if this wheel may be sent a setpoint now; `zero` tells whether it is a zero.
-bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero);
+/// The wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) that may be sent a setpoint now; `zero` tells whether it is a zero.
+uint32_t iw_confirmation_may_send(const iw_confirmation_t *self, bool zero);
 
 /// A frame was handed over (`accepted`; only where `iw_confirmation_may_send`) or refused by the port. A refused one
 /// starts the clock too, so that a port that takes nothing is found out; the next echo of that wheel stops it, or

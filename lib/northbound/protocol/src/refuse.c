@@ -24,10 +24,11 @@ static void number(wording_t *self, const char *before, int32_t value, const cha
     big_number(self, value, after);
 }
 
-/// At most INT32_MAX, 24 days.
-static int32_t ms_since(const wording_t *self, iw_time_us_t then_us) {
-    const iw_time_us_t ms = (then_us < self->seen->at_us) ? (self->seen->at_us - then_us) / IW_US_PER_MS : 0U;
-    return (ms < INT32_MAX) ? (int32_t)ms : INT32_MAX;
+/// Milliseconds since then; at most INT32_MAX, 24 days.
+static void since(wording_t *self, const char *before, iw_time_us_t then_us, const char *after) {
+    const iw_time_us_t at_us = self->seen->at_us;
+    const iw_time_us_t ms = (then_us < at_us) ? (at_us - then_us) / IW_US_PER_MS : 0U;
+    number(self, before, (ms < INT32_MAX) ? (int32_t)ms : INT32_MAX, after);
 }
 
 static void say_holder(wording_t *self) {
@@ -36,7 +37,10 @@ static void say_holder(wording_t *self) {
     iwn_text_add(&self->text, self->context->holder);
     number(self, " holds the lease for another ",
            over ? 0 : (int32_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS),
-           " ms at least; let it stop first, or, with the wheels at rest, arm with takeover");
+           " ms at least; let it stop first");
+    if (self->request->cmd != IWN_CMD_RELEASE) {
+        iwn_text_add(&self->text, ", or, with the wheels at rest, arm with takeover");
+    }
 }
 
 static void say_not_armed(wording_t *self) {
@@ -51,7 +55,7 @@ static void say_not_armed(wording_t *self) {
         iwn_text_add(&self->text, "; arm first");
         return;
     }
-    number(self, "; the last stop was ", ms_since(self, stop->at_us), " ms ago: ");
+    since(self, "; the last stop was ", stop->at_us, " ms ago: ");
     iwn_text_add(&self->text, iwn_cause_name(stop->cause));
     if (stop->cause == IW_CAUSE_CLIENT_STOP && by != NULL) {
         SAY(self, ", asked for by ", by);
@@ -76,7 +80,7 @@ static void say_lost(wording_t *self) {
         if (wheel->speed_us == IW_NEVER) {
             iwn_text_add(&self->text, " wheel was never heard; ");
         } else {
-            number(self, " wheel was last heard ", ms_since(self, wheel->speed_us), " ms ago; ");
+            since(self, " wheel was last heard ", wheel->speed_us, " ms ago; ");
         }
     }
     iwn_text_add(&self->text, "check its power, cable and termination");
@@ -84,6 +88,11 @@ static void say_lost(wording_t *self) {
 
 static void say_not_at_rest(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
+    // Nothing is held yet, so that there is nothing to release: the wheels may stand all the same.
+    if (self->request->cmd == IWN_CMD_RELEASE && seen->holder != IW_CLIENT_NONE) {
+        say_holder(self);
+        return;
+    }
     number(self, "the wheels turn or are told to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm, " rpm, told ");
     number(self, "", seen->applied.wheel[IW_LEFT].speed_mm_s, " mm/s; right ");
     number(self, "", seen->wheel[IW_RIGHT].told->speed.speed_rpm, " rpm, told ");
@@ -97,8 +106,7 @@ static void say_stalled(wording_t *self) {
     if (waiting_us == IW_NEVER) {
         number(self, "the zero setpoints were not acknowledged on the bus within ", self->seen->config->echo_ms, " ms");
     } else {
-        number(self, "a setpoint has been waiting for ", ms_since(self, waiting_us),
-               " ms to be acknowledged on the bus");
+        since(self, "a setpoint has been waiting for ", waiting_us, " ms to be acknowledged on the bus");
     }
     iwn_text_add(&self->text, "; check that the wheels have power and the bus is terminated");
     if (waiting_us != IW_NEVER && more != NULL) {
@@ -113,19 +121,18 @@ static void say_stale(wording_t *self) {
         return;
     }
     iwn_text_add(&self->text, self->context->stale_client);
-    number(self, " sent a nonzero drive command ", ms_since(self, self->seen->stale_us), " ms ago");
+    since(self, " sent a nonzero drive command ", self->seen->stale_us, " ms ago");
     number(self, "; let go of the stick, wait ", IW_STALE_COMMAND_US / IW_US_PER_MS, " ms, try again");
 }
 
 static void say_second_master(wording_t *self) {
-    number(self, "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
-           ms_since(self, self->seen->seen_us[IW_CAUSE_SECOND_MASTER]),
-           " ms ago; switch the other sender off, wait a second");
+    since(self, "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
+          self->seen->seen_us[IW_CAUSE_SECOND_MASTER], " ms ago; switch the other sender off, wait a second");
 }
 
 /// Whoever keeps stopping is to be found, whatever way it came in.
 static void say_estopped(wording_t *self) {
-    number(self, "estop_software was asked for ", ms_since(self, self->context->estopped_us), " ms ago by ");
+    since(self, "estop_software was asked for ", self->context->estopped_us, " ms ago by ");
     SAY(self, self->context->estopped_by, "; end that program if it keeps asking, and wait a second");
 }
 
@@ -140,7 +147,7 @@ static void say_present(wording_t *self) {
             return;
         }
         iwn_text_add(&self->text, iwn_cause_name((iw_cause_t)cause));
-        number(self, " was seen ", ms_since(self, self->seen->seen_us[cause]), " ms ago; ");
+        since(self, " was seen ", self->seen->seen_us[cause], " ms ago; ");
         SAY(self, iwn_why_cure((iw_cause_t)cause), iwn_why_then((iw_cause_t)cause), ", and wait a second");
         return;
     }

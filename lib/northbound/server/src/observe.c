@@ -68,6 +68,7 @@ static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen)
     if (seen->rolling_fault) {
         told->rolling_us = self->now_us;
     }
+    iwn_target_changed(self, seen, IWN_CHANGE_ROLLS_AWAY, NULL, seen->rolling_fault);
     tell_fault(self, seen, "rolling", seen->rolling_fault);
 }
 

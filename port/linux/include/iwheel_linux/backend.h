@@ -52,11 +52,12 @@ typedef struct {
     uint16_t debounce_ms; ///< A release must last this long. Only for real lines.
     /// What the line was called when somebody saw its button work; NULL or "any": not compared. A line that is called
     /// otherwise is not read (EREMCHG), so it counts as pressed. Only for real lines.
-    const char *chip;      ///< Label of its chip: numbers of chips change, labels do not.
-    const char *chip_line; ///< Its own name.
-    /// The second contact of the same button; NULL or "none": it has one. No chip is expected of it.
-    const char *name2;
+    const char *chip;        ///< Label of its chip: numbers of chips change, labels do not.
+    const char *chip_line;   ///< Its own name.
+    const char *name2;       ///< The second contact of the same button; NULL or "none": it has one.
     bool active_high2;       ///< As `active_high`.
+    const char *chip2;       ///< As `chip`.
+    const char *chip2_line;  ///< As `chip_line`.
     uint16_t discrepancy_ms; ///< The contacts may say different for so long.
 } iw_estop_wish_t;
 

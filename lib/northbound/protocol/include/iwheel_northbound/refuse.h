@@ -16,7 +16,7 @@ typedef struct {
     const char *stopped_by;    ///< Who asked for the last stop, "user 0 (process 7)"; NULL: not known.
     const char *estopped_by;   ///< The same of the last software e-stop.
     iw_time_us_t estopped_us;  ///< When that was.
-    const char *estop;         ///< Name of the e-stop line.
+    const char *estop;         ///< Name of the e-stop line, of two the one that is meant.
     int estop_answer;          ///< Its last: 0 released, 1 pressed, negative unreadable.
     const char *bus;           ///< Name of the bus.
     const char *bus_cure;      ///< What brings it up.

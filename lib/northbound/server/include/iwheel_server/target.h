@@ -74,7 +74,8 @@ typedef enum {
     IWN_CHANGE_ESTOP,       ///< `word`: its state.
     IWN_CHANGE_FAULT,       ///< `word`: the cause; `present`: it has come.
     IWN_CHANGE_LEFT_BEHIND, ///< A setpoint may wait in the queue of the bus.
-    IWN_CHANGE_ROLLING,     ///< `present`: it rolls.
+    IWN_CHANGE_ROLLING,     ///< `present`: a wheel turns although nothing is sent to it.
+    IWN_CHANGE_ROLLS_AWAY,  ///< `present`: the same soon after the last setpoint, which is a fault.
     IWN_CHANGE_STOP,        ///< `self->last_stop` is the new one.
     IWN_CHANGE_LEASE,       ///< `word`: gained, moved or lost; `self->told.holder` has it now.
     IWN_CHANGE_STATE,       ///< `word`: the new state; `self->told.state` is the one before.

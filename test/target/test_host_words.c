@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// What the image's host code says: each answer with all that the protocol promises, each change as an event of its topic.
+#include "host_rig.inc"
+
+#include "iwheel/codec.h"
+
+/// The relay is there all the time.
+static void pass(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+}
+
+static void ask(const char *json, const char *part) {
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer(json, part);
+}
+
+static void forget(void) {
+    all[0] = '\0';
+    all_length = 0;
+}
+
+static void watch(const char *topics) {
+    char json[128];
+    (void)snprintf(json, sizeof json, "{\"cmd\":\"watch\",\"topics\":[%s],\"rate_hz\":1}", topics);
+    say(1, json);
+    pass(100);
+    forget();
+}
+
+static void test_host_why_names_cause_and_has_no_recording(void) {
+    ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
+    ask("{\"cmd\":\"why\",\"id\":2}", "\"cause\":\"client_stop\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"recording\":null"), answer);
+}
+
+static void test_host_reset_before_its_time_is_refused(void) {
+    ask("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
+    ask("{\"cmd\":\"reset\",\"id\":2,\"stop\":1}", "\"id\":2,\"ok\":false");
+}
+
+static void test_host_confirmed_item_has_all_its_members(void) {
+    ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"dlc\",\"value\":\"yes\"}", "\"state\":\"confirmed\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(answer, "\"found\":null,\"how\":null,\"since_wall_us\":null,\"reason\":null,\"disabled\":null}"),
+        answer);
+}
+
+static void test_host_staged_keys_stay_when_they_are_read(void) {
+    ask("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.radius_mm\",\"value\":\"200\"}", "\"staged\":true");
+    ask("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "{\"key\":\"wheels.radius_mm\",\"value\":\"200\"},{\"key\":"), answer);
+    ask("{\"cmd\":\"config\",\"id\":3,\"commit\":false}", "\"staged\":false");
+}
+
+static void test_host_role_of_the_current_is_read_as_a_word(void) {
+    ask("{\"cmd\":\"config\",\"id\":1}", "{\"key\":\"wheels.current_role\",\"value\":\"limit\"}");
+}
+
+static void test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first(void) {
+    ask("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.radius_mm\",\"value\":\"1\"}", " must be 60 to 400");
+    ask("{\"cmd\":\"config\",\"id\":2,\"key\":\"limits.rest_rpm\",\"value\":\"9\"}", "\"staged\":true");
+    ask("{\"cmd\":\"config\",\"id\":3,\"commit\":true}", "set it to 2 first");
+}
+
+static void test_host_lease_that_ends_is_told_once(void) {
+    watch("\"lease\"");
+    ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
+    forget();
+    char line[IWN_LINE_BOARD_MAX];
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line)); // Refused, and nobody's lease.
+    pass(300);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"ok\":false"), answer);
+    TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
+}
+
+static void test_host_state_that_changes_is_told_at_once(void) {
+    watch("\"state\"");
+    pass(1100); // What comes at its rate has come.
+    forget();
+    arm();
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"state\""), all);
+}
+
+static void test_host_item_that_changes_is_told(void) {
+    watch("\"state\"");
+    ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"dlc\",\"value\":\"no\"}", "\"state\":\"contradicted\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"ledger\""), all);
+}
+
+static void test_host_link_line_comes_at_its_second_and_not_later(void) {
+    ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
+    pass(2500);
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    forget();
+    seen.at_us = host.linked_us + IW_HOST_LINK_US - 1U;
+    (void)iw_host_tell(&host, &seen, false);
+    TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
+    seen.at_us++;
+    (void)iw_host_tell(&host, &seen, false);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
+}
+
+/// Force frames of one wheel, which stands.
+static void press(iw_side_t side, uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 50U) {
+        const iw_can_frame_t frame = {
+            .id = (side == IW_LEFT) ? IW_ID_LEFT_FORCE : IW_ID_RIGHT_FORCE, .dlc = IW_DLC_FORCE, .data = {0, 70}};
+        fake_bus_put(&rig.bus, &frame);
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(50);
+    }
+}
+
+static void test_host_tare_of_one_wheel_is_that_wheels_zero(void) {
+    ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
+    press(IW_LEFT, 4000);
+    ask("{\"cmd\":\"tare\",\"id\":2,\"side\":\"left\"}", "\"left\":{");
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_OPERATOR, host.zero[IW_LEFT].from);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iwn_surroundings_t around = iw_host_around(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT32(IW_FORCE_WINDOW_SAMPLES, around.zero[IW_LEFT].samples);
+    TEST_ASSERT_EQUAL_UINT32(0, around.zero[IW_RIGHT].samples);
+}
+
+static void test_host_first_item_is_kept_like_the_others(void) {
+    ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_learnt_t learnt;
+    iw_learnt_note(&learnt, &seen, &host.settings, host.zero);
+    TEST_ASSERT_EQUAL_UINT8(IW_LEDGER_CONFIRMED, learnt.item[IW_LEDGER_SETPOINT_TYPE] & 0x0FU);
+}
+
+static void test_host_counts_its_channels_and_nothing_behind_them(void) {
+    memset(&host.pending, 0xFF, sizeof host.pending);
+    memset(&host.receiver, 0xFF, sizeof host.receiver);
+    memset(host.in, 0xFF, sizeof host.in);
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    TEST_ASSERT_EQUAL_UINT32(1, iw_host_around(&host, &seen).clients);
+}
+
+static void test_host_line_has_room_for_what_stands_around_its_json(void) {
+    const iwn_out_t json = iw_host_begin_event(&host, "link");
+    TEST_ASSERT_EQUAL_PTR(&host.scratch.small[IWN_LINE_PREFIX], json.data);
+    TEST_ASSERT_EQUAL_UINT32(IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_host_why_names_cause_and_has_no_recording);
+    RUN_TEST(test_host_reset_before_its_time_is_refused);
+    RUN_TEST(test_host_confirmed_item_has_all_its_members);
+    RUN_TEST(test_host_staged_keys_stay_when_they_are_read);
+    RUN_TEST(test_host_role_of_the_current_is_read_as_a_word);
+    RUN_TEST(test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first);
+    RUN_TEST(test_host_lease_that_ends_is_told_once);
+    RUN_TEST(test_host_state_that_changes_is_told_at_once);
+    RUN_TEST(test_host_item_that_changes_is_told);
+    RUN_TEST(test_host_link_line_comes_at_its_second_and_not_later);
+    RUN_TEST(test_host_tare_of_one_wheel_is_that_wheels_zero);
+    RUN_TEST(test_host_first_item_is_kept_like_the_others);
+    RUN_TEST(test_host_counts_its_channels_and_nothing_behind_them);
+    RUN_TEST(test_host_line_has_room_for_what_stands_around_its_json);
+    return UNITY_END();
+}

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+// What the daemon tells of itself, and when: to watchers, in the log and in refusals, in virtual time.
+#include "daemon_client.h"
+
+#include "unity.h"
+
+#include "iwheel_server/target.h"
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/// Until then its first telemetry may still come.
+static void test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on(void) {
+    const uint32_t lost = 1U << IW_CAUSE_WHEEL_LOST;
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
+    daemon_rig_crash();
+    daemon_rig_start();
+    daemon_rig_run(IWN_FIRST_TELEMETRY_US / IW_US_PER_MS - 50U);
+    TEST_ASSERT_EQUAL_UINT32(0U, daemon_rig.daemon->answers.server.told.present & lost);
+    daemon_rig_run(100);
+    TEST_ASSERT_EQUAL_UINT32(lost, daemon_rig.daemon->answers.server.told.present & lost);
+}
+
+static void test_status_has_no_more_warnings_than_places_for_them(void) {
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    iw_snapshot_t seen = gw_wheels_look(wheels);
+    seen.holding = seen.rolling = true;
+    for (wheels->warnings = IWN_WARNINGS - 2U; wheels->warnings <= IWN_WARNINGS; wheels->warnings++) {
+        const iwn_surroundings_t around = iwn_target_around(&daemon_rig.daemon->answers.server, &seen);
+        TEST_ASSERT_EQUAL_UINT32(IWN_WARNINGS, around.warnings);
+    }
+}
+
+static void test_hello_has_the_time_of_its_cycle(void) {
+    char text[1024];
+    daemon_rig_run(7);
+    const iw_time_us_t before_us = daemon_rig.now_us;
+    const int other = daemon_rig_connect();
+    daemon_rig_run(5);
+    const ssize_t size = recv(other, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    const char *told = strstr(text, "\"t_us\":");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(before_us, strtoull(told + strlen("\"t_us\":"), NULL, 10));
+    (void)close(other);
+}
+
+static void test_arm_without_a_setpoint_type_says_where_it_is_set(void) {
+    daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
+    assert_reply("{\"cmd\":\"arm\"}", "under [wheels] in the configuration");
+}
+
+static void test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not(void) {
+    daemon_rig_keep_log();
+    daemon_rig.estop = 1;
+    daemon_rig_run(20);
+    daemon_rig.estop = 0;
+    daemon_rig_run(20);
+    const char *pressed = strstr(daemon_rig_log(), "warning: e-stop ");
+    TEST_ASSERT_NOT_NULL_MESSAGE(pressed, daemon_rig_log());
+    TEST_ASSERT_NULL_MESSAGE(strstr(pressed + 1, "warning: e-stop "), daemon_rig_log());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(pressed, "info: e-stop "), daemon_rig_log());
+}
+
+/// Sends a line, lets 30 ms pass, and takes all that has come.
+static const char *said_after(const char *line) {
+    static char text[1U << 16];
+    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
+    daemon_rig_run(30);
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(size > 0) ? size : 0] = '\0';
+    return text;
+}
+
+/// Fails unless an event of that name has come, with that in it.
+static void assert_told(const char *said, const char *name, const char *part) {
+    char begin[64];
+    char line[8192];
+    (void)snprintf(begin, sizeof begin, "{\"event\":\"%s\",", name);
+    const char *event = strstr(said, begin);
+    TEST_ASSERT_NOT_NULL_MESSAGE(event, begin);
+    (void)snprintf(line, sizeof line, "%.*s", (int)strcspn(event, "\n"), event);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(line, part), line);
+    TEST_ASSERT_EQUAL_CHAR('}', line[strlen(line) - 1U]);
+}
+
+static void test_events_are_whole_and_come_at_once_to_who_is_due_later(void) {
+    (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"bus\",\"lease\",\"stop\",\"state\"],\"rate_hz\":1}\n");
+    daemon_rig_run(1000);
+    do {
+        (void)said_after("");
+    } while (daemon_rig.daemon->answers.served[0].client.next_us < daemon_rig.now_us + MS(500));
+    const char *said = said_after("{\"cmd\":\"arm\",\"name\":\"pendant\"}\n");
+    assert_told(said, "lease", "\"change\":\"gained\"");
+    assert_told(said, "lease", "\"name\":\"pendant\"");
+    assert_told(said, "state", "\"state\":\"armed\"");
+    said = said_after("{\"cmd\":\"stop\"}\n");
+    assert_told(said, "stop", "\"cause\":\"client_stop\"");
+    assert_told(said, "stop", "\"client_name\":\"pendant\"");
+    assert_told(said, "lease", "\"change\":\"lost\"");
+    daemon_rig.bus = IW_BUS_OFF;
+    assert_told(said_after(""), "bus", "\"state\":\"bus_off\"");
+}
+
+static void test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence(void) {
+    char sentence[1024];
+    daemon_rig_keep_log();
+    assert_reply("{\"cmd\":\"arm\",\"name\":\"pendant\"}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "lease gained: \"pendant\" (client"), daemon_rig_log());
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "lease lost: nobody"), daemon_rig_log());
+    const iwn_stop_note_t *note = &daemon_rig.daemon->answers.server.last_stop;
+    (void)snprintf(sentence, sizeof sentence, "stop %u: %s\n", (unsigned)note->stop.number, note->sentence);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), sentence), daemon_rig_log());
+}
+
+/// Before the next step: whoever asked may be gone then.
+static void test_stop_is_told_with_the_request_that_asks_for_it(void) {
+    static const char line[] = "{\"cmd\":\"stop\"}";
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    const gw_servant_t *servant = &daemon->clients.servant;
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 100, 100, 200);
+    const uint32_t before = daemon->answers.server.told.stop_number;
+    servant->carry_out(servant->context, &daemon->clients.client[0], line, sizeof line - 1U);
+    TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
+}
+
+static void test_arm_that_an_estop_ends_is_refused_with_its_id_and_why(void) {
+    static const char estop[] = "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n";
+    const int other = daemon_rig_connect();
+    daemon_rig_run(20);
+    daemon_rig_keep_log();
+    static const char arm[] = "{\"id\":41,\"cmd\":\"arm\"}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof arm - 1, (int)send(client, arm, sizeof arm - 1U, MSG_NOSIGNAL));
+    TEST_ASSERT_EQUAL_INT((int)sizeof estop - 1, (int)send(other, estop, sizeof estop - 1U, MSG_NOSIGNAL));
+    const char *said = said_after("");
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(said, "\"id\":41,\"ok\":false,\"error\":\"cause_present\",\"message\":\"estop_software"), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "smoke"), daemon_rig_log());
+    (void)close(other);
+}
+
+static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
+    static const char *const sides[IW_SIDES] = {"left", "right"};
+    char told[64];
+    daemon_rig_run(3000);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"tare\"}");
+    const iw_force_quality_t *kept = daemon_rig.daemon->knowledge.tare;
+    const iw_force_t *force = daemon_rig.daemon->wheels.core.force;
+    TEST_ASSERT_NOT_EQUAL_INT(kept[IW_LEFT].deviation_mN, kept[IW_RIGHT].deviation_mN);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_INT(iw_force_measure(&force[side]).deviation_mN, kept[side].deviation_mN);
+        (void)snprintf(told, sizeof told, "\"%s\":{\"offset_mN\":%d,\"samples\":%d,\"deviation_mN\":%d,", sides[side],
+                       (int)force[side].offset_mN, (int)kept[side].samples, (int)kept[side].deviation_mN);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, told), reply);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
+    RUN_TEST(test_status_has_no_more_warnings_than_places_for_them);
+    RUN_TEST(test_hello_has_the_time_of_its_cycle);
+    RUN_TEST(test_arm_without_a_setpoint_type_says_where_it_is_set);
+    RUN_TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not);
+    RUN_TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later);
+    RUN_TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence);
+    RUN_TEST(test_stop_is_told_with_the_request_that_asks_for_it);
+    RUN_TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why);
+    RUN_TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window);
+    return UNITY_END();
+}
