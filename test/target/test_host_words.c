@@ -122,7 +122,7 @@ static void test_host_tare_of_one_wheel_is_that_wheels_zero(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_OPERATOR, host.zero[IW_LEFT].from);
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    const iwn_surroundings_t around = iw_host_around(&host, &seen);
+    const iwn_surroundings_t around = iwn_target_around(&host.server, &seen);
     TEST_ASSERT_EQUAL_UINT32(IW_FORCE_WINDOW_SAMPLES, around.zero[IW_LEFT].samples);
     TEST_ASSERT_EQUAL_UINT32(0, around.zero[IW_RIGHT].samples);
 }
@@ -140,11 +140,11 @@ static void test_host_counts_its_channels_and_nothing_behind_them(void) {
     memset(&host.receiver, 0xFF, sizeof host.receiver);
     memset(host.in, 0xFF, sizeof host.in);
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    TEST_ASSERT_EQUAL_UINT32(1, iw_host_around(&host, &seen).clients);
+    TEST_ASSERT_EQUAL_UINT32(1, iwn_target_around(&host.server, &seen).clients);
 }
 
 static void test_host_line_has_room_for_what_stands_around_its_json(void) {
-    const iwn_out_t json = iw_host_begin_event(&host, "link");
+    const iwn_out_t json = iwn_server_begin_event(&host.server, "link");
     TEST_ASSERT_EQUAL_PTR(&host.scratch.small[IWN_LINE_PREFIX], json.data);
     TEST_ASSERT_EQUAL_UINT32(IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);
 }
