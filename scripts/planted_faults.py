@@ -475,7 +475,7 @@ CASES = [
     (arch, "python3", "the same by its way", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'), True),
     (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
     (arch, "python3", "a port looks up to the board's application", ("port/stm32_stub/report.c", '#include "report.h"', '#include "report.h"\n#include "host.h"'), True),
-    (arch, "python3", "the board includes a file of the daemon", ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/dispatch.h"'), True),
+    (arch, "python3", "the board includes a file of the daemon", ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'), True),
     (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
     (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),

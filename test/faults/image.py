@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The image of an STM32F103 with one file of the port changed, and one scenario of the emulated board."""
+"""The image of an STM32F103 with one file changed, and one scenario of the emulated board."""
 import re
 import shutil
 import subprocess
@@ -8,11 +8,11 @@ from pathlib import Path
 
 from table import ROOT, Broken
 
-TARGET, PORT, APPLICATION = ROOT / "test/target", ROOT / "port/stm32_stub", ROOT / "app/board"
+TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
 DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
-IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "startup.c", "watchdog.c")
+IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "small.c", "startup.c", "watchdog.c")
 ALONE_FILES = ("commander.c", "console.c", "report.c")
-GATEWAY_FILES = ("answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c", "kept.c", "learnt.c", "observe.c", "pending.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c")
+GATEWAY_FILES = (*(path.name for path in sorted(SERVER.glob("*.c"))), "answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c", "kept.c", "learnt.c", "pending.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c", "told.c")
 
 
 def run(command):
@@ -29,12 +29,13 @@ def judge(work, applied, folder, image, scenario):
     """What the scenario finds, or None. `work`: the builds of test/target/run."""
     work = Path(work).resolve()
     shutil.copytree(PORT, folder)
-    shutil.copytree(APPLICATION, folder, dirs_exist_ok=True)
-    home = next(place for place in (PORT, APPLICATION) if (ROOT / applied.file).is_relative_to(place))
+    for place in (APPLICATION, SERVER):
+        shutil.copytree(place, folder, dirs_exist_ok=True)
+    home = next(place for place in (PORT, APPLICATION, SERVER) if (ROOT / applied.file).is_relative_to(place))
     (folder / (ROOT / applied.file).relative_to(home)).write_text(applied.text)
-    flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections",
+    flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections", "-DNDEBUG",
              "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
-             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}",
+             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}", f"-I{ROOT / 'lib/northbound/server/include'}",
              f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}", "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
              '-DIWHEEL_VERSION="0.0.0"',
              f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}"]

@@ -136,6 +136,21 @@ static void say_at_once(int who, const char *lines) {
     TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(who, lines, strlen(lines), MSG_NOSIGNAL));
 }
 
+/// Granted, but stopped by somebody else before the wheels answer.
+static void test_arm_that_a_stop_overtakes_is_refused(void) {
+    char text[4096];
+    const int other = daemon_rig_connect();
+    say_at_once(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
+    say_at_once(other, "{\"cmd\":\"estop\"}\n");
+    daemon_rig_run(100);
+    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
+    text[length] = '\0';
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "{\"id\":7,\"ok\":false,"), text);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    (void)close(other);
+}
+
 /// What somebody has sent behind an arm, waits here for its answer.
 static void test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else(void) {
     static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\"}\n"};
@@ -461,6 +476,7 @@ int main(void) {
     RUN_TEST(test_tare_of_both_that_one_cannot_have_changes_neither);
     RUN_TEST(test_client_that_goes_while_it_arms_leaves_no_lease);
     RUN_TEST(test_command_behind_arm_in_one_breath_is_stale);
+    RUN_TEST(test_arm_that_a_stop_overtakes_is_refused);
     RUN_TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else);
     RUN_TEST(test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out);
     RUN_TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now);

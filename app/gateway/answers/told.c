@@ -62,6 +62,11 @@ static void log_fault(const gw_answers_t *self, const char *cause, bool present)
     gw_log(self->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
 }
 
+static void log_rolling(const gw_answers_t *self, bool present) {
+    gw_log(self->log, GW_LOG_INFO, "%s",
+           present ? "rolling: a wheel turns although nothing is sent to it" : "rolling: no longer");
+}
+
 void iwn_target_changed(iwn_server_t *server, const iw_snapshot_t *seen, iwn_change_t change, const char *word,
                         bool present) {
     gw_answers_t *self = gw_answers_of(server);
@@ -81,8 +86,7 @@ void iwn_target_changed(iwn_server_t *server, const iw_snapshot_t *seen, iwn_cha
         }
         break;
     case IWN_CHANGE_ROLLING:
-        gw_log(self->log, GW_LOG_INFO, "%s",
-               present ? "rolling: a wheel turns although nothing is sent to it" : "rolling: no longer");
+        log_rolling(self, present);
         break;
     case IWN_CHANGE_ROLLS_AWAY:
         if (present) {
