@@ -159,6 +159,20 @@ static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
     }
 }
 
+static void test_request_behind_an_arm_is_answered_after_it(void) {
+    (void)said_after("");
+    const char *said = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
+    const char *first = strstr(said, "\"id\":1,\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(first, said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), said);
+}
+
+static void test_refusal_of_recordings_and_of_a_contradicted_arm_says_why(void) {
+    assert_reply("{\"cmd\":\"recordings\"}", "nothing is recorded: [record] blackbox_s is 0");
+    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
@@ -171,5 +185,7 @@ int main(void) {
     RUN_TEST(test_stop_is_told_with_the_request_that_asks_for_it);
     RUN_TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why);
     RUN_TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window);
+    RUN_TEST(test_request_behind_an_arm_is_answered_after_it);
+    RUN_TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why);
     return UNITY_END();
 }
