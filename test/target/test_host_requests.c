@@ -63,6 +63,7 @@ static void test_host_config_that_is_read_stays_staged_and_a_flash_that_fails_is
     disarm();
     assert_answer("{\"cmd\":\"config\",\"key\":\"wheels.track_mm\",\"value\":541,\"id\":1}", "\"staged\":true");
     assert_answer("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"key\":\"wheels.current_role\",\"value\":\"limit\""), answer);
     keep_fails = true;
     assert_answer("{\"cmd\":\"config\",\"commit\":true,\"id\":3}", "the flash did not take it");
     keep_fails = false;
