@@ -159,6 +159,57 @@ static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
     }
 }
 
+static void test_request_behind_an_arm_is_answered_after_it(void) {
+    (void)said_after("");
+    const char *said = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
+    const char *first = strstr(said, "\"id\":1,\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(first, said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), said);
+}
+
+static void test_refusal_of_recordings_and_of_a_contradicted_arm_says_why(void) {
+    assert_reply("{\"cmd\":\"recordings\"}", "nothing is recorded: [record] blackbox_s is 0");
+    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
+}
+
+static unsigned logged(const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
+static void test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both(void) {
+    static const char *const sentences[IW_SIDES] = {"the left wheel's battery", "the right wheel's battery"};
+    gw_health_t *health = &daemon_rig.daemon->wheels.health;
+    (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}\n");
+    daemon_rig_keep_log();
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const unsigned other = 1U - side;
+        const unsigned before[IW_SIDES] = {logged(sentences[IW_LEFT]), logged(sentences[IW_RIGHT])};
+        health->limits.battery_low_dV = 255;
+        health->present[other][GW_BATTERY_LOW] = true; // Told already.
+        daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
+        TEST_ASSERT_EQUAL_UINT(before[side] + 1U, logged(sentences[side]));
+        TEST_ASSERT_EQUAL_UINT(before[other], logged(sentences[other]));
+        TEST_ASSERT_EQUAL_UINT(0, logged("fault: battery_low"));
+        health->limits.battery_low_dV = 1;
+        health->present[side][GW_BATTERY_LOW] = false;
+        daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
+        TEST_ASSERT_EQUAL_UINT(side + 1U, logged("fault gone: battery_low"));
+        assert_told(said_after(""), "fault", "\"cause\":\"battery_low\",\"present\":false");
+    }
+}
+
+static void test_frame_is_told_whole(void) {
+    (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
+    daemon_rig_run(200);
+    const char *said = said_after("");
+    assert_told(said, "frame", "\"data\":");
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
@@ -171,5 +222,9 @@ int main(void) {
     RUN_TEST(test_stop_is_told_with_the_request_that_asks_for_it);
     RUN_TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why);
     RUN_TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window);
+    RUN_TEST(test_request_behind_an_arm_is_answered_after_it);
+    RUN_TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why);
+    RUN_TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both);
+    RUN_TEST(test_frame_is_told_whole);
     return UNITY_END();
 }

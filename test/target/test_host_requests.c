@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// What the board answers to a request by itself, and what it refuses.
+#include "host_rig.inc"
+
+static void disarm(void) {
+    say(1, "{\"cmd\":\"stop\"}");
+    for (unsigned i = 0; i < 30U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+}
+
+static void test_host_arm_of_another_names_who_holds_the_lease(void) {
+    char holder[64];
+    char line[IWN_LINE_BOARD_MAX];
+    put(line, drive_line(0, BOOT, ++seq, t_us, line));
+    (void)snprintf(host.client[0].served.name, sizeof host.client[0].served.name, "pendant");
+    (void)snprintf(holder, sizeof holder, "\\\"pendant\\\" (client %u)", (unsigned)host.client[0].served.id);
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    say(2, "{\"cmd\":\"arm\",\"id\":8}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, holder), answer);
+}
+
+static void test_host_that_starts_anew_arms_nobody_and_resets(void) {
+    host.restart_us = 1;
+    assert_answer("{\"cmd\":\"reset\",\"id\":1}", "\"id\":1");
+    TEST_ASSERT_NULL_MESSAGE(strstr(answer, "was committed"), answer);
+    assert_answer("{\"cmd\":\"arm\",\"id\":2}", "a configuration was committed");
+}
+
+static void test_host_second_status_before_the_answer_to_the_first_is_busy(void) {
+    all_length = 0;
+    say(1, "{\"cmd\":\"status\",\"id\":1}");
+    say(1, "{\"cmd\":\"status\",\"id\":2}");
+    run_ms(60);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":1,\"ok\":true"), all);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":2,\"ok\":false,\"error\":\"busy\""), all);
+}
+
+static void test_host_tare_is_kept_of_the_wheel_it_is_of(void) {
+    const iw_force_quality_t window = {.deviation_mN = 31};
+    rig.gateway.force[IW_LEFT].offset_mN = 11;
+    rig.gateway.force[IW_RIGHT].offset_mN = 22;
+    rig.gateway.force[IW_RIGHT].provenance = IW_OFFSET_OPERATOR;
+    (void)iwn_server_look(&host.server);
+    iwn_target_tared(&host.server, &host.client[0].served, IW_RIGHT, &window);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_OPERATOR, host.zero[IW_RIGHT].from);
+    TEST_ASSERT_EQUAL_INT32(22, host.zero[IW_RIGHT].offset_mN);
+    TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
+    TEST_ASSERT_EQUAL_UINT16(0, host.zero[IW_LEFT].deviation_mN);
+}
+
+static void test_host_why_and_the_answer_to_confirm_are_whole(void) {
+    assert_answer("{\"cmd\":\"why\",\"id\":1}", "\"directory\":null,\"recording\":null,\"recording_error\":null,"
+                                                "\"frames_before\":[],\"frames_after\":[]}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\"}",
+                  "\"found\":null,\"how\":null,\"since_wall_us\":null,\"reason\":null,\"disabled\":null}");
+}
+
+static void test_host_config_that_is_read_stays_staged_and_a_flash_that_fails_is_told(void) {
+    disarm();
+    assert_answer("{\"cmd\":\"config\",\"key\":\"wheels.track_mm\",\"value\":541,\"id\":1}", "\"staged\":true");
+    assert_answer("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"key\":\"wheels.current_role\",\"value\":\"limit\""), answer);
+    keep_fails = true;
+    assert_answer("{\"cmd\":\"config\",\"commit\":true,\"id\":3}", "the flash did not take it");
+    keep_fails = false;
+    TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
+    assert_answer("{\"cmd\":\"config\",\"commit\":false,\"id\":4}", "\"staged\":false");
+}
+
+static void test_host_answers_of_clients_that_have_gone_take_no_place(void) {
+    for (unsigned i = 0; i < 2U * IWN_LINE_CHANNELS; i++) {
+        say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+        say(2, "{\"cmd\":\"status\",\"id\":50}");
+        say(0, "{\"cmd\":\"close\",\"channel\":2}");
+        while (iw_host_take(&host, rig.now_us)) {
+        }
+        wire_length = wire_taken = 0;
+    }
+    assert_answer("{\"cmd\":\"status\",\"id\":51}", "\"id\":51,\"ok\":true");
+}
+
+static void test_host_request_is_late_after_a_second_and_not_before(void) {
+    char json[96];
+    disarm();
+    (void)snprintf(json, sizeof json, "{\"cmd\":\"reset\",\"id\":1,\"t_us\":%llu}",
+                   (unsigned long long)(rig.now_us - IWN_MAX_AGE_MS * 800U));
+    assert_answer(json, "\"id\":1");
+    TEST_ASSERT_NULL_MESSAGE(strstr(answer, "stale_command"), answer);
+    (void)snprintf(json, sizeof json, "{\"cmd\":\"reset\",\"id\":2,\"t_us\":%llu}",
+                   (unsigned long long)(rig.now_us - IWN_MAX_AGE_MS * 1100U));
+    assert_answer(json, "\"error\":\"stale_command\"");
+}
+
+/// Its close was lost: what the client of before has said is nothing of the new one's.
+static void test_host_channel_opened_anew_is_greeted_as_who_it_is_and_has_no_older_command(void) {
+    char json[256];
+    char part[64];
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    run_ms(5);
+    (void)snprintf(json, sizeof json,
+                   "{\"boot\":\"%016llx\",\"seq\":1,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0}",
+                   (unsigned long long)BOOT, (unsigned long long)t_us);
+    run_ms(5);
+    all_length = 0;
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    run_ms(5);
+    (void)snprintf(part, sizeof part, "\"client\":%u,\"rights\":\"drive\"", (unsigned)host.client[1].served.id);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, part), all);
+    refused = 0;
+    say(2, json);
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT32(1, refused);
+}
+
+static void test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_event_is_due(void) {
+    disarm();
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
+    run_ms(20);
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    const iw_time_us_t next_us = iw_host_tell(&host, &seen, true);
+    TEST_ASSERT_EQUAL_INT(1, host.server.told.estop);
+    TEST_ASSERT_EQUAL_UINT64(host.client[0].served.next_us, next_us);
+    TEST_ASSERT_TRUE(next_us > rig.now_us && next_us < host.linked_us + 1000000U);
+}
+
+static void test_host_change_of_the_ledger_is_told_and_every_item_is_kept(void) {
+    disarm();
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":1}");
+    run_ms(20);
+    all_length = 0;
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"ledger\""), all);
+    iw_learnt_t now;
+    memset(&now, 0, sizeof now);
+    iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    seen.assumed = entry;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        entry[item] = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    }
+    iw_learnt_note(&now, &seen, &host.settings, host.zero);
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        TEST_ASSERT_NOT_EQUAL_UINT8(0, now.item[item]);
+    }
+}
+
+static void test_host_setting_that_is_refused_says_what_it_may_be(void) {
+    assert_answer("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.track_mm\",\"value\":\"0\"}",
+                  "\"error\":\"bad_value\"");
+    const char *const to = strstr(answer, " to ");
+    TEST_ASSERT_NOT_NULL_MESSAGE(to, answer);
+    TEST_ASSERT_TRUE_MESSAGE(to[4] >= '1' && to[4] <= '9', answer);
+    iw_config_t config = rig.config;
+    config.rest_rpm = 3;
+    const iw_settings_t settings = iw_settings_from(&config);
+    char text[256];
+    iwn_text_t why = iwn_text_begin(text, sizeof text);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "set it to 2 first"), text);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_host_arm_of_another_names_who_holds_the_lease);
+    RUN_TEST(test_host_that_starts_anew_arms_nobody_and_resets);
+    RUN_TEST(test_host_second_status_before_the_answer_to_the_first_is_busy);
+    RUN_TEST(test_host_tare_is_kept_of_the_wheel_it_is_of);
+    RUN_TEST(test_host_why_and_the_answer_to_confirm_are_whole);
+    RUN_TEST(test_host_config_that_is_read_stays_staged_and_a_flash_that_fails_is_told);
+    RUN_TEST(test_host_answers_of_clients_that_have_gone_take_no_place);
+    RUN_TEST(test_host_request_is_late_after_a_second_and_not_before);
+    RUN_TEST(test_host_channel_opened_anew_is_greeted_as_who_it_is_and_has_no_older_command);
+    RUN_TEST(test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_event_is_due);
+    RUN_TEST(test_host_change_of_the_ledger_is_told_and_every_item_is_kept);
+    RUN_TEST(test_host_setting_that_is_refused_says_what_it_may_be);
+    return UNITY_END();
+}
