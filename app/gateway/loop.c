@@ -221,7 +221,7 @@ static iw_time_us_t next_us(gw_daemon_t *daemon) {
         return 0;
     }
     iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
-    next_us = earlier(next_us, iwn_server_next_us(&daemon->answers.server));
+    next_us = earlier(next_us, gw_answers_next_us(&daemon->answers));
     next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
     next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
     return looks(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
@@ -235,7 +235,7 @@ static void heed_bus(gw_daemon_t *daemon) {
     }
     const bool may_wait = daemon->loop.pace != GW_PACE_ALERT &&
                           wheels->now_us < daemon->loop.frames_us + FRAMES_GONE_US && wheels->tape.tapped < GW_FRAMES &&
-                          iwn_server_watching(&daemon->answers.server, IWN_TOPIC_FRAME) == 0U;
+                          gw_answers_watching_frames(&daemon->answers) == 0U;
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
     if (may_wait != daemon->loop.frames_wait &&
         epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {

@@ -210,6 +210,12 @@ static void test_frame_is_told_whole(void) {
     assert_told(said, "frame", "\"data\":");
 }
 
+static void test_assumption_of_the_button_is_of_its_time_in_force(void) {
+    const gw_daemon_t *daemon = daemon_rig.daemon;
+    TEST_ASSERT_NOT_EQUAL_UINT(0, daemon->config.estop.debounce_ms);
+    TEST_ASSERT_EQUAL_UINT64(MS(daemon->config.estop.debounce_ms), daemon->knowledge.button.debounce_us);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
@@ -226,5 +232,6 @@ int main(void) {
     RUN_TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why);
     RUN_TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both);
     RUN_TEST(test_frame_is_told_whole);
+    RUN_TEST(test_assumption_of_the_button_is_of_its_time_in_force);
     return UNITY_END();
 }

@@ -18,16 +18,27 @@ void gw_answers_begin(gw_answers_t *self) {
     iwn_server_begin(&self->server);
 }
 
+/// What does not change while the gateway runs.
+static iwn_estop_t describe_estop(const gw_wheels_t *wheels) {
+    const iw_linux_hal_t *hal = &wheels->hal;
+    return (iwn_estop_t){.line = wheels->estop,
+                         .present = hal->estop_ops->present,
+                         .simulated = hal->estop_ops->simulated};
+}
+
 void gw_answers_refresh(gw_answers_t *self) {
     const iw_linux_hal_t *hal = &self->wheels->hal;
+    iwn_estop_t *estop = &self->server.estop;
     self->server.now_us = self->wheels->now_us;
-    self->server.estop = (iwn_estop_t){.line = self->wheels->estop,
-                                       .line2 = hal->two_contacts ? self->wheels->estop2 : NULL,
-                                       .pressed_at = hal->two_contacts ? inspect_pressed_at(hal) : NULL,
-                                       .answer = hal->estop_last,
-                                       .present = hal->estop_ops->present,
-                                       .simulated = hal->estop_ops->simulated,
-                                       .tried_us = self->wheels->estop_tried_us};
+    if (!self->server.told.started) {
+        *estop = describe_estop(self->wheels);
+    }
+    if (hal->two_contacts) {
+        estop->line2 = self->wheels->estop2;
+        estop->pressed_at = inspect_pressed_at(hal);
+    }
+    estop->answer = hal->estop_last;
+    estop->tried_us = self->wheels->estop_tried_us;
 }
 
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
@@ -263,6 +274,16 @@ void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen) {
 }
 
 void gw_answers_periodic(gw_answers_t *self) {
-    self->server.now_us = self->wheels->now_us;
-    iwn_server_periodic(&self->server);
+    if (gw_clients_count(self->clients) > 0U) {
+        self->server.now_us = self->wheels->now_us;
+        iwn_server_periodic(&self->server);
+    }
+}
+
+iw_time_us_t gw_answers_next_us(gw_answers_t *self) {
+    return (gw_clients_count(self->clients) > 0U) ? iwn_server_next_us(&self->server) : IW_NEVER;
+}
+
+uint32_t gw_answers_watching_frames(gw_answers_t *self) {
+    return (gw_clients_count(self->clients) > 0U) ? iwn_server_watching(&self->server, IWN_TOPIC_FRAME) : 0U;
 }

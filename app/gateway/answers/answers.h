@@ -84,6 +84,12 @@ void gw_answers_observe(gw_answers_t *self, const iw_snapshot_t *seen);
 /// Sends the periodic events that are due.
 void gw_answers_periodic(gw_answers_t *self);
 
+/// When there is one; IW_NEVER if nobody watches.
+iw_time_us_t gw_answers_next_us(gw_answers_t *self);
+
+/// How many watch frames.
+uint32_t gw_answers_watching_frames(gw_answers_t *self);
+
 /// Sends the frames that the tape has tapped to the watchers of the topic `frame`, or leaves them there for a while.
 void gw_answers_frames(gw_answers_t *self);
 

@@ -187,7 +187,7 @@ static void tell_frame(iwn_server_t *server, const gw_tapped_t *tapped) {
 void gw_answers_frames(gw_answers_t *self) {
     gw_tape_t *tape = &self->wheels->tape;
     const iw_time_us_t now_us = self->wheels->now_us;
-    const uint32_t watching = iwn_server_watching(&self->server, IWN_TOPIC_FRAME);
+    const uint32_t watching = (tape->tapped > 0U) ? gw_answers_watching_frames(self) : 0U;
     if (watching > GW_FRAMES_ONE_BY_ONE && now_us < self->frames_us && tape->tapped <= GW_FRAMES / 2U) {
         return;
     }
