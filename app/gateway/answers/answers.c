@@ -21,9 +21,8 @@ void gw_answers_begin(gw_answers_t *self) {
 /// What does not change while the gateway runs.
 static iwn_estop_t describe_estop(const gw_wheels_t *wheels) {
     const iw_linux_hal_t *hal = &wheels->hal;
-    return (iwn_estop_t){.line = wheels->estop,
-                         .present = hal->estop_ops->present,
-                         .simulated = hal->estop_ops->simulated};
+    return (iwn_estop_t){
+        .line = wheels->estop, .present = hal->estop_ops->present, .simulated = hal->estop_ops->simulated};
 }
 
 void gw_answers_refresh(gw_answers_t *self) {
