@@ -176,6 +176,7 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     server->rate_max_hz = place->rate_max_hz;
     server->topics =
         (uint8_t)((1U << IWN_TOPICS) - 1U) & (uint8_t) ~(1U << IWN_TOPIC_FRAME); // The line cannot carry the bus.
+    server->each_for_itself = true;
     server->now_us = now_us;
     server->estop.line = place->estop;
     server->estop.present = true;
@@ -228,6 +229,9 @@ static void pay(iw_host_t *self, const iw_snapshot_t *seen) {
         const bool reply = turn < IWN_LINE_CHANNELS;
         iw_host_client_t *const client = &self->client[(self->next_owed + turn) % IWN_LINE_CHANNELS];
         bool *const owed = reply ? &client->owed_status : &client->owed_state;
+        if ((client->served.topics & (1U << IWN_TOPIC_STATE)) == 0U) {
+            client->owed_state = false; // It watches no more.
+        }
         if (client->served.id != IW_CLIENT_NONE && *owed) {
             *owed = false;
             const iwn_id_t *const id =

@@ -37,6 +37,9 @@ static const char *frame(iw_host_t *self, uint8_t channel, char *json, size_t le
 /// Puts a line of `self->scratch.small` into the ring, leaving `reserve` bytes free.
 static bool put(iw_host_t *self, uint8_t channel, size_t length, size_t reserve) {
     size_t whole;
+    if (length + reserve > iw_serial_room()) {
+        return false; // Without its CRC: that costs time, before the next look at the e-stop.
+    }
     const char *const line = frame(self, channel, &self->scratch.small[IWN_LINE_PREFIX], length, &whole);
     if (whole == 0U || whole + reserve > iw_serial_room()) {
         return false;

@@ -29,7 +29,8 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
         return has_gpio() ? "there is no such line; gpioinfo lists them"
                           : "this machine has no GPIO chip (/dev/gpiochip*): load its driver, or use another input";
     case ENOTUNIQ:
-        return "two lines have this name; write the wired one as gpiochipN:OFFSET under [estop] (gpioinfo lists them)";
+        return "two lines have this name; set [estop] line or line2 to gpiochipN:OFFSET of the wired one (gpioinfo "
+               "lists them)";
     case EREMCHG:
         return (first != 0)
                    ? "the line is of another chip, or has another name, than [estop] chip and chip_line say: find "

@@ -10,16 +10,16 @@
 
 void gw_client_read(gw_client_t *self) {
     const size_t room = sizeof self->in - self->in_length;
-    if (room == 0U || self->phase != GW_OPEN) {
+    if (room == 0U || self->phase == GW_ENDED || gw_client_is_closing(self)) {
         return;
     }
     const ssize_t count = recv(self->fd, &self->in[self->in_length], room, MSG_DONTWAIT);
     self->drained = count < (ssize_t)room;
     if (count > 0) {
         self->in_length += (size_t)count;
-    } else if (count == 0) {
+    } else if (count == 0 && self->phase == GW_OPEN) {
         self->phase = GW_ENDED;
-    } else if (errno != EAGAIN && errno != EINTR) {
+    } else if (count < 0 && errno != EAGAIN && errno != EINTR) {
         gw_client_break(self);
     }
 }

@@ -29,7 +29,7 @@
 typedef enum {
     GW_OPEN = 0,
     GW_ENDED,   ///< Nothing more comes; complete lines that came before still count.
-    GW_BROKEN,  ///< It cannot be read or written; nobody has been told yet.
+    GW_BROKEN,  ///< It cannot be written; what it has sent is read once more, for the stops in it.
     GW_CLOSING, ///< Nothing more is read; what is queued is sent.
     GW_GONE,    ///< Neither; its slot can be freed.
 } gw_phase_t;

@@ -280,6 +280,16 @@ static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
 }
 
+/// An answer finds no room in the step, before its stop is read.
+static void test_stop_not_yet_read_of_a_broken_connection_is_carried_out(void) {
+    take_all_places();
+    begin_driving();
+    say(crowd[0], "{\"cmd\":\"stop\"}\n");
+    gw_client_break(&daemon_rig.daemon->clients.client[1]);
+    assert_slower("broken");
+    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
+}
+
 /// It has stopped before it is gone.
 static void test_stop_of_a_holder_that_is_given_up_is_its_own(void) {
     begin_driving();
@@ -389,6 +399,7 @@ int main(void) {
     RUN_TEST(test_stop_behind_another_line_is_carried_out);
     RUN_TEST(test_stop_place_answers_one_line_and_all_stops);
     RUN_TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out);
+    RUN_TEST(test_stop_not_yet_read_of_a_broken_connection_is_carried_out);
     RUN_TEST(test_stop_of_a_holder_that_is_given_up_is_its_own);
     RUN_TEST(test_stop_place_of_the_silent_is_free_after_200_ms);
     RUN_TEST(test_stop_places_of_one_user_are_half_of_them);

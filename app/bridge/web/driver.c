@@ -51,7 +51,10 @@ static const char *judge(const web_driver_t *self, const web_command_t *command,
     if (sequence <= self->sequence) {
         return "a newer command was here already";
     }
-    if ((uint64_t)told_us > now_us || now_us - (uint64_t)told_us > limits->ttl_us) {
+    if ((uint64_t)told_us > now_us + WEB_AHEAD_US) {
+        return "its t_us is in the future; quote t_us of the newest state";
+    }
+    if ((uint64_t)told_us < now_us && now_us - (uint64_t)told_us > limits->ttl_us) {
         return "too old: the connection is too slow for driving";
     }
     return NULL;

@@ -29,7 +29,7 @@ void gw_answers_refresh(gw_answers_t *self) {
     const iw_linux_hal_t *hal = &self->wheels->hal;
     iwn_estop_t *estop = &self->server.estop;
     self->server.now_us = self->wheels->now_us;
-    if (!self->server.told.started) {
+    if (estop->line == NULL) {
         *estop = describe_estop(self->wheels);
     }
     if (hal->two_contacts) {
@@ -37,7 +37,6 @@ void gw_answers_refresh(gw_answers_t *self) {
         estop->pressed_at = inspect_pressed_at(hal);
     }
     estop->answer = hal->estop_last;
-    estop->tried_us = self->wheels->estop_tried_us;
 }
 
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
@@ -248,6 +247,9 @@ static void leave(void *context, gw_client_t *connection) {
     gw_wheels_leave(self->wheels, connection->id);
     connection->held = false;
     served->client.arming = false;
+    if (connection->phase != GW_OPEN) {
+        served->client.topics = 0; // It gets no more events.
+    }
     const iw_snapshot_t seen = gw_wheels_look(self->wheels);
     gw_answers_observe(self, &seen);
 }

@@ -49,6 +49,7 @@ iwn_surroundings_t iwn_target_around(iwn_server_t *server, const iw_snapshot_t *
                                  .warnings = wheels->warnings,
                                  .clients = gw_clients_count(self->clients),
                                  .shutting_down = wheels->shutting_down};
+    around.estop.tried_us = wheels->estop_tried_us;
     for (uint32_t i = 0; i < wheels->warnings; i++) {
         around.warning[i] = wheels->warning[i];
     }

@@ -129,7 +129,9 @@ void gw_record_rolling(gw_box_t *box, gw_log_t *log, const iw_snapshot_t *seen) 
     iwn_stop_note_t note = {.stop = {.at_us = seen->at_us, .from = seen->state}, .wall_us = iw_clock_wall_us()};
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const bool turns = seen->wheel[side].heard && abs(seen->wheel[side].speed_mm_s) > IW_ROLLING_MM_S;
-        note.stop.sides |= turns ? (uint8_t)(IW_SIDES_LEFT << side) : 0U;
+        if (turns) {
+            note.stop.sides = (uint8_t)(note.stop.sides | (unsigned)IW_SIDES_LEFT << side);
+        }
     }
     (void)snprintf(note.sentence, sizeof note.sentence,
                    "a wheel turns although nothing is sent to it, and soon after the last setpoint: the machine rolls "

@@ -91,15 +91,23 @@ static bool is_periodic(const iwn_client_t *client) {
     return (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
 }
 
+/// No burst after a stall.
+static iw_time_us_t next_of(const iwn_server_t *self, const iwn_client_t *client) {
+    const iw_time_us_t period_us = 1000000U / client->rate_hz;
+    const iw_time_us_t own_us = client->next_us + period_us;
+    if (!self->each_for_itself) {
+        return self->now_us - self->now_us % period_us + period_us;
+    }
+    return (own_us > self->now_us) ? own_us : self->now_us + period_us;
+}
+
 /// The topics of periodic events that are due.
 static uint8_t find_due(iwn_server_t *self) {
     uint8_t topics = 0;
     for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
         client->due = is_periodic(client) && self->now_us >= client->next_us;
         if (client->due) {
-            // On a grid that all clients share, so that an event is written once for many; and no burst after a stall.
-            const iw_time_us_t period_us = 1000000U / client->rate_hz;
-            client->next_us = self->now_us - self->now_us % period_us + period_us;
+            client->next_us = next_of(self, client);
             topics |= client->topics;
         }
     }

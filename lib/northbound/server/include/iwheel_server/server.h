@@ -65,6 +65,9 @@ typedef struct iwn_server {
     uint32_t max_age_ms; ///< Of arm, reset, release and confirm.
     uint32_t rate_max_hz;
     uint8_t topics; ///< What can be watched here: a bit for each iwn_topic_t.
+    /// Periodic events of each client come at times of its own, for a line without room for many at once. Otherwise on a grid that all
+    /// share, so that an event is written once for many.
+    bool each_for_itself;
 
     // Set by the caller before each call.
     iw_time_us_t now_us;
