@@ -39,6 +39,16 @@ static void test_host_second_status_before_the_answer_to_the_first_is_busy(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":2,\"ok\":false,\"error\":\"busy\""), all);
 }
 
+/// The serial line has no room for the events of all at once.
+static void test_host_periodic_events_of_each_client_keep_their_own_times(void) {
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
+    run_ms(30);
+    say(2, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
+    run_ms(300);
+    TEST_ASSERT_TRUE(host.client[0].served.next_us % 100000U != host.client[1].served.next_us % 100000U);
+}
+
 static void test_host_tare_is_kept_of_the_wheel_it_is_of(void) {
     const iw_force_quality_t window = {.deviation_mN = 31};
     rig.gateway.force[IW_LEFT].offset_mN = 11;
@@ -165,6 +175,7 @@ static void test_host_setting_that_is_refused_says_what_it_may_be(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_host_periodic_events_of_each_client_keep_their_own_times);
     RUN_TEST(test_host_arm_of_another_names_who_holds_the_lease);
     RUN_TEST(test_host_that_starts_anew_arms_nobody_and_resets);
     RUN_TEST(test_host_second_status_before_the_answer_to_the_first_is_busy);

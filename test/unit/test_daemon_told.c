@@ -5,10 +5,26 @@
 #include "unity.h"
 
 #include "iwheel_server/target.h"
+#include "start/start_report.h"
+
+#include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+static void test_bus_that_cannot_be_opened_is_named_with_the_cure(void) {
+    const gateway_config_t *config = &daemon_rig.daemon->config;
+    char *text = NULL;
+    size_t length = 0;
+    FILE *err = open_memstream(&text, &length);
+    TEST_ASSERT_NOT_NULL(err);
+    gw_report_unopened(config, config->bus.interface, ENODEV, err);
+    (void)fclose(err);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, config->bus.interface), text);
+    free(text);
+}
 
 /// Until then its first telemetry may still come.
 static void test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on(void) {
@@ -218,6 +234,7 @@ static void test_assumption_of_the_button_is_of_its_time_in_force(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_bus_that_cannot_be_opened_is_named_with_the_cure);
     RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
     RUN_TEST(test_status_has_no_more_warnings_than_places_for_them);
     RUN_TEST(test_hello_has_the_time_of_its_cycle);
