@@ -188,7 +188,7 @@ static void show(const uint8_t *data, size_t size) {
     free(text);
     fetch_begin(&fetch, "w1", "me", 60000000U, NOW_US);
     fuzz_require(fetch_step(&fetch, NOW_US, &verb, asked), "it asks");
-    fetch.greets = false;
+    fetch.asked = FETCH_COMMAND;
     (void)fetch_take(&fetch, "reply/me", payload, size, NOW_US);
     for (size_t i = 0; i < fetch.count; i++) {
         fuzz_require(strncmp(fetch.list[i].name, "stop-", 5) == 0 && strpbrk(fetch.list[i].name, "/.") == NULL,
