@@ -164,10 +164,9 @@ static IW_APART int32_t turn_by(const step_t *step, const int32_t *speed, bool b
 /// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
 static IW_APART void cut_step(step_t *step, bool braking, uint32_t fraction) {
     uint32_t *const share = &step->share[braking ? 1U : 0U];
-    const uint32_t cut = (uint32_t)((uint64_t)*share * fraction / FRACTION_ONE);
-    if (cut < *share) {
-        *share = cut;
-    }
+    const uint32_t whole = *share;
+    const uint32_t cut = (uint32_t)((uint64_t)whole * fraction / FRACTION_ONE);
+    *share = (cut < whole) ? cut : whole; // A share of a share is never larger, which Eva cannot see by itself.
 }
 
 /// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that

@@ -61,8 +61,10 @@ static inline iwn_span_t iwn_span(const char *text) {
 }
 
 #ifdef __OPTIMIZE_SIZE__
+/// The functions that take a name are compiled once, in json_out.c.
 #define IWN_OUT_INLINE
 #else
+/// The functions that take a name are inline.
 #define IWN_OUT_INLINE static inline
 #endif
 
