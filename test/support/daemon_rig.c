@@ -447,6 +447,14 @@ const char *daemon_rig_log(void) {
     return text;
 }
 
+unsigned daemon_rig_logged(const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
 bool daemon_rig_marked(void) {
     char path[128];
     (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);

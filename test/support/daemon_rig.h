@@ -91,6 +91,9 @@ void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms
 void daemon_rig_keep_log(void);
 const char *daemon_rig_log(void);
 
+/// How often the log has these words.
+unsigned daemon_rig_logged(const char *words);
+
 /// True if the crash marker is there.
 bool daemon_rig_marked(void);
 

@@ -189,14 +189,6 @@ static void test_refusal_of_recordings_and_of_a_contradicted_arm_says_why(void) 
     assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
 }
 
-static unsigned logged(const char *words) {
-    unsigned count = 0;
-    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
-        count++;
-    }
-    return count;
-}
-
 static void test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both(void) {
     static const char *const sentences[IW_SIDES] = {"the left wheel's battery", "the right wheel's battery"};
     gw_health_t *health = &daemon_rig.daemon->wheels.health;
@@ -204,17 +196,18 @@ static void test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for
     daemon_rig_keep_log();
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const unsigned other = 1U - side;
-        const unsigned before[IW_SIDES] = {logged(sentences[IW_LEFT]), logged(sentences[IW_RIGHT])};
+        const unsigned before[IW_SIDES] = {daemon_rig_logged(sentences[IW_LEFT]),
+                                           daemon_rig_logged(sentences[IW_RIGHT])};
         health->limits.battery_low_dV = 255;
         health->present[other][GW_BATTERY_LOW] = true; // Told already.
         daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
-        TEST_ASSERT_EQUAL_UINT(before[side] + 1U, logged(sentences[side]));
-        TEST_ASSERT_EQUAL_UINT(before[other], logged(sentences[other]));
-        TEST_ASSERT_EQUAL_UINT(0, logged("fault: battery_low"));
+        TEST_ASSERT_EQUAL_UINT(before[side] + 1U, daemon_rig_logged(sentences[side]));
+        TEST_ASSERT_EQUAL_UINT(before[other], daemon_rig_logged(sentences[other]));
+        TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("fault: battery_low"));
         health->limits.battery_low_dV = 1;
         health->present[side][GW_BATTERY_LOW] = false;
         daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
-        TEST_ASSERT_EQUAL_UINT(side + 1U, logged("fault gone: battery_low"));
+        TEST_ASSERT_EQUAL_UINT(side + 1U, daemon_rig_logged("fault gone: battery_low"));
         assert_told(said_after(""), "fault", "\"cause\":\"battery_low\",\"present\":false");
     }
 }

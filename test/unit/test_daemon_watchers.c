@@ -340,14 +340,6 @@ static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 
-static unsigned told(const char *words) {
-    unsigned count = 0;
-    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
-        count++;
-    }
-    return count;
-}
-
 static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
     daemon_rig_keep_log();
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -366,7 +358,7 @@ static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
     daemon_rig_run(20);
     TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[GW_WATCH]);
-    TEST_ASSERT_EQUAL_UINT(0, told("turned away"));
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
 }
 
 static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in(void) {
@@ -374,13 +366,13 @@ static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_h
     daemon_rig.daemon->clients.most[GW_WATCH] = 2;
     connect_crowd(3);
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_EQUAL_UINT(1, told("a client was turned away: 2 watchers are connected"));
+    TEST_ASSERT_EQUAL_UINT(1, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
     (void)close(crowd[0]);
     crowd[0] = -1;
     daemon_rig_run(10);
     connect_crowd(2);
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_EQUAL_UINT(2, told("a client was turned away: 2 watchers are connected"));
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
 }
 
 static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one(void) {
@@ -404,7 +396,7 @@ static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_i
     daemon_rig.waits = 0;
     daemon_rig_run(GW_LISTENER_PAUSE_US / IW_US_PER_MS - 5U);
     const unsigned count = daemon_rig.daemon->clients.count[GW_DRIVE];
-    const unsigned lines = told("cannot accept clients for want of descriptors; trying again in 200 ms");
+    const unsigned lines = daemon_rig_logged("cannot accept clients for want of descriptors; trying again in 200 ms");
     const uint32_t waits = daemon_rig.waits;
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_UINT(1, count);

@@ -58,11 +58,10 @@ typedef struct gw_answers {
     const char *group;
     gw_stopper_t stopped_by;
     gw_stopper_t estopped_by;
-    iw_link_purge_t purge;                 ///< As told to the log.
-    iw_time_us_t frames_us;                ///< Frames that are told together wait until then.
-    char key[IWN_LEASE_KEY_MAX + 1U];      ///< Drawn for the arm that is being carried out.
-    char holder_text[GW_CLIENT_TEXT_SIZE]; ///< Of the lease, as shown to others.
-    char text[GW_CLIENT_TEXT_SIZE];        ///< Of iwn_target_name.
+    iw_link_purge_t purge;            ///< As told to the log.
+    iw_time_us_t frames_us;           ///< Frames that are told together wait until then.
+    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Drawn for the arm that is being carried out.
+    char text[GW_CLIENT_TEXT_SIZE];   ///< Of iwn_target_name.
     gw_refuse_texts_t texts;
     iwn_work_t work; ///< For reading requests.
     gw_served_t served[GW_CLIENTS_MAX];

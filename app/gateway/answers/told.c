@@ -52,10 +52,8 @@ static void log_stop(const gw_answers_t *self) {
 
 static void log_lease(gw_answers_t *self, const char *change) {
     const iw_client_t holder = self->server.told.holder;
-    if (holder != IW_CLIENT_NONE) {
-        gw_answers_describe(self, holder, self->holder_text);
-    }
-    gw_log(self->log, GW_LOG_INFO, "lease %s: %s", change, (holder == IW_CLIENT_NONE) ? "nobody" : self->holder_text);
+    gw_log(self->log, GW_LOG_INFO, "lease %s: %s", change,
+           (holder == IW_CLIENT_NONE) ? "nobody" : iwn_target_name(&self->server, holder));
 }
 
 static void log_fault(const gw_answers_t *self, const char *cause, bool present) {
