@@ -144,6 +144,8 @@ function(iwheel_shared_support file)
     endif()
 endfunction()
 
+add_custom_target(iwheel_unit_tests) # All of them, and what they need.
+
 function(iwheel_unit_test name)
     set(sources ${ARGN})
     foreach(file ${IWHEEL_SHARED_SUPPORT})
@@ -156,6 +158,7 @@ function(iwheel_unit_test name)
     add_executable(unit_${name} ${sources})
     target_include_directories(unit_${name} PRIVATE "${PROJECT_SOURCE_DIR}/test/support")
     target_link_libraries(unit_${name} PRIVATE iwheel::core iwheel_unity iwheel_gnu)
+    add_dependencies(iwheel_unit_tests unit_${name})
     add_test(NAME unit.${name} COMMAND unit_${name})
     set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 1200) # Some steps of ./check get little of the processor.
 endfunction()

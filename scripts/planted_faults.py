@@ -290,8 +290,8 @@ def sizes(_, new):
 
 def counting(folder, case):
     (folder / "junit.xml").write_text(f"<testsuite>{case}</testsuite>")
-    status, said = run(SCRIPTS / "count_tests.py", folder / "junit.xml")
-    return status or int(said.split()[-2]), said
+    status, said = run(ROOT / "test/all/count_tests.py", "--run", folder / "read.xml", "cp", folder / "junit.xml", folder / "read.xml")
+    return status or int(said.split()[-4]), said
 
 
 def of_mutation(name):
@@ -318,36 +318,6 @@ def mutation(_, kind):
     with contextlib.redirect_stdout(io.StringIO()) as said:
         campaign.enter(next(key for key, mutant in record.mutants.items() if mutant.file == "ledger.c"), module.Verdict(kind))
         return module.verdict_on(campaign, argparse.Namespace(update=False)), said.getvalue()
-
-
-# What is done to the tree, whether `api` (which reads pages) and `eva` (which reads none) must run after it.
-DEEDS = (("nothing", ":", "--no-install", True, True), ("nothing more", ":", "--no-install", False, False), ("a file changed", "echo >>deed", "--no-install", True, True),
-         ("a file more", "echo >more", "--no-install", True, True), ("other rights", "chmod +x more", "--no-install", True, True),
-         ("a page changed", "echo >>page.md", "--no-install", True, False), ("what git ignores changed", "echo >>build/x", "--no-install", False, False),
-         ("--again", ":", "--again", True, True), ("a step named", ":", "api", True, False), ("the other option", ":", "--full", True, True),
-         ("it fails", "echo false >deed", "--no-install", True, True), ("it fails still", ":", "--no-install", True, True),
-         ("it skips", "echo echo 1 passed, 0 failed, 1 skipped >deed", "--no-install", True, True), ("it skips still", ":", "--no-install", False, True),
-         ("it changes the tree", "echo 'echo >new' >deed", "--no-install", True, True), ("changed back", "rm new", "--no-install", True, False)) # `api` makes it anew.
-
-
-def memory(folder, fault):
-    """./check of two steps that write down when they run, in a tree of its own, with the fault in one of its files: is what changed seen?"""
-    text = re.sub(r"^readonly (steps|in_real_time|computing)=\(.*?\)$", "", (ROOT / "check").read_text(), flags=re.S | re.M)
-    text = text.replace("# Seconds by the clock,", 'readonly steps=("build b" "api a" "eva e") in_real_time=("api eva") computing=()\n#', 1)
-    files = {"check": text, "scripts/fingerprint": (SCRIPTS / "fingerprint").read_text(), "bin/cmake": "#!/bin/sh\n", "page.md": "", "deed": ":\n", ".gitignore": "build/\n"}
-    files |= {name: f"#!/bin/sh\necho {step} >>build/ran\n. ./deed || exit\n" for step, name in (("api", "scripts/api_reference"), ("eva", "test/eva/run"))}
-    for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(content.replace(fault[1], fault[2]) if fault and fault[0] == name else content)
-        (folder / name).chmod(0o644 if name in ("deed", "page.md") else 0o755)
-    run("git", "init", "-q", cwd=folder)
-    for what, deed, option, *must_run in DEEDS:
-        run("sh", "-c", f"mkdir -p build; rm -f build/ran; {deed}", cwd=folder)
-        _, said = run("env", f"PATH={folder}/bin:{os.environ['PATH']}", "./check", "--no-install", option, cwd=folder)
-        ran = (folder / "build/ran").read_text() if (folder / "build/ran").exists() else ""
-        if [name in ran for name in ("api", "eva")] != must_run:
-            return 1, f"{what}: ran: {ran}\n{said}"
-    return 0, ""
 
 
 def proofs(folder, change):
@@ -509,11 +479,6 @@ CASES = [
     (around, "clang", "lives", ("!", {}, True), True),
     (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
     (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
-    (memory, "git", "clean", None, False),
-    (memory, "git", "contents that are not read", ("scripts/fingerprint", 'sha256sum -- "$@"', ":"), True),
-    (memory, "git", "what is new is not read", ("scripts/fingerprint", "-co --exclude-standard", "-c"), True),
-    (memory, "git", "what failed is remembered", ("check", '[ "$status" -ne 0 ] || remember', "failed=0 && remember"), True),
-    (memory, "git", "what changed meanwhile is remembered", ("check", '&& [ "$(fingerprint "$1")" = "$2" ] ||', "||"), True),
     (proofs, "python3", "clean", str, False),
     (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
     (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),

@@ -4,9 +4,10 @@
 
 usage: scripts/proofs.py [--update] [TABLE]
 
-A row is a step of ./check, or one of several proofs in a step. `number` is a minimum of single tests. It fails: a step without a row, a row whose
-step or runner is no longer there, and a number that has become smaller. Numbers come from the runners' lists, from the sources, and from the last
-run of the step (build/check/STEP.counts); a step that was not run here is "not run", which is no pass. --update raises numbers and adds steps.
+A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), or one of several proofs in a step. `number` is a minimum of single
+tests. It fails: a step without a row, a row whose step or runner is no longer there, or that went to a longer list, and a number that has become
+smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts); a step that was not
+run here is "not run", which is no pass. --update raises numbers and adds steps.
 """
 import csv
 import re
@@ -16,7 +17,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs/developer/proofs.csv"
+TESTS = ROOT / "test/all/steps.cmake"
 FIELDS = ("id", "what", "command", "number", "list")
+LISTS = ("quick", "check", "ci", "full")
 TIMEOUT_S = 60
 # Proofs inside steps: (what, command of the runner that lists them) or (what, files, what begins each single test in them).
 LISTED = {
@@ -37,9 +40,11 @@ COUNTED = {
 
 
 def steps():
-    """{step: what it proves}"""
-    done = subprocess.run([ROOT / "check", "--list"], capture_output=True, text=True, check=True)
-    return dict(line.split(None, 1) for line in done.stdout.splitlines())
+    """{step: the shortest list that has all of it: quick, check, ci; but full only if all of it is there}"""
+    found = {}
+    for name, where in re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real) )([a-z0-9_]+)\S* (quick|check|ci|full)", TESTS.read_text(), re.M):
+        found[name] = max(found.get(name, "quick"), where, key=LISTS.index) if where != "full" or name not in found else found[name]
+    return found
 
 
 def listed(command):
@@ -54,11 +59,9 @@ def listed(command):
 
 def last_run(step):
     """Single tests that the step ran here last; None if it did not run, or skipped some."""
-    path = ROOT / f"build/check/{step}.counts"
-    if not path.exists():
-        return None
-    counts = [list(map(int, line.split())) for line in path.read_text().splitlines()]
-    return None if any(sum(line[2:]) for line in counts) else sum(map(sum, counts))
+    paths = [*ROOT.glob(f"build/check/{step}.counts"), *ROOT.glob(f"build/check/{step}.*.counts")]
+    counts = [list(map(int, path.read_text().split())) for path in paths]
+    return None if not (ROOT / f"build/check/{step}.counts").exists() or any(sum(one[2:]) for one in counts) else sum(map(sum, counts))
 
 
 def number_of(name):
@@ -70,13 +73,13 @@ def number_of(name):
     return last_run(name)
 
 
-def rows_now(known):
+def rows_now(known, table):
     """Every row that there must be: (id, what, command, list)."""
-    for name, what in known.items():
-        yield name, what, f"./check {name}", "check"
+    for name, where in known.items():
+        yield name, table.get(name, {}).get("what", ""), f"./check {name}", where
     for name, (what, *source) in {**LISTED, **COUNTED}.items():
         step, full = name.split(".")[0], name.endswith(".full")
-        yield name, what, f"./check {'--full ' if full else ''}{step}", "full" if full else "check"
+        yield name, what, f"./check {'--full ' if full else ''}{step}", "full" if full else known.get(step, "")
 
 
 def main(arguments):
@@ -84,7 +87,7 @@ def main(arguments):
     with open(path, newline="", encoding="utf-8") as file:
         table = {row["id"]: row for row in csv.DictReader(file)}
     wrong = []
-    for name, what, command, where in rows_now(known):
+    for name, what, command, where in rows_now(known, table):
         if "--update" in arguments:
             now = number_of(name)
             old = int(table.get(name, {}).get("number") or 0)

@@ -10,6 +10,7 @@ The last line sums up: "N passed, N failed, N skipped".
 import contextlib
 import io
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,7 @@ import textwrap
 import time
 import types
 import unittest
+from pathlib import Path
 from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -59,16 +61,19 @@ FAULTS = (
 
 
 # The same for what reads the runners' sums: (what, file, old, new).
+START, COUNT = "test/all/start", "test/all/count_tests.py"
 READER_FAULTS = (
-    ("check believes a second run", "check", "counted test/system/run --build build/default", "test/system/run || counted test/system/run"),
-    ("check takes 75 for success", "check", '[ ! -s "$out/unjudged" ] || exit 75', ":"),
-    ("check lets 75 outweigh a failure", "check", '[ "$sum_failed" -eq 0 ] || exit 1', '[ ! -s "$out/unjudged" ] || exit 75'),
-    ("check takes any status for 75", "check", '[ "$1" -ne 75 ] || [ "$status" -eq 1 ] || {', "{"),
-    ("check cuts the reason of a failure", "check", "--no-group-separator -A 4", "--no-group-separator"),
-    ("check names nothing inconclusive", "check", '[ "$sum_inconclusive" -eq 0 ] ||', "true ||"),
-    ("CTest's reader takes 75 for a failure", "scripts/count_tests.py", "and not NOT_JUDGED.search(output)", ""),
-    ("CTest's reader takes 75 for success", "scripts/count_tests.py", "75 if unjudged else 0", "0"),
-    ("CTest's reader believes the sum of what died", "scripts/count_tests.py", "and not NOT_JUDGED.search(output)", "and not ours"),
+    ("check believes a second run", START, "status = 77 if missing else run(command, file)", "status = 77 if missing else run(command, file) and run(command, file)"),
+    ("check takes 75 for success", COUNT, "return 1 if sums[1] else 75 if unjudged else int(not sums[0])", "return 1 if sums[1] else int(not sums[0])"),
+    ("check lets 75 outweigh a failure", COUNT, "return 1 if sums[1] else 75 if unjudged", "return 75 if unjudged else 1 if sums[1]"),
+    ("check takes any status for 75", COUNT, "status not in (0, 77) and not (status == 75 and", "status == 1 and not (status == 75 and"),
+    ("check cuts the reason of a failure", START, "for more in range(5)", "for more in range(1)"),
+    ("check names nothing inconclusive", COUNT, 'above\\n" if inconclusive', 'above\\n" if False'),
+    ("check takes what was killed for skipped", COUNT, '("none", 77 if status == 77 else 1, 0, 0)', '("none", 77, 0, 0)'),
+    ("check shows nothing of what was killed", COUNT, 'if layer == "none":', "if False:"),
+    ("CTest's reader takes 75 for a failure", COUNT, "failed = 75 if NOT_JUDGED.search(output) else 1", "failed = 1"),
+    ("CTest's reader takes 75 for success", COUNT, 'return 1 if sums[1] else 75 if any(line.startswith("real time") for line in lines) else ended', "return 1 if sums[1] else 0"),
+    ("CTest's reader believes the sum of what died", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
 )
 
 
@@ -304,29 +309,39 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check itself, with the step `system`, whose runner is a script of this test, and `unit`, whose tests are a file of CTest's output."""
+    """./check itself, with the step `system`, whose runner is a script of this test, and `unit`, whose tests are a file of CTest's output.
+    Both wait for the build, which does nothing here and counts as one."""
+
+    FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
+    CTEST = """#!/bin/sh
+        case "$*" in
+        --test-dir*) exec {ctest} "$@" ;;
+        *unit.programs.xml*) echo "<suite/>" >build/check/unit.programs.xml ;;
+        *) echo '<suite>{junit}</suite>' >build/check/unit.xml && exit 8 ;;
+        esac
+        """
 
     faulty = {}  # {file: (old, new)}: a fault that is seeded into it
 
     def check(self, runner, *steps, junit=""):
         """(exit status, lines, how often the runner ran)"""
         with tempfile.TemporaryDirectory() as folder:
-            root = os.path.join(HERE, "..", "..")
-            files = {name: open(os.path.join(root, name), encoding="utf-8").read() for name in ("check", "scripts/fingerprint", "scripts/count_tests.py")}
+            files = {name: Path(HERE, "../..", name).read_text(encoding="utf-8") for name in self.FILES}
             for name, (old, new) in self.faulty.items():
                 assert files[name].count(old) == 1, f"{name}: {old}"
                 files[name] = files[name].replace(old, new)
-            files |= {"bin/cmake": "#!/bin/sh\n", "test/system/run": f"#!/bin/bash\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
-            files["bin/ctest"] = f"#!/bin/sh\ncat >build/check/unit.xml <<'END'\n<suite>{junit}</suite>\nEND\nexit 8\n"
+            files |= {"bin/cmake": f'#!/bin/sh\n[ "$1" != -S ] || exec {shutil.which("cmake")} "$@"\n',
+                      "bin/ctest": textwrap.dedent(self.CTEST.format(ctest=shutil.which("ctest"), junit=junit)),
+                      "test/system/run": f"#!/bin/bash\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
             for name, text in files.items():
-                os.makedirs(os.path.dirname(os.path.join(folder, name)), exist_ok=True)
-                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
-                    file.write(text)
-                os.chmod(file.name, 0o755)
+                path = Path(folder, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+                path.chmod(0o755)
             done = subprocess.run(["./check", "--no-install", *steps], cwd=folder, capture_output=True, text=True, check=False,
                                   env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
-            ran = os.path.join(folder, "ran")
-            return done.returncode, done.stdout.splitlines(), os.path.getsize(ran) // 2 if os.path.exists(ran) else 0
+            ran = Path(folder, "ran")
+            return done.returncode, done.stdout.splitlines(), ran.stat().st_size // 2 if ran.exists() else 0
 
     def test_broken_rule_that_shows_once_fails_check(self):
         once = """if [ "$ran" = 1 ]; then
@@ -335,7 +350,7 @@ class Check(unittest.TestCase):
         echo "4 passed, 0 failed, 0 skipped"
         """
         status, lines, ran = self.check(once, "system")
-        self.assertEqual((1, "3 passed, 1 failed, 0 skipped", 1), (status, lines[-1], ran), lines)
+        self.assertEqual((1, "4 passed, 1 failed, 0 skipped", 1), (status, lines[-1], ran), lines)
 
     def test_check_shows_the_reason_that_follows_a_failure(self):
         runner = "echo 'FAIL row11'; for i in 1 2 3 4 5; do echo \"  reason $i\"; done; seq 100 199; echo '0 passed, 1 failed, 0 skipped'; exit 1\n"
@@ -348,19 +363,23 @@ class Check(unittest.TestCase):
 
     def test_not_judged_is_75_and_named(self):
         status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(2, 0, 1, [\"row11\"]))'\n", "system")
-        self.assertEqual((75, "2 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
-        self.assertRegex(lines[-2], "^real time not judged: system ")
+        self.assertEqual((75, "3 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        self.assertRegex(lines[-2], "^real time not judged: system;")
         self.assertRegex(lines[-3], "^1 inconclusive, counted as skipped")
-        self.assertTrue([line for line in lines if line.startswith("system ") and "UNJUDGED" in line], lines)
 
     def test_inconclusive_test_alone_is_told_and_no_failure(self):
         status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system")
-        self.assertEqual((0, "3 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        self.assertEqual((0, "4 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
         self.assertRegex(lines[-2], "^1 inconclusive, counted as skipped")
 
     def test_runner_that_dies_of_another_status_fails_check(self):
         for number in (1, 74, 134):
             self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system")[0])
+
+    def test_runner_that_is_killed_fails_check_which_shows_what_it_said(self):
+        status, lines, _ = self.check("echo as far as this; kill -9 $PPID; sleep 5\n", "system")
+        self.assertEqual((1, "1 passed, 1 failed, 0 skipped"), (status, lines[-1]), lines)
+        self.assertTrue([line for line in lines if line.endswith("as far as this")], lines)
 
     @staticmethod
     def case(output, status="fail"):
@@ -369,7 +388,7 @@ class Check(unittest.TestCase):
     def test_not_judged_among_unit_tests_is_75(self):
         late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
         status, lines, _ = self.check("", "unit", junit=late)
-        self.assertEqual((75, "2 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        self.assertEqual((75, "3 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
         died = self.case("2 passed, 0 failed, 1 skipped\n")
         for junit in (died, late + died, late + self.case("1 passed, 1 failed, 0 skipped\n")):
             self.assertEqual(1, self.check("", "unit", junit=junit)[0], junit)
