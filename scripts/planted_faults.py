@@ -7,6 +7,7 @@ usage: planted_faults.py
 Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
 """
 import argparse
+import collections
 import atexit
 import contextlib
 import functools
@@ -311,13 +312,13 @@ def around(_, found):
 
 
 def mutation(_, kind):
-    """The gate's word on the ledger's mutants when one of them is judged anew like that."""
-    module = of_mutation("run")
-    record = module.Record({}, ["ledger.c"], {})
-    campaign = module.Campaign(None, record, {}, argparse.Namespace(jobs=1, update=False))
+    """The gate's word on a mutant of the core that is judged like that."""
+    module, key = of_mutation("run"), "a.c | f | x; | y;"
+    judge = argparse.Namespace(kills=collections.defaultdict(collections.Counter))
+    campaign = module.Campaign(judge, {key: argparse.Namespace(file="a.c", function="f")}, {}, 1)
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        campaign.enter(next(key for key, mutant in record.mutants.items() if mutant.file == "ledger.c"), module.Verdict(kind))
-        return module.verdict_on(campaign, argparse.Namespace(update=False)), said.getvalue()
+        campaign.enter(key, module.Verdict(kind))
+        return campaign.failures(["a.c"]), said.getvalue()
 
 
 # What is done to the tree, whether `api` (which reads pages) and `eva` (which reads none) must run after it.

@@ -29,12 +29,6 @@ def digest(text):
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def versions():
-    """The compilers that prove what is the same code."""
-    return [subprocess.run([name, "-dumpfullversion" if name == "gcc" else "-dumpversion"], capture_output=True, text=True,
-                           check=True).stdout.strip() for name in ("gcc", "clang")]
-
-
 INCLUDED = re.compile(r'^#include "([^"]+)"', re.M)
 
 
@@ -69,12 +63,6 @@ class Judge:
         self.sources = {name: path.read_text() for name, path in self.paths.items()}
         self.reach = {name: reach(sources) for name, sources in judges.programs.items()}
         self.optimised = {}
-
-    def expect(self, record):
-        """Those that saw a function's mutants before are asked first."""
-        for key, verdict in record.before.items():
-            if verdict.program in self.judges.tests:
-                self.kills[record.mutants[key].file, record.mutants[key].function][verdict.program] += 1
 
     def clean(self):
         """What the judges have against the core as it is; they are worth nothing then."""
