@@ -33,7 +33,7 @@ CLEAN = "// SPDX-License-Identifier: MIT\nint iw_f(int a);\nint iw_f(int a)\n{\n
 
 def run(*command, cwd=None):
     """(status, everything it said)"""
-    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True)
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -151,6 +151,12 @@ def mcdc(folder, calls):
         folder / "core/planted.c", "-o", folder / "unit_planted")
     run("env", f"LLVM_PROFILE_FILE={folder}/profiles/a.profraw", folder / "unit_planted")
     return run(SCRIPTS / "mcdc_gate.py", folder, folder / "core")
+
+
+def ruff(folder, code):
+    """A script with that body."""
+    (folder / "planted").write_text(f'#!/usr/bin/env python3\n"""Planted."""\n{code}')
+    return run("ruff", "check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
 
 
 def style(folder, code):
@@ -373,6 +379,7 @@ DEVIATING = {
     "docs/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
     ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
     "core/a.c": CLEAN,
+    "ruff.toml": '[lint]\nignore = [\n]\n',
 }
 
 # gate, its tool, what is planted, argument, must it be caught
@@ -416,6 +423,8 @@ CASES = [
     (deviations, "python3", "clean", ("", "", ""), False),
     (deviations, "python3", "a switch-off without a number", (".clang-tidy", "-cert-x,", "-cert-x,\n  -cert-y,"), True),
     (deviations, "python3", "a number without use", (".clang-tidy", "  -cert-x,\n", ""), True),
+    (deviations, "python3", "a rule of ruff without a number", ("ruff.toml", "[\n]", '[\n    "E402",\n]'), True),
+    (deviations, "python3", "a comment that silences ruff", ("core/a.c", "a + 1;", "a + 1; # noqa"), True),
     (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
     (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
@@ -434,6 +443,14 @@ CASES = [
     (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
     (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
     (northbound, "python3", "an integer without a unit", ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'), True),
+    (ruff, "ruff", "clean", "import sys\n\nprint(sys.argv)\n", False),
+    (ruff, "ruff", "an import that nobody needs", "import sys\n", True),
+    (ruff, "ruff", "a name that is nowhere", "print(gone)\n", True),
+    (ruff, "ruff", "a default that all calls share", "def f(a=[]):\n    a.append(1)\n    return a\n", True),
+    (ruff, "ruff", "whatever goes wrong is passed over", "try:\n    print(1)\nexcept:\n    print(2)\n", True),
+    (ruff, "ruff", "a run whose failure nobody sees", "import subprocess\n\nsubprocess.run(['false'])\n", True),
+    (ruff, "ruff", "a comparison of what may be shorter", "print([a for a, b in zip('ab', 'a') if a == b])\n", True),
+    (ruff, "ruff", "complexity 17", "def f(a):\n" + "".join(f"    if a == {n}:\n        print({n})\n" for n in range(16)), True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
     (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
@@ -464,7 +481,8 @@ CASES = [
     (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
     (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
-    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
+    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
+     "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}"), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
     (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The history of a fleet while nats-servers die: what the stream lacks is reported. IWHEEL_KILLS=100 test/mqtt/run --only kills for the long form."""
 
+import contextlib
 import json
 import os
 import socket
@@ -36,10 +37,8 @@ class Teller:
 
     @staticmethod
     def say(link, message):
-        try:
+        with contextlib.suppress(OSError):
             link.sendall(json.dumps(message, separators=(",", ":")).encode() + b"\n")
-        except OSError:
-            pass
 
     def stop_fields(self):
         return {"number": self.number, "cause": "client_stop", "wall_us": self.wall_us, "sentence": f"stop number {self.number}"}
@@ -77,7 +76,7 @@ def judge(rig, config, teller, far):
 
     def read():
         code, out, err = console(rig, config, "history", ID, "--last", "2h", "--json", timeout=120)
-        return code == 0 and lines(out) or print("        ", err.strip())
+        return (code == 0 and lines(out)) or print("        ", err.strip())
     *events, total = until(read, 90, "the history")
     there = {event["message"]["number"] for event in events if "message" in event}
     missing = set(range(1, teller.number + 1)) - there

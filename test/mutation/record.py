@@ -120,7 +120,7 @@ class Record:
             words = entry.get("seen", "").split()
             if entry.get("text") != self.texts[file, name] or len(words) != len(keys):
                 continue
-            for key, word in zip(keys, words):
+            for key, word in zip(keys, words, strict=True):
                 if word != UNKNOWN:
                     self.before[key], holds = self.read(word, tests)
                     if holds and (self.before[key].kind != LIVES or key in self.named):
@@ -188,7 +188,7 @@ def table(title, rows):
     lines = [f"| {title} | mutants | {' | '.join(COLUMNS)} |", "|---|" + "---:|" * (len(COLUMNS) + 1)]
     for name, row in [*sorted(rows.items()), ("**all**", sum(rows.values(), collections.Counter()))]:
         lines.append(f"| {name} | {sum(row.values())} | {' | '.join(str(row[column]) for column in COLUMNS)} |")
-    return lines + [""]
+    return [*lines, ""]
 
 
 def write_page(record, named):
