@@ -159,6 +159,11 @@ def ruff(folder, code):
     return run("ruff", "check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
 
 
+def shellcheck(folder, code):
+    (folder / "planted").write_text(f"#!/usr/bin/env bash\n{code}")
+    return run("shellcheck", "-x", folder / "planted")
+
+
 def style(folder, code):
     for part in ("core/src", "core/include", "lib/northbound/protocol/src", "lib/northbound/protocol/include", "port", "app", "test"):
         (folder / part).mkdir(parents=True)
@@ -451,6 +456,11 @@ CASES = [
     (ruff, "ruff", "a run whose failure nobody sees", "import subprocess\n\nsubprocess.run(['false'])\n", True),
     (ruff, "ruff", "a comparison of what may be shorter", "print([a for a, b in zip('ab', 'a') if a == b])\n", True),
     (ruff, "ruff", "complexity 17", "def f(a):\n" + "".join(f"    if a == {n}:\n        print({n})\n" for n in range(16)), True),
+    (shellcheck, "shellcheck", "clean", 'echo "$1"\n', False),
+    (shellcheck, "shellcheck", "words that are split", "rm -r $1\n", True),
+    (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
+    (shellcheck, "shellcheck", "a name that is nowhere", 'echo "$gone"\n', True),
+    (shellcheck, "shellcheck", "a status that is lost", "f() { local a=$(false); echo \"$a\"; }\nf\n", True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
     (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
