@@ -164,6 +164,12 @@ def shellcheck(folder, code):
     return run("shellcheck", "-x", folder / "planted")
 
 
+def codespell(folder, text):
+    shutil.copy(ROOT / ".codespellrc", folder)
+    (folder / "page.md").write_text(text)
+    return run("codespell", cwd=folder)
+
+
 def style(folder, code):
     for part in ("core/src", "core/include", "lib/northbound/protocol/src", "lib/northbound/protocol/include", "port", "app", "test"):
         (folder / part).mkdir(parents=True)
@@ -461,6 +467,8 @@ CASES = [
     (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
     (shellcheck, "shellcheck", "a name that is nowhere", 'echo "$gone"\n', True),
     (shellcheck, "shellcheck", "a status that is lost", "f() { local a=$(false); echo \"$a\"; }\nf\n", True),
+    (codespell, "codespell", "clean", "The wheels obey its behaviour.\n", False),
+    (codespell, "codespell", "two letters in each other's place", "The wheels obey te" + "h gateway.\n", True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
     (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
