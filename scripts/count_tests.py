@@ -54,7 +54,7 @@ def main(arguments):
     sums, unjudged = [0, 0, 0], False
     for case in xml.etree.ElementTree.parse(arguments[1]).getroot().iter("testcase"):
         counts = count(case)
-        sums = [total + one for total, one in zip(sums, counts)]
+        sums = [total + one for total, one in zip(sums, counts, strict=True)]
         for word, number in (("failed", counts[1]), ("skipped", counts[2])):
             if number:
                 print(f"{word}: {case.get('name')}: {number} of {sum(counts)}")

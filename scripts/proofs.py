@@ -74,7 +74,7 @@ def rows_now(known):
     """Every row that there must be: (id, what, command, list)."""
     for name, what in known.items():
         yield name, what, f"./check {name}", "check"
-    for name, (what, *source) in {**LISTED, **COUNTED}.items():
+    for name, (what, *_) in {**LISTED, **COUNTED}.items():
         step, full = name.split(".")[0], name.endswith(".full")
         yield name, what, f"./check {'--full ' if full else ''}{step}", "full" if full else "check"
 
@@ -88,7 +88,7 @@ def main(arguments):
         if "--update" in arguments:
             now = number_of(name)
             old = int(table.get(name, {}).get("number") or 0)
-            table[name] = dict(zip(FIELDS, (name, what, command, max(old, now or 0) or "", where)))
+            table[name] = dict(zip(FIELDS, (name, what, command, max(old, now or 0) or "", where), strict=False))
         elif name not in table:
             wrong.append(f"{name}: no row in {path.name}; add it: scripts/proofs.py --update")
         elif table[name]["list"] != where:

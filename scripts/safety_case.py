@@ -49,8 +49,7 @@ def defined_tests():
         names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
     for path in [*(ROOT / "test").rglob("*.py"), *(ROOT / "test").glob("*/run"), ROOT / "scripts/planted_faults.py"]:
         names.update(re.findall(r"^ *def (\w+)\(|^(\w+)\(\) \{$", path.read_text(), re.M))
-    names = {name for found in names for name in ([found] if isinstance(found, str) else found)}
-    return names
+    return {name for found in names for name in ([found] if isinstance(found, str) else found)}
 
 
 def oracle_rules():

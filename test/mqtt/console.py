@@ -49,8 +49,8 @@ def lines(text):
 # ---- history --------------------------------------------------------------------------------------------------------
 
 
-def cluster_config(rig, cluster, host=" ".join(HOSTS), name="console", **keys):
-    return write_config(rig, host=host, port=cluster.mqtt, stream_port=cluster.nats, ca=rig.path("certs/ca.pem"), certificate=rig.path(f"certs/{name}.pem"),
+def cluster_config(rig, cluster, host="", name="console", **keys):
+    return write_config(rig, host=host or " ".join(HOSTS), port=cluster.mqtt, stream_port=cluster.nats, ca=rig.path("certs/ca.pem"), certificate=rig.path(f"certs/{name}.pem"),
                         key=rig.path(f"certs/{name}.key"), **keys)
 
 

@@ -96,7 +96,7 @@ class Judge:
                 clean.mkdir(parents=True, exist_ok=True)
                 (clean / file).write_text(self.sources[file])
                 self.optimised[file] = list(self.objects_of(clean, file))
-        return any(changed == clean for changed, clean in zip(self.objects_of(folder, file), self.optimised[file]))
+        return any(changed == clean for changed, clean in zip(self.objects_of(folder, file), self.optimised[file], strict=True))
 
     def killed(self, core, mutant, names):
         found = self.judges.failing(core, names)

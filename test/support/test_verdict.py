@@ -17,13 +17,14 @@ import textwrap
 import time
 import types
 import unittest
+from pathlib import Path
 from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SOURCE = os.path.join(HERE, "verdict.py")
 sys.path.insert(0, HERE)
 sys.dont_write_bytecode = True
-import verdict  # noqa: E402
+import verdict
 
 AT_US = 3_000_000
 # What the module must decide is tried on copies of it, each with one of these faults: (what, old, new). Each must fail a test below.
@@ -312,7 +313,7 @@ class Check(unittest.TestCase):
         """(exit status, lines, how often the runner ran)"""
         with tempfile.TemporaryDirectory() as folder:
             root = os.path.join(HERE, "..", "..")
-            files = {name: open(os.path.join(root, name), encoding="utf-8").read() for name in ("check", "scripts/fingerprint", "scripts/count_tests.py")}
+            files = {name: Path(root, name).read_text(encoding="utf-8") for name in ("check", "scripts/fingerprint", "scripts/count_tests.py")}
             for name, (old, new) in self.faulty.items():
                 assert files[name].count(old) == 1, f"{name}: {old}"
                 files[name] = files[name].replace(old, new)
@@ -395,7 +396,7 @@ def seed(old, new):
         faulty.__file__ = os.path.join(folder, "verdict.py")  # Sleepers are started from it.
         with open(faulty.__file__, "w", encoding="utf-8") as file:
             file.write(text.replace(old, new))
-        exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)  # pylint: disable=exec-used
+        exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)
         verdict, result = faulty, unittest.TestResult()
         try:
             suite().run(result)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
+import itertools
 import random
 
 import beginnings
@@ -296,7 +297,7 @@ def reset_in_motion(rig):
     """Both resets while the wheels turn: zeros first, another boot, and commands of before feed nothing."""
     host = start_driving(rig)
     boots = {host.boot}
-    for reset in (lambda: rig.machine.reset("pin", PINRSTF), lambda: rig.machine.divert()):
+    for reset in (lambda: rig.machine.reset("pin", PINRSTF), rig.machine.divert):
         reset()
         reset_ns = rig.machine.now_ns
         old = host.boot
@@ -503,7 +504,7 @@ def hostile_line(rig):
     kept, begun_ns = [], rig.machine.now_ns
     good = None
     count = 0
-    for turn in range(60):
+    for _ in range(60):
         for _ in range(12):
             good = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 777, "right_mm_s": 777})) + b"\n"
             kept.append(good)
@@ -584,7 +585,7 @@ def crowd(rig):
     frames = rig.setpoints(begun_ns + 200 * MS)
     assert frames and all(frame.setpoint()[0] == SPEED for frame in frames), "the crowd disturbed the driver"
     times = [frame.time_ns for frame in frames if frame.id == LEFT]
-    gap_ns = max(b - a for a, b in zip(times, times[1:]))
+    gap_ns = max(b - a for a, b in itertools.pairwise(times))
     assert gap_ns < 30 * MS, f"a gap of {gap_ns / MS:.1f} ms"
     assert host.events("lost"), "losses were not told"
     served = {line.channel for line in host.lines if line.message.get("id") is not None and "left" in line.message}
