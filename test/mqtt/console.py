@@ -117,7 +117,7 @@ def test_history_with_a_frozen_first_host_checks_its_end(rig):
     try:
         def checked():
             code, out, err = console(rig, config, "history", "w2", "--json", timeout=60)
-            return code == 0 and lines(out)[-1]["end_checked"] or print("        ", err.strip())
+            return (code == 0 and lines(out)[-1]["end_checked"]) or print("        ", err.strip())
         until(checked, 60, "the other two have a leader, and the end is checked")
     finally:
         cluster.servers[HOSTS[0]].signal(signal.SIGCONT)

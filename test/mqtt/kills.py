@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The history of a fleet while nats-servers die: what the stream lacks is reported. IWHEEL_KILLS=100 test/mqtt/run --only kills for the long form."""
 
+import contextlib
 import json
 import os
 import socket
@@ -36,10 +37,8 @@ class Teller:
 
     @staticmethod
     def say(link, message):
-        try:
+        with contextlib.suppress(OSError):
             link.sendall(json.dumps(message, separators=(",", ":")).encode() + b"\n")
-        except OSError:
-            pass
 
     def stop_fields(self):
         return {"number": self.number, "cause": "client_stop", "wall_us": self.wall_us, "sentence": f"stop number {self.number}"}
