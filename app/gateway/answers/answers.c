@@ -259,7 +259,7 @@ static void welcome(void *context, gw_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);
     memset(served, 0, sizeof *served);
-    iwn_server_welcome(&self->server, &served->client, connection->id, connection->right == GW_WATCH);
+    iwn_server_welcome(&served->client, connection->id, connection->right == GW_WATCH);
     if (connection->right != GW_STOP) {
         self->server.now_us = self->wheels->now_us;
         iwn_server_hello(&self->server, &served->client);
