@@ -53,8 +53,8 @@ def add_runtime_calls(objects, size, calls):
                 section = header[1] if header else None
             called = re.search(r"\s(__aeabi_\w+|__gnu_\w+)$", line)
             if section and called:
-                for name in size:
-                    if name == section or name.endswith(f"{path.stem}:{section}"):
+                for name in size: # The linker's object has another name in its graph.
+                    if name == section or name.endswith((f"{path.stem}:{section}", f"{path.stem.removesuffix('.ltrans')}.o:{section}")):
                         calls.setdefault(name, set()).add(called[1])
 
 

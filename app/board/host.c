@@ -39,7 +39,7 @@ static void open_client(iw_host_t *self, uint8_t channel, bool watches_only) {
     iw_host_client_t *const client = &self->client[channel - 1U];
     end_client(self, client); // Its close was lost.
     client->opened_us = self->server.now_us;
-    iwn_server_welcome(&self->server, &client->served, ++self->last_id, watches_only);
+    iwn_server_welcome(&client->served, ++self->last_id, watches_only);
     iwn_server_hello(&self->server, &client->served);
 }
 
