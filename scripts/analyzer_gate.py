@@ -19,7 +19,7 @@ FOLDERS = ("core/", "port/", "lib/", "app/")
 
 def look(name, command):
     with tempfile.TemporaryDirectory() as folder:
-        run = subprocess.run(with_output(command, "-fanalyzer", "-Werror", "-c", "-o", f"{folder}/out.o"), capture_output=True, text=True)
+        run = subprocess.run(with_output(command, "-fanalyzer", "-Werror", "-c", "-o", f"{folder}/out.o"), capture_output=True, text=True, check=False)
     return "" if run.returncode == 0 and not run.stderr else run.stderr or f"{name}: gcc ended with {run.returncode}\n"
 
 

@@ -4,12 +4,13 @@
 The images are those of the presets arm-m3 and arm, which listen, of the build beside arm that ends in -f446, and of the builds beside
 these that end in -demo and -gateway. An interrupt may come anywhere, and none interrupts another: the
 worst handler and the registers that the CPU saves are on top of the main loop's deepest path. Calls through the HAL go to each of
-its functions.
+its functions. Of an image that is optimised as one program, the graph is that of the linker's result and of the objects apart from it.
 """
+import re
 import subprocess
 from pathlib import Path
 
-from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph
+from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph, short
 
 # Image, which build it is in, and how that one's name goes on.
 BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
@@ -39,13 +40,25 @@ def core_stack(build):
     return max(depth.of(name)[0] for name in size)
 
 
-def image_stack(build, image):
+def linked_objects(build, image):
+    """All whose code is in the image: those that its map names, or of an archive that it names. Others are of an earlier configuration."""
+    table = next(Path(build).rglob(f"{image}.map"))
+    loaded = {(table.parent / name).resolve() for name in re.findall(r"^LOAD (\S+)$", table.read_text(), re.MULTILINE)}
+    archives = {f"{path.stem.removeprefix('lib')}.dir" for path in loaded if path.suffix == ".a"}
     objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_northbound_server", "iwheel_stm32_driver", image)
+    merged = [path for path in loaded if path.name.startswith(f"{image}.elf.ltrans")]
+    return [path for path in objects if (path.resolve() in loaded or archives.intersection(path.parts)) and not (merged and b".gnu.lto_" in path.read_bytes())] + merged
+
+
+def image_stack(build, image):
+    objects = linked_objects(build, image)
     known = read_graph(objects)[0]
-    tabled = [name for name in known if THROUGH_TABLE in name and "iw_host_take" in known]
-    size, depth = depth_of(objects, (*HAL, *tabled))
-    handlers = (*HANDLERS, *(name for name in SERIAL_HANDLERS if name in size))
-    missing = [name for name in (*HAL, *HANDLERS) if name not in size]
+    hal = [name for name in known if short(name) in HAL]
+    serial = [name for name in SERIAL_HANDLERS if name in known]
+    tabled = [name for name in known if THROUGH_TABLE in name and serial]
+    size, depth = depth_of(objects, (*hal, *tabled))
+    handlers = (*HANDLERS, *serial)
+    missing = {*HAL, *HANDLERS} - {*map(short, hal), *known}
     if missing:
         raise SystemExit(f"not in the call graph of {image}: {', '.join(missing)}")
     total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in handlers)

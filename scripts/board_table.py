@@ -37,7 +37,7 @@ def facts(board, *options):
         subprocess.run(["gcc", "-xc", "-", "-o", f"{folder}/probe", *options, f"-I{STM32}", f"-I{STM32 / 'boards' / board}"], input=program,
                        text=True, check=True)
         told = subprocess.run([f"{folder}/probe"], capture_output=True, text=True, check=True).stdout
-    return dict(zip(values, map(int, told.split())))
+    return dict(zip(values, map(int, told.split()), strict=True))
 
 
 def pin(number):
@@ -61,7 +61,7 @@ def pin_table():
     for what in PINS:
         cells = [pin(known[board][what]) for board in NAMES]
         if what == "lamp":
-            cells = [f"{cell}, lit by {'a high' if known[board]['lit'] else 'a low'} level" for cell, board in zip(cells, NAMES)]
+            cells = [f"{cell}, lit by {'a high' if known[board]['lit'] else 'a low'} level" for cell, board in zip(cells, NAMES, strict=True)]
         if what.startswith("CAN"):
             cells = [f"{cell}; {pin(other[what])} with `IWHEEL_CAN_PINS=PA11`" for cell in cells]
         yield f"| {what} | " + " | ".join(cells) + " |"

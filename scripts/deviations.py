@@ -4,8 +4,8 @@
 
 usage: deviations.py [ROOT]
 
-Looks at .clang-tidy, at what compilers are told, and at the comments by which code silences a tool. What of cppcheck is
-accepted stands in the same table; whether that is still needed only cppcheck can tell (scripts/cppcheck_gate.py).
+Looks at .clang-tidy, ruff.toml and .cppcheck-suppressions, at what compilers are told, and at the comments by which code silences a tool. Whether cppcheck still needs what
+.cppcheck-suppressions accepts, cppcheck tells itself.
 The last line is "N passed, N failed, N skipped".
 """
 import fnmatch
@@ -26,13 +26,12 @@ SILENCERS = [
     ("clang-tidy", r"NOLINT\w*\(([^)]*)\)"),
     ("clang-tidy", r"(NOLINT\w*)(?!\w*\()"),
     ("clang-format", r"clang-format (off)"),
-    ("cppcheck", r"cppcheck-suppress[\w-]*[\s\[(]*(\w*)"),
+    ("cppcheck", r"cppcheck-suppress(?!ions)[\w-]*[\s\[(]*(\w*)"),
     ("coverage", r"((?:GCOVR?|LCOV)_EXCL\w*)"),
     ("shellcheck", r"shellcheck disable=([\w,]+)"),
-    ("flake8", r"# noqa: ?([\w,]+)"),
-    ("flake8", r"# (noqa)(?!:)"),
+    ("ruff", r"# noqa: ?([\w,]+)"),
+    ("ruff", r"# (?:ruff: )?(noqa)(?!: ?[A-Z])"),
     ("mypy", r"# type: (ignore[\w\[\],-]*)"),
-    ("pylint", r"pylint: disable=([\w,-]+)"),
 ]
 # Where nothing is looked for: what is built, and where these words stand for themselves.
 ELSEWHERE = {"build", ".git", ".venv", "__pycache__"}
@@ -81,6 +80,14 @@ def silenced(root):
             for number, line in enumerate(text.splitlines(), 1):
                 yield from (("clang-tidy", what, file, number) for what in re.findall(r"^\s+-([a-z][\w.*-]+),?", line))
             continue
+        if Path(file).name == "ruff.toml":
+            yield from (("ruff", what, file, number) for number, line in enumerate(text.splitlines(), 1) for what in re.findall(r'^ +"([A-Z]+\d+)"', line))
+            continue
+        if Path(file).name == ".cppcheck-suppressions":
+            for number, line in enumerate(text.splitlines(), 1):
+                what, _, where = line.partition(":")
+                yield from [("cppcheck", what, where or file, number)] if what and not what.startswith("#") else []
+            continue
         for tool, pattern in SILENCERS:
             for found in re.finditer(pattern, text):
                 yield from ((tool, what.strip(), file, text.count("\n", 0, found.start()) + 1) for what in found[1].split(","))
@@ -95,10 +102,10 @@ def findings(root):
             used.add(row.number)
         else:
             yield f"{file}:{line}: {tool}: {what} is switched off there, without a number in {PAGE}"
-    for before, row in zip([None, *rows], rows):
+    for before, row in zip([None, *rows], rows, strict=False):
         if before and int(row.number[1:]) <= int(before.number[1:]):
             yield f"{row.number} stands behind {before.number}: numbers rise, and none is given twice"
-        if row.number not in used and row.tool != "cppcheck":
+        if row.number not in used:
             yield f"{row.number} ({row.tool}: {row.what}): nothing needs it any more: delete the row, and give its number to nobody"
 
 

@@ -96,7 +96,7 @@ def main(arguments):
             path.write_text(new)
         elif new != text:
             old, other = text.splitlines(), new.splitlines()
-            findings += [f"{path.relative_to(root)}:{n}: write: {b.strip()}" for n, (a, b) in enumerate(zip(old, other), 1) if a != b]
+            findings += [f"{path.relative_to(root)}:{n}: write: {b.strip()}" for n, (a, b) in enumerate(zip(old, other, strict=False), 1) if a != b]
         if path.suffix == ".h":
             findings += [f"{path.relative_to(root)}: {finding}" for finding in guard_finding(path, text)]
     print(*findings, sep="\n")

@@ -84,7 +84,7 @@ def compiled_anew(job):
     command = [word for word in shlex.split(entry["command"]) if word not in ("ccache", "-c")]
     command[command.index("-o"):command.index("-o") + 2] = ["-fsyntax-only"]
     command = [word.replace(str(HEADERS), folder) for word in command]
-    run = subprocess.run(command, cwd=entry["directory"], capture_output=True, text=True)
+    run = subprocess.run(command, cwd=entry["directory"], capture_output=True, text=True, check=False)
     return [line for line in run.stderr.splitlines() if "error:" in line]
 
 

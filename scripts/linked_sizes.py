@@ -45,7 +45,7 @@ def table(builds):
     """[(use, [bytes on each CPU])], [what is wrong], the share of each module in the gateway on a Cortex-M4."""
     rows, findings, shares = [], [], {}
     for use, (headers, functions, limit) in USES.items():
-        sizes = [linked(next(Path(build).rglob("libiwheel_core.a")), cpu, headers, functions) for build, cpu in zip(builds, CPU_FLAGS)]
+        sizes = [linked(next(Path(build).rglob("libiwheel_core.a")), cpu, headers, functions) for build, cpu in zip(builds, CPU_FLAGS, strict=False)]
         rows.append((use, [sum(size.values()) for size in sizes]))
         if limit is not None and rows[-1][1][-1] > limit:
             findings.append(f"{use} on Cortex-M4: {rows[-1][1][-1]} B are linked, allowed {limit} B")

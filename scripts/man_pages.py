@@ -49,7 +49,7 @@ class Sources:
     def verbs(self, name):
         names = re.findall(r"^  ([a-z]+) {2,}\S", self.output(name, "--help"), re.MULTILINE)
         pages = [self.output(name, verb, "--help").split("\n", 1) for verb in names]
-        return "\n".join(f"## {verb}\n\n" + literal(usage + "\n" + rest) for verb, (usage, rest) in zip(names, pages))
+        return "\n".join(f"## {verb}\n\n" + literal(usage + "\n" + rest) for verb, (usage, rest) in zip(names, pages, strict=False))
 
     def commands(self, _):
         """The list of a running simulator."""

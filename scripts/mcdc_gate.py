@@ -35,7 +35,7 @@ def decisions_of(record):
     found = {}
     for line, column, *_, conditions in record["mcdc_records"]:
         before = found.get((line, column), [False] * len(conditions))
-        found[(line, column)] = [old or new for old, new in zip(before, conditions)]
+        found[(line, column)] = [old or new for old, new in zip(before, conditions, strict=True)]
     return found
 
 

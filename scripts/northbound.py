@@ -159,7 +159,7 @@ HEADER = '''# SPDX-License-Identifier: MIT
 
 from __future__ import annotations
 
-from typing import Dict, List, Literal, Optional, TypedDict, Union
+from typing import Literal, TypedDict
 '''
 
 
@@ -218,18 +218,20 @@ class Types:
             return base
         assert base == "TypedDict", f"{name} extends something already"
         apart = f"_{camel(name)}{kind}"
-        pairs = ", ".join(f"{json.dumps(key)}: {self.type_of(field)}" for key, field in fields.items())
-        total = ", total=False" if kind == "Partly" else ""
-        self.blocks.append(f'{apart} = TypedDict("{apart}", {{{pairs}}}{total})')
+        if kind == "Partly":
+            self.blocks.append("\n".join([f"class {apart}(TypedDict, total=False):", *(f"    {key}: {self.type_of(field)}" for key, field in fields.items())]))
+        else:
+            pairs = ", ".join(f"{json.dumps(key)}: {self.type_of(field)}" for key, field in fields.items())
+            self.blocks.append(f'{apart} = TypedDict("{apart}", {{{pairs}}})')
         return apart
 
     def type_of(self, field):
         kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
         names = [PLAIN.get(kind, camel(kind)) for kind in kinds]
-        text = names[0] if len(names) == 1 else f"Union[{', '.join(names)}]"
-        text = f"List[{text}]" if field.get("list") else text
-        text = f"Dict[{camel(field['keys'])}, {text}]" if "keys" in field else text
-        return f"Optional[{text}]" if field.get("null") else text
+        text = " | ".join(names)
+        text = f"list[{text}]" if field.get("list") else text
+        text = f"dict[{camel(field['keys'])}, {text}]" if "keys" in field else text
+        return f"{text} | None" if field.get("null") else text
 
 
 def wrapped(name, words):
@@ -242,11 +244,9 @@ def python_types(description):
     limits = description.limits
     constants = f"API = {description.api}\nREQUEST_MAX = {limits['request_bytes']}\nLINE_MAX = {limits['line_bytes']}"
     body = "\n\n".join([constants, *types.blocks])
-    used = [name for name in ("Dict", "List", "Literal", "Optional", "TypedDict", "Union") if re.search(rf"\b{name}\b", body)]
-    header = re.sub(r"import Dict.*", "import " + ", ".join(used), HEADER)
     # Two lines before and after a class, one elsewhere.
     body = re.sub(r"\n\n(?=class )", "\n\n\n", body)
-    return header + "\n" + re.sub(r"(\nclass [^\n]*\n(?:    [^\n]*\n|\n(?=    ))*)\n(?=[A-Z_])", r"\1\n\n", body) + "\n"
+    return HEADER + "\n" + re.sub(r"(\nclass [^\n]*\n(?:    [^\n]*\n|\n(?=    ))*)\n(?=[A-Z_])", r"\1\n\n", body) + "\n"
 
 
 # The C reader's table ------------------------------------------------------------------------------------------------
@@ -444,7 +444,7 @@ class Document:
     def causes(self):
         told = {}
         for names, latches, _ in rows(section(self.text, "## Causes"))[1:]:
-            told.update({name: latches for name in tokens(names)})
+            told.update(dict.fromkeys(tokens(names), latches))
         yield from differences("causes", set(told), set(self.description.words["cause"]))
         for name, cause in self.description.raw["causes"].items():
             if told.get(name, cause["latches"]) != cause["latches"]:
@@ -467,7 +467,7 @@ def gateway_words(description):
             match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
             if match is None:
                 yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
-            known.update({word: path for word in set(re.findall(r'"([^"]*)"', match[0] if match else "")) - others})
+            known.update(dict.fromkeys(set(re.findall(r'"([^"]*)"', match[0] if match else "")) - others, path))
         yield from (f"share/northbound.json: {kind} lacks {word}, which {known[word]} has" for word in sorted(known.keys() - wanted))
         yield from (f"share/northbound.json: {kind} has {word}, which {path} has not" for word in sorted(wanted - known.keys()))
 

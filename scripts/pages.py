@@ -19,7 +19,7 @@ MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
 
 def files(*places):
     """What git knows or would add; without git everything there."""
-    run = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "--", *places], capture_output=True, text=True)
+    run = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "--", *places], capture_output=True, text=True, check=False)
     names = run.stdout.split("\n") if run.returncode == 0 else [
         str(path.relative_to(ROOT)) for place in places for path in ([ROOT / place] if (ROOT / place).is_file() else (ROOT / place).rglob("*"))]
     return sorted(name for name in set(names) if name and (ROOT / name).is_file())

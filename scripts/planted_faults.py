@@ -7,6 +7,7 @@ usage: planted_faults.py
 Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
 """
 import argparse
+import collections
 import atexit
 import contextlib
 import functools
@@ -15,7 +16,6 @@ import importlib.machinery
 import importlib.util
 import io
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -33,7 +33,7 @@ CLEAN = "// SPDX-License-Identifier: MIT\nint iw_f(int a);\nint iw_f(int a)\n{\n
 
 def run(*command, cwd=None):
     """(status, everything it said)"""
-    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True)
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True, check=False)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -74,10 +74,12 @@ def coverage(folder, calls):
     objects.mkdir()
     (sources / "planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
     (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
-    run("gcc", "-O0", "--coverage", "-c", sources / "planted.c", "-o", objects / "planted.o")
-    run("gcc", folder / "main.c", objects / "planted.o", "--coverage", "-o", folder / "main", cwd=folder)
-    run(folder / "main")
-    return run(SCRIPTS / "coverage_gate.py", folder)
+    if calls is not None:
+        run("gcc", "-O0", "--coverage", "-c", sources / "planted.c", "-o", objects / "planted.o")
+        run("gcc", folder / "main.c", objects / "planted.o", "--coverage", "-o", folder / "main", cwd=folder)
+        run(folder / "main")
+    shutil.copy(ROOT / "gcovr.cfg", folder)
+    return run("gcovr", objects, cwd=folder)
 
 
 def warnings(folder, code, compiler="gcc"):
@@ -101,10 +103,21 @@ def tidy(folder, code):
     return run("clang-tidy", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", folder / "planted.c", "--", "-std=c99")
 
 
-def cppcheck(folder, code):
-    (folder / "planted.c").write_text(code)
-    (folder / "page.md").write_text("| D1 | cppcheck | `misra-c2012-8.4` | `*` | cppcheck 2.10 overlooks a declaration in the same file |\n")
-    return run(SCRIPTS / "cppcheck_gate.py", folder / "planted.c", "--", folder / "page.md")
+def cppcheck(folder, code, suppressions=""):
+    """As the core."""
+    if "2.10" not in run("cppcheck", "--version")[1]:
+        return 77, "skip: the suppressions are written for cppcheck 2.10"
+    for part in ("core/src", "core/include"):
+        (folder / part).mkdir(parents=True)
+    (folder / "core/src/planted.c").write_text(code)
+    (folder / ".cppcheck-suppressions").write_text(suppressions)
+    return run("xargs", "-a", ROOT / ".cppcheck", "cppcheck", "core/src/planted.c", cwd=folder)
+
+
+def cppcheck_accepts(folder, what):
+    """Memory is copied, whose value the addon takes as discarded (17.7)."""
+    text = CLEAN.replace("    return", "    int b;\n    memcpy(&b, &a, sizeof b);\n    return")
+    return cppcheck(folder, "#include <string.h>\n" + text, f"misra-c2012-17.7:core/*\nmissingIncludeSystem\n{what}")
 
 
 def deviations(folder, fault):
@@ -151,6 +164,23 @@ def mcdc(folder, calls):
         folder / "core/planted.c", "-o", folder / "unit_planted")
     run("env", f"LLVM_PROFILE_FILE={folder}/profiles/a.profraw", folder / "unit_planted")
     return run(SCRIPTS / "mcdc_gate.py", folder, folder / "core")
+
+
+def ruff(folder, code):
+    """A script with that body."""
+    (folder / "planted").write_text(f'#!/usr/bin/env python3\n"""Planted."""\n{code}')
+    return run("ruff", "check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
+
+
+def shellcheck(folder, code):
+    (folder / "planted").write_text(f"#!/usr/bin/env bash\n{code}")
+    return run("shellcheck", "-x", folder / "planted")
+
+
+def codespell(folder, text):
+    shutil.copy(ROOT / ".codespellrc", folder)
+    (folder / "page.md").write_text(text)
+    return run("codespell", cwd=folder)
 
 
 def style(folder, code):
@@ -311,13 +341,13 @@ def around(_, found):
 
 
 def mutation(_, kind):
-    """The gate's word on the ledger's mutants when one of them is judged anew like that."""
-    module = of_mutation("run")
-    record = module.Record({}, ["ledger.c"], {})
-    campaign = module.Campaign(None, record, {}, argparse.Namespace(jobs=1, update=False))
+    """The gate's word on a mutant of the core that is judged like that."""
+    module, key = of_mutation("run"), "a.c | f | x; | y;"
+    judge = argparse.Namespace(kills=collections.defaultdict(collections.Counter))
+    campaign = module.Campaign(judge, {key: argparse.Namespace(file="a.c", function="f")}, {}, 1)
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        campaign.enter(next(key for key, mutant in record.mutants.items() if mutant.file == "ledger.c"), module.Verdict(kind))
-        return module.verdict_on(campaign, argparse.Namespace(update=False)), said.getvalue()
+        campaign.enter(key, module.Verdict(kind))
+        return campaign.failures(["a.c"]), said.getvalue()
 
 
 def proofs(folder, change):
@@ -343,6 +373,8 @@ DEVIATING = {
     "docs/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
     ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
     "core/a.c": CLEAN,
+    ".cppcheck-suppressions": "# Words.\nzero:core/*\n",
+    "ruff.toml": '[lint]\nignore = [\n]\n',
 }
 
 # gate, its tool, what is planted, argument, must it be caught
@@ -361,9 +393,10 @@ CASES = [
     (frames, "gcc", "4000 bytes", BIG.replace("300", "4000"), False),
     (frames, "gcc", "4200 bytes", BIG.replace("300", "4200"), True),
     (frames, "gcc", "variable length", VARIABLE, True),
-    (coverage, "gcov", "clean", SOME_FOUR, False),
-    (coverage, "gcov", "a branch never taken", "f(0, 0); f(1, 1);", True),
-    (coverage, "gcov", "a function never called", "", True),
+    (coverage, "gcovr", "clean", SOME_FOUR, False),
+    (coverage, "gcovr", "a branch never taken", "f(0, 0); f(1, 1);", True),
+    (coverage, "gcovr", "a function never called", "", True),
+    (coverage, "gcovr", "nothing is measured", None, True),
     (warnings, "gcc", "clean", CLEAN, False),
     (warnings, "gcc", "lost bits", "short f(long a);\nshort f(long a) { return a; }\n", True),
     (warnings, "gcc", "sign", "unsigned f(int a);\nunsigned f(int a) { return a; }\n", True),
@@ -383,9 +416,15 @@ CASES = [
     (cppcheck, "cppcheck", "clean", CLEAN, False),
     (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
     (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
+    (cppcheck_accepts, "cppcheck", "clean", "", False),
+    (cppcheck_accepts, "cppcheck", "a suppression that nothing needs", "misra-c2012-8.4:core/*\n", True),
     (deviations, "python3", "clean", ("", "", ""), False),
     (deviations, "python3", "a switch-off without a number", (".clang-tidy", "-cert-x,", "-cert-x,\n  -cert-y,"), True),
     (deviations, "python3", "a number without use", (".clang-tidy", "  -cert-x,\n", ""), True),
+    (deviations, "python3", "a suppression without a number", (".cppcheck-suppressions", "zero:core/*\n", "zero:core/*\none:core/*\n"), True),
+    (deviations, "python3", "a number that cppcheck does not need", (".cppcheck-suppressions", "zero:core/*\n", ""), True),
+    (deviations, "python3", "a rule of ruff without a number", ("ruff.toml", "[\n]", '[\n    "E402",\n]'), True),
+    (deviations, "python3", "a comment that silences ruff", ("core/a.c", "a + 1;", "a + 1; # noqa"), True),
     (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
     (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
@@ -404,6 +443,21 @@ CASES = [
     (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
     (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
     (northbound, "python3", "an integer without a unit", ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'), True),
+    (ruff, "ruff", "clean", "import sys\n\nprint(sys.argv)\n", False),
+    (ruff, "ruff", "an import that nobody needs", "import sys\n", True),
+    (ruff, "ruff", "a name that is nowhere", "print(gone)\n", True),
+    (ruff, "ruff", "a default that all calls share", "def f(a=[]):\n    a.append(1)\n    return a\n", True),
+    (ruff, "ruff", "whatever goes wrong is passed over", "try:\n    print(1)\nexcept:\n    print(2)\n", True),
+    (ruff, "ruff", "a run whose failure nobody sees", "import subprocess\n\nsubprocess.run(['false'])\n", True),
+    (ruff, "ruff", "a comparison of what may be shorter", "print([a for a, b in zip('ab', 'a') if a == b])\n", True),
+    (ruff, "ruff", "complexity 17", "def f(a):\n" + "".join(f"    if a == {n}:\n        print({n})\n" for n in range(16)), True),
+    (shellcheck, "shellcheck", "clean", 'echo "$1"\n', False),
+    (shellcheck, "shellcheck", "words that are split", "rm -r $1\n", True),
+    (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
+    (shellcheck, "shellcheck", "a name that is nowhere", 'echo "$gone"\n', True),
+    (shellcheck, "shellcheck", "a status that is lost", "f() { local a=$(false); echo \"$a\"; }\nf\n", True),
+    (codespell, "codespell", "clean", "The wheels obey its behaviour.\n", False),
+    (codespell, "codespell", "two letters in each other's place", "The wheels obey te" + "h gateway.\n", True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
     (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
@@ -434,7 +488,8 @@ CASES = [
     (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
     (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
-    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
+    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
+     "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}"), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
     (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),

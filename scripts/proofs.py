@@ -77,7 +77,7 @@ def rows_now(known, table):
     """Every row that there must be: (id, what, command, list)."""
     for name, where in known.items():
         yield name, table.get(name, {}).get("what", ""), f"./check {name}", where
-    for name, (what, *source) in {**LISTED, **COUNTED}.items():
+    for name, (what, *_) in {**LISTED, **COUNTED}.items():
         step, full = name.split(".")[0], name.endswith(".full")
         yield name, what, f"./check {'--full ' if full else ''}{step}", "full" if full else known.get(step, "")
 
@@ -91,7 +91,7 @@ def main(arguments):
         if "--update" in arguments:
             now = number_of(name)
             old = int(table.get(name, {}).get("number") or 0)
-            table[name] = dict(zip(FIELDS, (name, what, command, max(old, now or 0) or "", where)))
+            table[name] = dict(zip(FIELDS, (name, what, command, max(old, now or 0) or "", where), strict=False))
         elif name not in table:
             wrong.append(f"{name}: no row in {path.name}; add it: scripts/proofs.py --update")
         elif table[name]["list"] != where:

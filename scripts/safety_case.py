@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
-And the threat model of SECURITY.md: each interface has tests, and they exist.
+And the threat model in docs/developer/threat-model.md: each interface has tests, and they exist.
 
 usage: safety_case.py [--update]
 
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "SECURITY.md"
+PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "docs/developer/threat-model.md"
 sys.path.insert(0, str(ROOT / "test/faults"))
 import table
 FAULTS = {
@@ -49,8 +49,7 @@ def defined_tests():
         names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
     for path in [*(ROOT / "test").rglob("*.py"), *(ROOT / "test").glob("*/run"), ROOT / "scripts/planted_faults.py"]:
         names.update(re.findall(r"^ *def (\w+)\(|^(\w+)\(\) \{$", path.read_text(), re.M))
-    names = {name for found in names for name in ([found] if isinstance(found, str) else found)}
-    return names
+    return {name for found in names for name in ([found] if isinstance(found, str) else found)}
 
 
 def oracle_rules():
@@ -126,15 +125,15 @@ def findings(text, tests, bugs, rules):
 
 
 def threat_findings(text, tests):
-    """Of SECURITY.md: each interface with all that is asked of it, and tests that exist."""
+    """Of the threat model: each interface with all that is asked of it, and tests that exist."""
     rows = re.findall(r"^\| ([^|]+) \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", text.partition("## Threats,")[2].partition("\n## ")[0], re.M)[1:]
     for interface, who, _, stops, remains, tested in rows:
         named = re.findall(r"`(\w+)`", tested)
-        yield from (f"SECURITY.md, {interface}: there is no test {name}" for name in named if name not in tests)
+        yield from (f"threat model, {interface}: there is no test {name}" for name in named if name not in tests)
         if not named or not all(cell.strip() for cell in (who, stops, remains)):
-            yield f"SECURITY.md, {interface}: an empty cell"
+            yield f"threat model, {interface}: an empty cell"
     if len(rows) < INTERFACES:
-        yield f"SECURITY.md: {len(rows)} of {INTERFACES} interfaces have a row"
+        yield f"threat model: {len(rows)} of {INTERFACES} interfaces have a row"
 
 
 def catalogue(tests):

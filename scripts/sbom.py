@@ -83,7 +83,7 @@ def package_of(name, architecture):
 
 def version_of(name):
     """Of an installed package; what is not installed here has none."""
-    done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", name], capture_output=True, text=True)
+    done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", name], capture_output=True, text=True, check=False)
     return done.stdout if done.returncode == 0 and done.stdout else "NOASSERTION"
 
 
@@ -214,7 +214,7 @@ def describe(folder, found):
 def at_least(version, relation, least):
     """Whether that version is what a Depends asks for."""
     how = {">=": "ge", "=": "eq", ">>": "gt", "<=": "le", "<<": "lt"}[relation]
-    return version != "NOASSERTION" and subprocess.run(["dpkg", "--compare-versions", version, how, least]).returncode == 0
+    return version != "NOASSERTION" and subprocess.run(["dpkg", "--compare-versions", version, how, least], check=False).returncode == 0
 
 
 # ---- the gate -------------------------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def differences(old, new):
         if name not in old or name not in new:
             yield f"{name}: only in the {'committed' if name in old else 'new'} table"
             continue
-        for committed, actual in zip(old[name], new[name]):
+        for committed, actual in zip(old[name], new[name], strict=True):
             if abs(committed - actual) > max(0.02 * committed, 8):
                 yield f"{name}: {actual} B, committed {committed} B"
 

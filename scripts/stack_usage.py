@@ -53,8 +53,8 @@ def add_runtime_calls(objects, size, calls):
                 section = header[1] if header else None
             called = re.search(r"\s(__aeabi_\w+|__gnu_\w+)$", line)
             if section and called:
-                for name in size:
-                    if name == section or name.endswith(f"{path.stem}:{section}"):
+                for name in size: # The linker's object has another name in its graph.
+                    if name == section or name.endswith((f"{path.stem}:{section}", f"{path.stem.removesuffix('.ltrans')}.o:{section}")):
                         calls.setdefault(name, set()).add(called[1])
 
 
@@ -74,7 +74,7 @@ class Depth:
     def of(self, name):
         """(bytes, path) from this function down."""
         if name in self.open:
-            self.cycles.append(self.open[self.open.index(name):] + [name])
+            self.cycles.append([*self.open[self.open.index(name):], name])
             return 0, [name]
         if name not in self.known:
             self.open.append(name)
@@ -131,7 +131,7 @@ def main(arguments):
     depth = Depth(size, calls)
     worst = sorted(((depth.of(name), name) for name in size if ":" not in name), reverse=True)
     findings += [f"recursion: {' -> '.join(map(short, cycle))}" for cycle in depth.cycles]
-    for (used, path), name in worst[:5]:
+    for (used, path), _ in worst[:5]:
         print(f"{used:4d} B  {' -> '.join(f'{short(step)} {own_stack(size, step)}' for step in path)}")
     findings += [f"{name}: {used} B of stack, {limit} B allowed" for (used, _), name in worst if used > limit]
     for finding in findings:

@@ -6,15 +6,6 @@
 
 #include <string.h>
 
-static bool refuse_as(iwn_server_t *server, iwn_error_t error, const char *const *texts) {
-    iwn_text_t message = iwn_text_begin(server->refusal.message, sizeof server->refusal.message);
-    server->refusal.error = error;
-    iwn_text_join(&message, texts);
-    return false;
-}
-
-#define REFUSE(server, error, ...) refuse_as((server), (error), (const char *const[]){__VA_ARGS__, NULL})
-
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
     iw_host_t *const self = iw_host_of(server);
     size_t next = (after == NULL) ? 0U : (size_t)((const iw_host_client_t *)after - self->client) + 1U;
@@ -28,7 +19,8 @@ iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
 void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
     iw_host_client_t *const whose = (iw_host_client_t *)client;
     if (whose->owed_status) {
-        (void)REFUSE(server, IWN_BUSY, "the answer to an earlier status still waits for the serial line; wait for it");
+        (void)IWN_REFUSE(&server->refusal, IWN_BUSY,
+                         "the answer to an earlier status still waits for the serial line; wait for it");
         iwn_server_refuse(server, client, &server->request.id);
         return;
     }
@@ -55,20 +47,23 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
         return true;
     }
     if (self->restart_us != 0U) {
-        return REFUSE(server, IWN_DENIED, "a configuration was committed: the gateway starts anew with it, then arm");
+        return IWN_REFUSE(&server->refusal, IWN_DENIED,
+                          "a configuration was committed: the gateway starts anew with it, then arm");
     }
     return iw_pending_has_room(&self->pending, client->id, IWN_CMD_ARM) ||
-           REFUSE(server, IWN_BUSY, "the answers to other requests still wait for the serial line; try again");
+           IWN_REFUSE(&server->refusal, IWN_BUSY,
+                      "the answers to other requests still wait for the serial line; try again");
 }
 
 void iwn_target_say_right(iwn_server_t *server) {
-    (void)REFUSE(server, IWN_DENIED, "this channel is for watching, stop and estop");
+    (void)IWN_REFUSE(&server->refusal, IWN_DENIED, "this channel is for watching, stop and estop");
 }
 
 bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const char *key) {
     (void)client;
     (void)key;
-    return REFUSE(server, IWN_NOT_HOLDER, "this gateway is a microcontroller, which gives no key; leave key out");
+    return IWN_REFUSE(&server->refusal, IWN_NOT_HOLDER,
+                      "this gateway is a microcontroller, which gives no key; leave key out");
 }
 
 /// What is wrong with a quote; NULL: nothing. A stamp from before the channel was opened is another client's.
@@ -107,7 +102,7 @@ bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_
     }
     const char *const why = stale(self, whose, quote);
     if (why != NULL) {
-        return REFUSE(server, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
+        return IWN_REFUSE(&server->refusal, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
     }
     whose->has_seq = true;
     whose->seq = quote->seq;
@@ -158,7 +153,7 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
         iw_host_config(iw_host_of(server), client);
         break;
     default:
-        (void)REFUSE(server, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        (void)IWN_REFUSE(&server->refusal, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
         iwn_server_refuse(server, client, &server->request.id);
         break;
     }

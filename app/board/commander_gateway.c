@@ -68,6 +68,7 @@ bool iw_host_remember(const iw_learnt_t *learnt) {
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
     static char estop[] = "PA0";
     estop[1] = (char)('A' + IW_BOARD_ESTOP / 16U);
+    iw_gateway_snapshot(gateway, now_us, iw_report_room());
     const iw_host_place_t place = {
         .gateway = gateway,
         .version = IWHEEL_VERSION,
@@ -75,7 +76,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .settings = iw_settings_from(&gateway->config),
+        .settings = iw_settings_from(iw_report_room()->config),
         .rate_max_hz = RATE_MAX_HZ,
         .boot = iw_boot_id(kept.power_ons),
     };

@@ -30,13 +30,6 @@ static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_
     }
 }
 
-static bool has_failed(iw_host_t *self, iwn_error_t error, const char *text) {
-    iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
-    self->server.refusal.error = error;
-    iwn_text_add(&why, text);
-    return false;
-}
-
 /// False, with `self->server.refusal`, if the request's value is none of the item's.
 static bool compare(iw_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->server.request;
@@ -50,10 +43,10 @@ static bool compare(iw_host_t *self, bool *out_same) {
     if (key == NULL) {
         *out_same = !is_told || strcmp(request->value, "yes") == 0;
         return *out_same || strcmp(request->value, "no") == 0 ||
-               has_failed(self, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
+               IWN_REFUSE(&self->server.refusal, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
     if (!iw_settings_value(&self->settings, key, value)) {
-        return has_failed(self, IWN_TYPE_NOT_SET,
+        return IWN_REFUSE(&self->server.refusal, IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
     if (is_told && !iw_settings_set(&found, key, request->value, &why)) {

@@ -39,7 +39,7 @@ static void open_client(iw_host_t *self, uint8_t channel, bool watches_only) {
     iw_host_client_t *const client = &self->client[channel - 1U];
     end_client(self, client); // Its close was lost.
     client->opened_us = self->server.now_us;
-    iwn_server_welcome(&self->server, &client->served, ++self->last_id, watches_only);
+    iwn_server_welcome(&client->served, ++self->last_id, watches_only);
     iwn_server_hello(&self->server, &client->served);
 }
 
@@ -202,7 +202,6 @@ bool iw_host_wants_restart(const iw_host_t *self) {
 
 bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {
     char byte;
-    unsigned lines = 0;
     self->server.now_us = now_us;
     if (now_us - self->heard_us >= (iw_time_us_t)IWN_LINE_SILENT_MS * IW_US_PER_MS) {
         end_all(self);
@@ -210,17 +209,18 @@ bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {
     if (iw_serial_had_error()) {
         iwn_receiver_spoil(&self->receiver);
     }
-    while (lines < IW_HOST_LINES_AT_ONCE && iw_serial_read(&byte, 1U) == 1U) {
+    while (iw_serial_read(&byte, 1U) == 1U) {
         iwn_line_t line;
         const iwn_line_verdict_t verdict = iwn_receiver_put(&self->receiver, byte, &line);
         if (verdict == IWN_LINE_GOOD) {
             take_line(self, &line);
-            lines++;
-        } else if (verdict != IWN_LINE_NOTHING) {
+            return true;
+        }
+        if (verdict != IWN_LINE_NOTHING) {
             note_fault(self, verdict);
         }
     }
-    return lines == IW_HOST_LINES_AT_ONCE;
+    return false;
 }
 
 /// One snapshot at a time, replies first, each client in its turn.

@@ -29,8 +29,6 @@
 #define IW_HOST_SMALL_BYTES 1664U
 /// What events leave free of the line, for replies.
 #define IW_HOST_REPLY_ROOM 768U
-/// Lines that are carried out in one call at the most, so that the e-stop is looked at between them.
-#define IW_HOST_LINES_AT_ONCE 4U
 /// The event `link` comes this often, and with an armed client whenever nothing else has been stamped for so long:
 /// a command cannot quote a younger stamp than it has heard.
 #define IW_HOST_LINK_US       1000000U
@@ -120,8 +118,9 @@ typedef struct {
 /// Nobody is there yet.
 void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us);
 
-/// Right before a step of the gateway: ends what must end, and carries out what came, in its order. True if there may
-/// be more: come again at once.
+/// Call it right before a step of the gateway. It ends what must end, and carries out one line: a request can take
+/// milliseconds, and the loop must read the e-stop between two of them. Returns true if more lines may wait: call it
+/// again immediately, after the step.
 bool iw_host_take(iw_host_t *self, iw_time_us_t now_us);
 
 /// Right after the step: answers the arms that it decided, tells what changed, and what is due. Returns when to come

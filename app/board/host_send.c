@@ -139,9 +139,8 @@ void iw_host_tell_link(iw_host_t *self) {
     iwn_out_t json = iwn_server_begin_event(&self->server, "link");
     iwn_out_text(&json, "boot", boot_text(self->boot, boot));
     iwn_out_text(&json, "version", self->server.version);
-    iwn_out_int(&json, "line_bytes", IW_HOST_LINE_BYTES);
-    iwn_out_int(&json, "channels", IWN_LINE_CHANNELS);
-    iwn_out_int(&json, "silent_ms", IWN_LINE_SILENT_MS);
+    IWN_OUT_NUMBERS(&json, "line_bytes\0channels\0silent_ms\0", IW_HOST_LINE_BYTES, IWN_LINE_CHANNELS,
+                    IWN_LINE_SILENT_MS);
     if (put(self, CHANNEL_LINK, finish(&json), 0U)) {
         self->linked_us = self->server.now_us;
     }

@@ -35,15 +35,14 @@ static iw_settings_t from_before(const uint32_t *words) {
     return iw_settings_from_before(value);
 }
 
-/// What a record of version 0.2 holds, in its new places.
+/// What a record of version 0.2 holds moves to its new places, which lie behind: the last first.
 static void convert(record_t *record) {
-    const record_t before = *record;
     const size_t rest = offsetof(iw_learnt_t, zero);
-    const uint8_t *const learnt = (const uint8_t *)&before.words[BEFORE_LEARNT + 1U];
-    record->is.settings = from_before(&before.words[BEFORE_AT]);
-    record->is.has_learnt = before.words[BEFORE_LEARNT];
-    record->is.learnt.settings = from_before(&before.words[BEFORE_LEARNT + 1U]);
-    memcpy((uint8_t *)&record->is.learnt + rest, learnt + BEFORE_BYTES, sizeof(iw_learnt_t) - rest);
+    const uint8_t *const learnt = (const uint8_t *)&record->words[BEFORE_LEARNT + 1U];
+    memmove((uint8_t *)&record->is.learnt + rest, learnt + BEFORE_BYTES, sizeof(iw_learnt_t) - rest);
+    record->is.learnt.settings = from_before(&record->words[BEFORE_LEARNT + 1U]);
+    record->is.has_learnt = record->words[BEFORE_LEARNT];
+    record->is.settings = from_before(&record->words[BEFORE_AT]);
     record->is.flags |= HAS_PAIR;
 }
 

@@ -106,10 +106,14 @@ static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool
     return true;
 }
 
-/// The watchdog is fed at the end: only a cycle that got through all of it counts as alive (fault 26).
+/// Steps the gateway before and after the commander: a request and a report can each take milliseconds, and the e-stop
+/// is read between any two of them. The watchdog is fed at the end: only a cycle that got through all of it counts as
+/// alive (fault 26).
 static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
-    const iw_time_us_t now_us = iw_time_now_us();
+    iw_time_us_t now_us = iw_time_now_us();
+    (void)iw_gateway_step(gateway, now_us);
     iw_commander_step(commander, gateway, now_us);
+    now_us = iw_time_now_us();
     const iw_time_us_t next_us = iw_gateway_step(gateway, now_us);
     const bool estop_high = iw_pins_estop_high();
     iw_snapshot_t *const seen = iw_report_room(); // Not on the stack, which it would nearly double.

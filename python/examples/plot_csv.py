@@ -6,12 +6,13 @@ usage: plot_csv.py FILE.csv FILE.png
 """
 
 import csv
+import itertools
 import sys
 
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 COLOURS = {"left": "tab:blue", "right": "tab:orange"}
 
@@ -30,7 +31,7 @@ def draw(source: str, target: str) -> None:
         speed.step(times, column(rows, f"{side}_applied_mm_s"), where="post", color=colour, ls=":", label=f"{side}, told")
         speed.plot(times, column(rows, f"{side}_speed_mm_s"), color=colour, label=f"{side}, measured")
         force.plot(times, column(rows, f"{side}_force_net_mN", 1e-3), color=colour, label=side)
-    for before, row in zip(rows, rows[1:]):
+    for before, row in itertools.pairwise(rows):
         if row["state"] == "latched" and before["state"] != "latched":
             speed.axvline(float(row["time_s"]), color="tab:red", label="latched")
     speed.set_ylabel("speed in mm/s")

@@ -10,10 +10,10 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 sys.path[:0] = [os.path.join(ROOT, "python", "src"), os.path.join(ROOT, "test", "system")]
 
-from bus import now_us  # noqa: E402
-from harness import Rig  # noqa: E402
-from judge_log import ALWAYS_US  # noqa: E402
-from verdict import hold  # noqa: E402
+from bus import now_us
+from harness import Rig
+from judge_log import ALWAYS_US
+from verdict import hold
 
 BUILD = os.environ.get("IWHEEL_BUILD", os.path.join(ROOT, "build", "default"))
 EXAMPLES = os.path.join(ROOT, "python", "examples")

@@ -15,7 +15,7 @@ import unittest
 from rig import ROOT, RigCase, now_us
 from stand_in import StandIn
 
-from iwheel import AsyncGateway, IWheelError, Refused
+from iwheel import AsyncGateway, Refused
 
 COUNT = int(os.environ.get("IWHEEL_CANCELLATIONS", "2400"))
 END_S = 0.1
@@ -109,7 +109,7 @@ async def by_a_group(work, seconds):
         async with asyncio.TaskGroup() as group:
             group.create_task(work)
             group.create_task(fail())
-    except BaseException as group_error:
+    except BaseException as group_error:  # noqa: BLE001
         assert [type(error) for error in group_error.exceptions] == [ZeroDivisionError], group_error
     return at[0]
 

@@ -2,6 +2,7 @@
 """The examples, used as a person would."""
 
 import csv
+import itertools
 import os
 import pty
 import signal
@@ -139,7 +140,7 @@ class Examples(RigCase):
             os.write(pad, self.event(-32767 + n, 2, 1))
         self.assertGreater(self.last_motion_us(), now_us() - 150_000)
         gaps = sorted(t for t, _, speed in self.rig.bus.setpoints() if speed != 0 and t > last_us + 500_000)
-        self.assertLess(max(b - a for a, b in zip(gaps, gaps[1:])), 200_000, "it stopped in between")
+        self.assertLess(max(b - a for a, b in itertools.pairwise(gaps)), 200_000, "it stopped in between")
 
     def test_gamepad_state_from_the_kernel_is_no_evidence(self):
         pad, _, last_us = self.held()

@@ -69,7 +69,7 @@ def as_nobody(call):
                 os.setgid(65534)
                 os.setuid(65534)
             call()
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001
             os.write(writing, str(error).encode())
         os._exit(0)
     os.close(writing)
@@ -141,9 +141,8 @@ class Hostile(unittest.TestCase):
 
         with self.assertRaises(error) as first:
             asyncio.run(asyncio.wait_for(ask_async(), 5))
-        with self.assertRaises(error) as second:
-            with Gateway(impostor.path, timeout=0.2) as gateway:
-                getattr(gateway, ask)()
+        with self.assertRaises(error) as second, Gateway(impostor.path, timeout=0.2) as gateway:
+            getattr(gateway, ask)()
         self.assertEqual(str(first.exception), str(second.exception))
         return impostor, str(first.exception)
 

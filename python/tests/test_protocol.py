@@ -19,7 +19,7 @@ from harness import Rig
 from iwheel import _protocol
 
 sys.path.insert(0, os.path.join(ROOT, "scripts"))
-from northbound import Description, camel  # noqa: E402
+from northbound import Description, camel
 
 TOPICS = ["state", "bus", "estop", "lease", "stop", "force", "frame"]
 # What this rig cannot bring about, with the reason. Everything else must be seen.

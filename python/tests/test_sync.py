@@ -103,10 +103,9 @@ class Driving(RigCase):
                 wheels.drive(300, 300)
 
     def test_an_exception_in_the_block_stops_and_is_not_swallowed(self):
-        with self.assertRaises(ZeroDivisionError):
-            with Gateway(self.socket).arm() as wheels:
-                wheels.drive_for(0.4, 300, 300)
-                1 / 0
+        with self.assertRaises(ZeroDivisionError), Gateway(self.socket).arm() as wheels:
+            wheels.drive_for(0.4, 300, 300)
+            raise ZeroDivisionError
         self.assert_stood_by(now_us(), 0)
 
     def test_ctrl_c_stops(self):
@@ -411,9 +410,8 @@ class Telling(RigCase):
             if status["left"]["speed_mm_s"] > 100:
                 raise ZeroDivisionError
 
-        with self.assertRaises(ZeroDivisionError):
-            with Gateway(self.socket).arm() as wheels:
-                wheels.drive_for(30, 300, 300, on_status=stumble)
+        with self.assertRaises(ZeroDivisionError), Gateway(self.socket).arm() as wheels:
+            wheels.drive_for(30, 300, 300, on_status=stumble)
         self.assert_stood_by(now_us(), 0)
 
     def test_one_that_hangs_loses_the_lease(self):
@@ -428,9 +426,8 @@ class Telling(RigCase):
 
         with warnings.catch_warnings(record=True):
             warnings.simplefilter("always")
-            with self.assertRaises(ConnectionLost):
-                with Gateway(self.socket).arm() as wheels:
-                    wheels.drive_for(30, 100, 100, on_status=kill)
+            with self.assertRaises(ConnectionLost), Gateway(self.socket).arm() as wheels:
+                wheels.drive_for(30, 100, 100, on_status=kill)
 
 
 class Answers(RigCase):

@@ -9,7 +9,7 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "..", "test", "system"))
-from harness import as_a_service, die_with_parent  # noqa: E402
+from harness import as_a_service, die_with_parent
 
 
 class Sleeper(threading.Thread):

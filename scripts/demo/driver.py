@@ -11,7 +11,7 @@ import sys
 import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "test", "system"))
-from client import Client  # noqa: E402
+from client import Client
 
 
 def main(path):

@@ -141,7 +141,7 @@ def run(options, interrupts):
         else:
             print("Try it yourself: ./demo --keep")
         return 0
-    except Exception as error:  # pylint: disable=broad-except
+    except Exception as error:
         if interrupts.came:
             raise KeyboardInterrupt from error
         report(story, rig, error, sleeper)

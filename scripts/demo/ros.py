@@ -14,8 +14,8 @@ import time
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("system", "ros2")]
 
-from harness import Process, Rig  # noqa: E402
-from peer import Peer  # noqa: E402
+from harness import Process, Rig
+from peer import Peer
 
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 400, "max_speed_mm_s": 700}}
 SIDE_M, SPEED, TURN, NEAR_M = 1.0, 0.4, 0.8, 0.25

@@ -102,7 +102,7 @@ class Screen:
 
     def draw(self):
         rows = [self._head(), "", self._state(), ""]
-        rows += [left + right for left, right in zip(self._wheels(), self._map())]
+        rows += [left + right for left, right in zip(self._wheels(), self._map(), strict=False)]
         rows += [tint(self.glyphs.rule * 80, 2), tint(f" {self.title}", 1)]
         rows += [" " + line for line in textwrap.wrap(self.text, 78)[:2]]
         facts = [line for fact, old in self.facts for line in self._fact(fact, old)]
@@ -115,7 +115,7 @@ class Screen:
         """Facts of earlier steps are dimmed."""
         lines = textwrap.wrap(fact, 76)[:4]
         marks = [tint(self.glyphs.tick, 32) if old else tint(self.glyphs.tick, 32, 1)] + [" "] * 3
-        return [f" {mark} {tint(line, 2) if old else line}" for mark, line in zip(marks, lines)]
+        return [f" {mark} {tint(line, 2) if old else line}" for mark, line in zip(marks, lines, strict=False)]
 
     def _head(self):
         left, right = (
@@ -152,7 +152,7 @@ class Screen:
                 self._values(wheel),
                 " " * 53,
             ]
-        return rows[:-1] + [" " * 53, f" {'':5} {'-600':<{BAR // 2}}0{'+600 mm/s':>{BAR // 2}}".ljust(53)]
+        return [*rows[:-1], " " * 53, f" {'':5} {'-600':<{BAR // 2}}0{'+600 mm/s':>{BAR // 2}}".ljust(53)]
 
     def _bar(self, label, value, colour):
         half = BAR // 2

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# shellcheck shell=bash
 # Completion for iwheelctl, iwheel-gateway and iwheel-sim. It asks the program itself, so it knows what that program knows.
 
 # CAN interfaces.

@@ -30,7 +30,7 @@ def count(output, status):
     if OURS.search(output):
         passed, failed, skipped = (int(number or 0) for number in OURS.findall(output)[-1])
     elif UNITY.search(output):
-        total, failed, skipped = (sum(map(int, column)) for column in zip(*UNITY.findall(output)))
+        total, failed, skipped = (sum(map(int, column)) for column in zip(*UNITY.findall(output), strict=True))
         passed = total - failed - skipped
     elif PYTHON.search(output):  # "Ran 12 tests", "OK" or "FAILED", " (failures=1, errors=1, skipped=2)"
         total, details = PYTHON.findall(output)[-1]
@@ -54,7 +54,7 @@ def run(path, *command):
     ended, sums, lines = subprocess.run(command, check=False).returncode, [0, 0, 0], []
     for name, output, status, _ in cases_of(path):
         counts = count(output, status)
-        sums = [total + one for total, one in zip(sums, counts)]
+        sums = [total + one for total, one in zip(sums, counts, strict=True)]
         lines += [f"{word}: {name}: {number} of {sum(counts)}" for word, number in (("failed", counts[1]), ("skip", counts[2])) if number]
         lines += [line for line in output.splitlines() if re.match(r"\d+ inconclusive|real time not judged", line)]
     print(*lines, "{} passed, {} failed, {} skipped".format(*sums), sep="\n")
@@ -66,8 +66,8 @@ def main(path):
     for name, output, status, wall_s in cases_of(path):
         layer, ended, late, processor_s = STARTED.findall(output)[-1] if STARTED.search(output) else ("none", 77 if status == 77 else 1, 0, 0)
         counts, log = count(output, int(ended)), Path(f"build/check/{name}.log")
-        sums, inconclusive = [total + one for total, one in zip(sums, counts)], inconclusive + int(late)
-        layers[layer] = [total + one for total, one in zip(layers[layer], (sum(counts), float(processor_s), wall_s))]
+        sums, inconclusive = [total + one for total, one in zip(sums, counts, strict=True)], inconclusive + int(late)
+        layers[layer] = [total + one for total, one in zip(layers[layer], (sum(counts), float(processor_s), wall_s), strict=True)]
         if counts[1]:
             failed.append(f"failed: {name}: {counts[1]} of {sum(counts)}; all of it: {log}")
             if layer == "none":
@@ -76,7 +76,7 @@ def main(path):
             why = [line.strip() for line in output.splitlines() if re.match(r" *skip", line, re.IGNORECASE)] or ["not run: what it needs failed"]
             skipped += [f"skipped: {name}: {re.sub('(?i)^skip(ped)?[: ]*', '', line)}" for line in why]
         unjudged += [name] if int(ended) == 75 and not counts[1] else []
-    layers["all"] = [sum(column) for column in zip(*layers.values())]
+    layers["all"] = [sum(column) for column in zip(*layers.values(), strict=True)]
     print(f"\n{'layer':12} {'single tests':>12} {'processor s':>12} {'wall s':>8}")
     print(*("{:12} {:12d} {:12.0f} {:8.0f}".format(layer, *numbers) for layer, numbers in layers.items()), *skipped, *failed, sep="\n")
     print(f"{inconclusive} inconclusive, counted as skipped: the machine stalled; their names are above\n" if inconclusive else "", end="")

@@ -145,7 +145,7 @@ def everything(work, compiler):
     """Rows of (codec, {what is counted: instructions per frame, without those of the loop around it})."""
     rows, loop = [], {}
     for name, (sources, includes) in codecs(work).items():
-        figures = dict(zip(("x86-64 decode", "x86-64 encode"), host_codec(work, name, sources, includes, compiler)))
+        figures = dict(zip(("x86-64 decode", "x86-64 encode"), host_codec(work, name, sources, includes, compiler), strict=True))
         for cpu in ARM_CPUS:
             decode, encode = arm_codec(work, name, cpu, sources, includes, compiler)
             figures |= {f"{cpu} decode": decode, f"{cpu} encode": encode}

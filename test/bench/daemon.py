@@ -20,9 +20,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "timed"))
 
-import growth  # noqa: E402
-import host  # noqa: E402
-import local  # noqa: E402
+import growth
+import host
+import local
 
 WATCH_S = 4.0
 START_S = 10.0

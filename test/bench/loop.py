@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "support"))
-from verdict import Witness, now_us  # noqa: E402
+from verdict import Witness, now_us
 
 FRAMES_S = 617
 WATCH_S = 2.0
@@ -151,10 +151,10 @@ def rows(build, pair_type, client_type):
     """(state, system calls and instructions for each frame), the dearest first; None: not measured. What is above its limit is measured once more:
     wakings that fall together differ by chance, and the smaller figure is what the loop costs."""
     found = measured(build, pair_type, client_type)
-    if any(figure is not None and limit is not None and figure > limit for state, *figures in found for figure, limit in zip(figures, LIMITS[state])):
+    if any(figure is not None and limit is not None and figure > limit for state, *figures in found for figure, limit in zip(figures, LIMITS[state], strict=True)):
         print("above a limit; once more", flush=True)
         again = {state: figures for state, *figures in measured(build, pair_type, client_type)}
-        found = [(state, *(figure if figure is None else min(figure, other) for figure, other in zip(figures, again[state]))) for state, *figures in found]
+        found = [(state, *(figure if figure is None else min(figure, other) for figure, other in zip(figures, again[state], strict=True))) for state, *figures in found]
     return found
 
 

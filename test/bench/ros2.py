@@ -18,9 +18,10 @@ import time
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("system", "ros2")]
 
-from bus import now_us  # noqa: E402
-from harness import Process, Rig, percentile  # noqa: E402
-from peer import Peer  # noqa: E402
+from bus import now_us
+from harness import Process, Rig
+from judge_log import percentile
+from peer import Peer
 
 COMMANDS, EVERY_S, COST_S = 120, 0.053, 10
 SPEEDS = (200, 260)
@@ -113,14 +114,14 @@ def main():
         for _ in range(options.rounds):
             client_us += by_client(rig, options.build)
             at_rest(rig, client)
-            for total, part in zip(all_us, by_bridge(rig, peer, writer)):
+            for total, part in zip(all_us, by_bridge(rig, peer, writer), strict=False):
                 total += part
             at_rest(rig, client)
         begin_s = bridge.cpu_seconds()
         time.sleep(COST_S)
         cost = (bridge.cpu_seconds() - begin_s) / COST_S
         print(f"drive by the C client to frame: {words(client_us)}")
-        for what, values in zip(("cmd_vel received to frame", "cmd_vel published to frame", "within the bridge"), (all_us[1], all_us[0], all_us[2])):
+        for what, values in zip(("cmd_vel received to frame", "cmd_vel published to frame", "within the bridge"), (all_us[1], all_us[0], all_us[2]), strict=False):
             print(f"{what + ':':<31} {words(values)}, {percentile(values, 50) / percentile(client_us, 50):.2f} x")
         print(f"bridge at 50 Hz odometry:       {100 * cost:.1f} % of one processor, {bridge.resident_kB() / 1024:.1f} MiB resident, {len(os.listdir(f'/proc/{bridge.child.pid}/task'))} threads")
     finally:

@@ -11,7 +11,7 @@ from pathlib import Path
 from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-import loop  # noqa: E402
+import loop
 
 STOPPED = {"ok": True, "cause": "stale_frames", "detail": "left wheel", "frames_before": ["x"] * 40, "recording": None}
 

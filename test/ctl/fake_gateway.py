@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A gateway that only talks: answers like the real one, or misbehaves as a test wants it to."""
+import contextlib
 import json
 import os
 import socket
@@ -61,10 +62,8 @@ class FakeGateway:
 
     def close(self):
         # A blocked accept() holds the listener open: shut it down first.
-        try:
+        with contextlib.suppress(OSError):
             self.listener.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         self.listener.close()
         self.thread.join(5)
         self.folder.cleanup()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A person at a terminal: reads what a program writes on a pty, and types when asked."""
+import contextlib
 import fcntl
 import os
 import pty
@@ -17,10 +18,8 @@ SERVICE_NICE = -10
 def sit_down():
     """The terminal is this process's own; and what drives wheels does not wait for the rest of this machine."""
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-    try:
+    with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, SERVICE_NICE)
-    except PermissionError:
-        pass
 
 
 class Operator:

@@ -7,7 +7,7 @@ import sys
 import unittest
 
 sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
-import verdict  # noqa: E402
+import verdict
 
 LIMIT_S = 240  # of one test
 

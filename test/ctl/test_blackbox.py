@@ -20,9 +20,9 @@ import unittest
 import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
-import several  # noqa: E402
-from client import Streamer  # noqa: E402
-from harness import Rig, find_program  # noqa: E402
+import several
+from client import Streamer
+from harness import Rig, find_program
 
 BUILD = ""
 

@@ -19,8 +19,8 @@ import several
 from operator_at_terminal import Operator
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
-from harness import Rig, find_program  # noqa: E402
-from verdict import hold  # noqa: E402
+from harness import Rig, find_program
+from verdict import hold
 
 BUILD = ""
 GRAVITY = 9.8
@@ -130,7 +130,7 @@ class Bringup(unittest.TestCase):
 
     def turn_by_hand(self, operator, radius_mm, turns=(3, 3), take="y"):
         operator.answer("Turn the wheels by hand?", "y")
-        for side, turn in zip(("left", "right"), turns):
+        for side, turn in zip(("left", "right"), turns, strict=True):
             operator.expect("press Enter ...")
             self.rig.sim.ask(f"push {side} {turn * radius_mm * FULL_TURN_M_PER_MM:.3f}")
             self.wait_until_stands()

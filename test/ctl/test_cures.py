@@ -17,8 +17,8 @@ import unittest
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "system"))
-import several  # noqa: E402
-from harness import Rig, find_program, read_only  # noqa: E402
+import several
+from harness import Rig, find_program, read_only
 
 BUILD = ""
 # Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
@@ -532,7 +532,7 @@ class Check(unittest.TestCase):
         self.rig.socket_name = "open/gateway.sock"
         code, text = self.only("fail", "others than the directory's owner may write")
         self.assertEqual(1, code)
-        subprocess.run(re.search(r"\((chmod go-w)\)", text).group(1).split() + [self.rig.path("open")], check=True)
+        subprocess.run([*re.search(r"\((chmod go-w)\)", text).group(1).split(), self.rig.path("open")], check=True)
         self.assertEqual(0, self.gone("fail", "socket"))
 
     def test_machine_without_can_or_gpio_is_judged_as_far_as_it_goes(self):

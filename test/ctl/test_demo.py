@@ -5,6 +5,7 @@
 Usage: test_demo.py BUILD [unittest's arguments]
 """
 import concurrent.futures
+import contextlib
 import os
 import signal
 import subprocess
@@ -29,10 +30,8 @@ def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",), beg
         first = process.stdout.readline() if begun else ""
         time.sleep(seconds)
         for number in signals:
-            try:
+            with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, number)  # As a terminal does: to all of them.
-            except ProcessLookupError:
-                pass
             time.sleep(spacing)
         output = first + process.communicate(timeout=60)[0]
         return process.returncode, os.listdir(folder), still_running(process.pid), output

@@ -16,7 +16,7 @@ import time
 import unittest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
-from harness import Rig, find_program  # noqa: E402
+from harness import Rig, find_program
 
 BUILD = ""
 

@@ -4,6 +4,7 @@
 
 Usage: test_iwheelctl.py PROGRAM [unittest's arguments]
 """
+import itertools
 import json
 import os
 import re
@@ -33,7 +34,7 @@ def run(*words, **more):
     """(exit code, stdout, stderr, seconds)"""
     begin = time.monotonic()
     done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=30,
-                          env=clean_environment(**more.pop("env", {})), **more)
+                          env=clean_environment(**more.pop("env", {})), **more, check=False)
     return done.returncode, done.stdout, done.stderr, time.monotonic() - begin
 
 
@@ -268,7 +269,7 @@ class Showing(WithGateway):
         self.assertRegex(out, r"battery +>= 25\.5 V, 17 ms ago +24\.3 V")
 
     def test_unknown_is_never_a_number(self):
-        nothing = {key: None for key in wheel()}
+        nothing = dict.fromkeys(wheel())
         out = self.show(snapshot(left={**nothing, "heard": False}, right={**nothing, "heard": False}))
         below = out[out.index("WHEELS"):out.index("POSE")]
         self.assertNotRegex(below, r"\d")
@@ -277,11 +278,11 @@ class Showing(WithGateway):
 
     def test_missing_and_wrong_fields_do_no_harm(self):
         self.assertIn("--", self.show({}))
-        self.show({key: 7 for key in snapshot()})
-        self.show({key: "x" for key in snapshot()})
+        self.show(dict.fromkeys(snapshot(), 7))
+        self.show(dict.fromkeys(snapshot(), "x"))
         self.show({key: [] for key in snapshot()})
         self.show({key: {} for key in snapshot()})
-        self.show(snapshot(left={key: "x" * 300 for key in wheel()}, present=[1, None], warnings=[{}, "w" * 500]))
+        self.show(snapshot(left=dict.fromkeys(wheel(), "x" * 300), present=[1, None], warnings=[{}, "w" * 500]))
 
     def test_names_cannot_command_the_terminal(self):
         lease = {"holder": 3, "name": "\u001b[2J\u0007\u009bevil\n", "pid": 1, "remaining_ms": 5, "lease_ms": 200}
@@ -549,7 +550,7 @@ class Driving(WithGateway):
     def assert_spacing(self, gateway, seconds, most):
         """Never more than `most` commands, and half of them that far apart or less, however slow the machine was now and then."""
         times = gateway.times("drive")
-        spacing = statistics.median(after - before for before, after in zip(times, times[1:]))
+        spacing = statistics.median(after - before for before, after in itertools.pairwise(times))
         self.assertLessEqual(len(times), most)
         self.assertTrue(0.8 * seconds < spacing < 1.5 * seconds, spacing)
 

@@ -15,8 +15,8 @@ import time
 import unittest
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
-from harness import find_program  # noqa: E402
-from operator_at_terminal import Operator  # noqa: E402
+from harness import find_program
+from operator_at_terminal import Operator
 
 BUILD = ""
 # What each key changes in `status`, and to what; pressed again it is as before.

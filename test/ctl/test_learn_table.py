@@ -15,7 +15,6 @@ import subprocess
 import sys
 import unittest
 from dataclasses import dataclass, replace
-from typing import Optional, Tuple
 
 PROGRAM = ""
 SIDES = ("left", "right")
@@ -29,29 +28,29 @@ CURRENTS = {"same": lambda speed: 1500, "scaled": lambda speed: 3 * speed, "nega
 @dataclass(frozen=True)
 class Story:
     """A drive. Whatever is paired is (left, right)."""
-    phases: Tuple[str, ...] = ("rest", "forward", "backward")
+    phases: tuple[str, ...] = ("rest", "forward", "backward")
     phase_ms: int = 4000
-    currents: Tuple[str, str] = ("same", "same")
-    told: Tuple[bool, bool] = (True, True)
-    types: Tuple[int, int] = (3, 3)
-    rest_type: Optional[int] = None          # Another type with speed 0.
-    second_type: Optional[int] = None        # Every other setpoint has it.
-    spare: Tuple[int, ...] = (0,)            # Bytes behind the fifth, in turn.
+    currents: tuple[str, str] = ("same", "same")
+    told: tuple[bool, bool] = (True, True)
+    types: tuple[int, int] = (3, 3)
+    rest_type: int | None = None          # Another type with speed 0.
+    second_type: int | None = None        # Every other setpoint has it.
+    spare: tuple[int, ...] = (0,)            # Bytes behind the fifth, in turn.
     sent: str = "none"                       # "all", "some": marked as the recorder's own.
     setpoint_ms: int = 20
-    turns: Tuple[bool, bool] = (True, True)
-    runs_at_zero: Tuple[bool, bool] = (False, False)
+    turns: tuple[bool, bool] = (True, True)
+    runs_at_zero: tuple[bool, bool] = (False, False)
     stutters: bool = False                   # At speed for every other fifth of a second.
-    signs: Tuple[int, int] = (1, 1)
+    signs: tuple[int, int] = (1, 1)
     flips: bool = False                      # Backwards it measures the sign of forwards.
     rpm_per_speed: float = 1 / 20.106
     ticks_per_turn: float = 60.0
     ticks_gap: bool = False                  # Speed frames are lost for 150 ms in every second.
-    speeds: Tuple[bool, bool] = (True, True)
-    statuses: Tuple[bool, bool] = (True, True)
-    raw: Tuple[Optional[int], Optional[int]] = (200, 20)
+    speeds: tuple[bool, bool] = (True, True)
+    statuses: tuple[bool, bool] = (True, True)
+    raw: tuple[int | None, int | None] = (200, 20)
     sway: int = 0
-    offsets: Tuple[Tuple[int, ...], Tuple[int, ...]] = ((20,), (20,))
+    offsets: tuple[tuple[int, ...], tuple[int, ...]] = ((20,), (20,))
     pose_step: int = 10                      # mm per frame; 0: it stands. None is not possible: see poses.
     poses: int = 10000
     pose_little: bool = False

@@ -21,10 +21,10 @@ try:
 except ImportError:
     print("skip: pyte is missing (pip install -r scripts/requirements.txt into .venv; ./check does it)")
     sys.exit(77)
-import several  # noqa: E402
-from fake_gateway import FakeGateway, snapshot  # noqa: E402
-from harness import Rig, find_program  # noqa: E402
-from operator_at_terminal import Operator  # noqa: E402
+import several
+from fake_gateway import FakeGateway, snapshot
+from harness import Rig, find_program
+from operator_at_terminal import Operator
 
 BUILD = ""
 
@@ -167,7 +167,7 @@ class WithWheels(unittest.TestCase):
             screen = top.look(0.5)
             self.assertEqual((rows, columns), (len(screen), len(screen[0])))
             big = rows >= 20 and columns >= 55
-            self.assertTrue(big and "#" in top.blocks(1) or any("LISTENING" in row for row in screen),
+            self.assertTrue((big and "#" in top.blocks(1)) or any("LISTENING" in row for row in screen),
                             (columns, rows, screen))
             if columns >= 40 and rows >= 10:
                 self.assertTrue(any("mm/s" in row for row in screen), (columns, rows, screen))

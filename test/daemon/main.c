@@ -104,7 +104,7 @@ static void tell_kills(void) {
     }
 }
 
-/// The table of docs/simulated-hours.md.
+/// The figures of docs/developer/verification.md.
 static int kill_many(uint64_t seed, uint32_t lives) {
     scenario_kills(&scenario, seed, lives);
     const verdict_t verdict = play(IW_NEVER);

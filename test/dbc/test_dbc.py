@@ -73,7 +73,7 @@ def encoded_by_dbc(database, commands):
     result = []
     for can_id, values in commands:
         message = database.get_message_by_frame_id(can_id)
-        named = {signal.name: value for signal, value in zip(in_byte_order(message), values)}
+        named = {signal.name: value for signal, value in zip(in_byte_order(message), values, strict=True)}
         result.append((can_id, message.encode(named, scaling=True, strict=False)))
     return result
 
@@ -120,7 +120,7 @@ class TestDatabase(unittest.TestCase):
             self.assertEqual(f"{side}{kind}", message.name.lower())
             self.assertEqual(int(length), message.length)
             # Of a setpoint the core has the longest period allowed, the DBC the gateway's own.
-            self.assertTrue(message.cycle_time == int(period_ms) or kind == "setpoint" and message.cycle_time < int(period_ms))
+            self.assertTrue(message.cycle_time == int(period_ms) or (kind == "setpoint" and message.cycle_time < int(period_ms)))
 
     def test_every_message_tells_its_number_in_hexadecimal(self):
         for message in DATABASE.messages:
@@ -162,22 +162,22 @@ class TestDatabase(unittest.TestCase):
 class TestAgainstTheCodec(unittest.TestCase):
     def test_random_frames_decode_alike(self):
         frames = random_frames(1, FRAMES_PER_MESSAGE)
-        for frame, ours, theirs in zip(frames, CODEC.decode(frames), decoded_by_dbc(DATABASE, frames)):
+        for frame, ours, theirs in zip(frames, CODEC.decode(frames), decoded_by_dbc(DATABASE, frames), strict=True):
             self.assertEqual(ours, theirs, frame)
 
     def test_random_values_encode_alike(self):
         commands = random_commands(2, FRAMES_PER_MESSAGE)
-        for command, ours, theirs in zip(commands, CODEC.encode(commands), encoded_by_dbc(DATABASE, commands)):
+        for command, ours, theirs in zip(commands, CODEC.encode(commands), encoded_by_dbc(DATABASE, commands), strict=True):
             self.assertEqual(ours, theirs, command)
 
     def test_longer_frames_decode_alike(self):
         frames = [(can_id, data + b"\xA5" * (8 - len(data))) for can_id, data in random_frames(3, 50)]
-        for frame, ours, theirs in zip(frames, CODEC.decode(frames), decoded_by_dbc(DATABASE, frames)):
+        for frame, ours, theirs in zip(frames, CODEC.decode(frames), decoded_by_dbc(DATABASE, frames), strict=True):
             self.assertEqual(ours, theirs, frame)
 
     def test_shorter_frames_are_refused_by_both(self):
         frames = [(can_id, data[:length]) for can_id, data in random_frames(4, 1) for length in range(len(data))]
-        for frame, ours in zip(frames, CODEC.decode(frames)):
+        for frame, ours in zip(frames, CODEC.decode(frames), strict=True):
             self.assertEqual("error", ours, frame)
             with self.assertRaises(cantools.database.DecodeError):
                 decoded_by_dbc(DATABASE, [frame])

@@ -35,7 +35,7 @@ class Readers(unittest.TestCase):
         with can.CanutilsLogReader(str(RECORDING)) as reader:
             messages = list(reader)
         self.assertEqual(len(LINES), len(messages))
-        for line, message in zip(LINES, messages):
+        for line, message in zip(LINES, messages, strict=True):
             self.assertEqual(line.endswith("R"), message.is_rx)
             self.assertAlmostEqual(float(line[1:line.index(")")]), message.timestamp, places=5)
             self.assertEqual(line.split()[2], f"{message.arbitration_id:03X}#{message.data.hex().upper()}")
@@ -47,7 +47,7 @@ class Readers(unittest.TestCase):
         decoded = rows()
         self.assertEqual((len(LINES), len(LINES)), (len(frames), len(decoded)))
         compared = 0
-        for frame, row in zip(frames, decoded):
+        for frame, row in zip(frames, decoded, strict=True):
             self.assertEqual(frame.frame_id, int(row["id"]))
             for name, value in database.decode_message(frame.frame_id, frame.data).items():
                 self.assertEqual(Decimal(value), Decimal(row[COLUMN.get(name, name)]), (row, name))

@@ -21,7 +21,7 @@ def judge(applied, tests, folder):
         (folder / applied.file).write_text(applied.text)
     try:
         done = subprocess.run([sys.executable, "-m", "unittest", "-f", tests], cwd=folder / "python/tests", capture_output=True, text=True,
-                              timeout=TIMEOUT_S, env={**os.environ, "PYTHONPATH": str(folder / "python/src"), "PYTHONDONTWRITEBYTECODE": "1"})
+                              timeout=TIMEOUT_S, env={**os.environ, "PYTHONPATH": str(folder / "python/src"), "PYTHONDONTWRITEBYTECODE": "1"}, check=False)
     except subprocess.TimeoutExpired:
         return f"does not end within {TIMEOUT_S} s"
     if done.returncode == 0:

@@ -94,7 +94,7 @@ def limit_s(unchanged):
 
 def compile_file(source, out, *flags, gcc=("gcc",), include=tuple(INCLUDE)):
     """None, or what the compiler said."""
-    done = subprocess.run([*gcc, "-std=gnu11", "-w", *flags, *include, "-c", source, "-o", out], capture_output=True, text=True)
+    done = subprocess.run([*gcc, "-std=gnu11", "-w", *flags, *include, "-c", source, "-o", out], capture_output=True, text=True, check=False)
     return None if done.returncode == 0 else done.stderr
 
 
@@ -115,7 +115,7 @@ class Judges:
         others = sorted({path for sources in programs.values() for path in sources})
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(self.compile_core, sorted(CORE.glob("*.c"))))
-            objects = dict(zip(others, pool.map(self.compile_other, others)))
+            objects = dict(zip(others, pool.map(self.compile_other, others), strict=True))
             self.link(self.clean.folder, {})
             list(pool.map(lambda name: self.build(name, [objects[path] for path in programs[name]]), programs))
 

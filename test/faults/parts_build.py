@@ -53,7 +53,7 @@ class Parts:
             return chosen, out, None
         kept = [word for word in words if not word.startswith("-W") and word not in (str(source), output_of(words), "-o", "-c", "-g", "-O2")]
         command = [*kept, *flags, "-w", "-iquote", str(source.parent), "-c", str(changed), "-o", str(out)]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         return chosen, out, None if done.returncode == 0 else done.stderr
 
     def link(self, program, source, changed, out, flags=("-O1",)):
@@ -68,7 +68,7 @@ class Parts:
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
             words.insert(1, str(changed_object))
-        done = subprocess.run([*words, "-s"], cwd=folder, capture_output=True, text=True)
+        done = subprocess.run([*words, "-s"], cwd=folder, capture_output=True, text=True, check=False)
         return None if done.returncode == 0 else f"does not link: {done.stderr}"
 
     def change(self, name, file, text):

@@ -87,7 +87,8 @@ def states():
     """What a gateway tells of itself, with values of each kind."""
     wheel = {"heard": True, "at_rest": False, "speed_mm_s": -100, "commanded_mm_s": 0, "applied_mm_s": 5, "distance_mm": 7, "battery_dV": 240, "temperature_degC": 30, "speed_age_ms": 1, "force_age_ms": None,
              "force_validity": "valid", "force_net_mN": -9}
-    return [json.dumps({"event": "state", "t_us": 1, "state": state, "cause": "x", "lease": lease, "estop": {"state": "released"}, "bus": {"state": "active"}, "left": wheel, "right": {**wheel, "heard": 0, "force_validity": "x"}}).encode() + b"\n"
+    return [json.dumps({"event": "state", "t_us": 1, "state": state, "cause": "x", "lease": lease, "estop": {"state": "released"}, "bus": {"state": "active"},
+                        "left": wheel, "right": {**wheel, "heard": 0, "force_validity": "x"}}).encode() + b"\n"
             for state in ("listening", "armed", "stopping", "latched", "x") for lease in ({"holder": 3, "remaining_ms": 9}, {"holder": None})]
 
 
@@ -134,7 +135,8 @@ def relayed():
     """What a board is told beside requests: by its relay, by a second client, of its configuration and of what is known."""
     keys = ("wheels.gear_ratio=3/2", "wheels.gear_ratio=0/1", "wheels.track_mm=600", "drive.lease_ms=9999", "left.invert=yes", "left.invert=maybe", "wheels.current_role=setpoint", "wheels.rpm_of=rotor", "bus.bitrate=5", "drive.period_ms=")
     config = b"".join(b'{"cmd":"config","key":"%s","value":"%s"}\n' % tuple(pair.encode().split(b"=")) for pair in keys)
-    confirm = b"".join(b'{"cmd":"confirm","id":4,"item":"%s","value":"%s","how":"x"}\n' % pair for pair in ((b"wheel_radius", b"192"), (b"track", b"9"), (b"current_role", b"setpoint"), (b"gear_ratio", b"1"), (b"dlc", b"yes"), (b"mount_sign_left", b"no")))
+    confirm = b"".join(b'{"cmd":"confirm","id":4,"item":"%s","value":"%s","how":"x"}\n' %
+                       pair for pair in ((b"wheel_radius", b"192"), (b"track", b"9"), (b"current_role", b"setpoint"), (b"gear_ratio", b"1"), (b"dlc", b"yes"), (b"mount_sign_left", b"no")))
     tare = b'+700\n{"cmd":"tare","side":"left"}\n{"cmd":"tare"}\n{"cmd":"why"}\n{"cmd":"recordings"}\n{"cmd":"status"}\n'
     return [config + b'{"cmd":"config","commit":true}\n{"cmd":"config","commit":false}\n{"cmd":"config"}\n', config[:60] + b'{"cmd":"config","commit":true}\n+900\n', confirm, tare,
             b'@{"cmd":"open","channel":2,"watch":true}\n2{"cmd":"arm"}\n2{"cmd":"stop","id":9}\n2{"cmd":"status"}\n@{"cmd":"close","channel":1}\n@{"cmd":"open","channel":1,"watch":false}\n',
@@ -172,7 +174,7 @@ def some_of_each(number):
 def codec():
     """As take_frame() of fuzz_codec.c reads them: one by one, and a drive in its order."""
     told = [bytes([IDS.index(number), len(data), ECHO if own else 0]) + data.ljust(8, b"\0") for _, number, data, own in some_of_each(6)]
-    return told + [b"".join(told)]
+    return [*told, b"".join(told)]
 
 
 def candump():
@@ -212,7 +214,7 @@ def mqtt():
         body = letter + number.to_bytes(8, "little") + bytes(8) + rest
         return len(body).to_bytes(4, "little") + zlib.crc32(body).to_bytes(4, "little") + body
     events = [record(b"e", number, b"stop\0" + b'{"number":%d}' % number) for number in (1, 2)]
-    return [verb + said + more + b"}" for verb, more in zip(verbs, fields)] + [b"iwspool1" + record(b"c", 0) + b"".join(events) + record(b"c", 1)]
+    return [verb + said + more + b"}" for verb, more in zip(verbs, fields, strict=False)] + [b"iwspool1" + record(b"c", 0) + b"".join(events) + record(b"c", 1)]
 
 
 def web():

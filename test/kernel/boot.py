@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and ends it for sure."""
 
+import contextlib
 import json
 import os
 import signal
@@ -17,7 +18,7 @@ VIRTUAL_NICE = 5
 def find_kernel(install=True):
     """Path of the kernel, built first if it is not there yet. Raises RuntimeError with what is missing."""
     command = [os.path.join(HERE, "build_kernel")]
-    known = subprocess.run(command + ["--print"], stdout=subprocess.PIPE, text=True, check=False)
+    known = subprocess.run([*command, "--print"], stdout=subprocess.PIPE, text=True, check=False)
     if known.returncode == 0:
         return known.stdout.strip()
     with subprocess.Popen(command + ([] if install else ["--no-install"]), stdout=subprocess.PIPE, text=True) as child:
@@ -65,10 +66,8 @@ class Boot:
             os.nice(VIRTUAL_NICE)
         if self.plan["virtual"] or self.plan["group"] == "starved":  # which would use up what is allowed, and be stopped for it
             return
-        try:
+        with contextlib.suppress(PermissionError):  # then the witness decides what can be judged
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
-        except PermissionError:
-            pass  # then the witness decides what can be judged
 
     def command(self, kernel):
         plan, folder, name = self.plan, self.folder, self.name
@@ -121,10 +120,8 @@ class Boot:
 
     def kill(self):
         """All its processes, by their group."""
-        try:
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(self.child.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
 
     def end(self):
         """Kills what is left of it; keeps the seconds of processor time that it and its processes took."""

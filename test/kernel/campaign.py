@@ -45,7 +45,7 @@ class Campaign:
         self.interrupted = False
         self.processors = sorted(os.sched_getaffinity(0))
         self.reserved = set()  # of those, while something runs in real time
-        self.used = {processor: 0 for processor in self.processors}  # how many kernels run on it
+        self.used = dict.fromkeys(self.processors, 0)  # how many kernels run on it
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self.interrupt)
 
@@ -289,7 +289,7 @@ def main(arguments):
             print(f"SKIPPED: {error}\n0 passed, 0 failed, 1 skipped")
             return 0
     outcomes = campaigns(options, kernel)
-    totals = [sum(counts) for counts in zip([0, 0, 0], *(outcome.counts() for outcome in outcomes))]
+    totals = [sum(counts) for counts in zip([0, 0, 0], *(outcome.counts() for outcome in outcomes), strict=False)]
     results = [result for outcome in outcomes for result in outcome.results]
     inconclusive = [f"{result['group']}/{result['name']}" for result in results if result.get("inconclusive")]
     if len(outcomes) < options.repeat:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The list of tests on a real kernel: what each is, on which rig it runs, and in which boot."""
 
-from typing import Callable, NamedTuple
+from typing import NamedTuple
+from collections.abc import Callable
 
 from kernel_rig import VcanRig
 

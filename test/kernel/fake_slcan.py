@@ -8,6 +8,7 @@ it until the simulated bus has taken it. Without a hub it is an adapter on a bus
 """
 
 import array
+import contextlib
 import fcntl
 import os
 import select
@@ -118,10 +119,8 @@ class FakeSlcan(threading.Thread):
     def write(self, line):
         with self.lock:
             if self.master is not None:
-                try:
+                with contextlib.suppress(BlockingIOError):  # the kernel does not read: a real adapter loses it too
                     os.write(self.master, line)
-                except BlockingIOError:
-                    pass  # the kernel does not read: a real adapter loses it too
 
     def _wake(self):
         os.write(self.wake_write, b"x")
@@ -143,10 +142,8 @@ class FakeSlcan(threading.Thread):
                     self._from_kernel()
 
     def _from_kernel(self):
-        try:
+        with contextlib.suppress(OSError):  # nobody has the other end open
             self.pending += os.read(self.master, READ_BYTES)
-        except OSError:
-            pass  # nobody has the other end open
 
     def _take_lines(self):
         while b"\r" in self.pending and self.waiting < DEPTH and not self.stalled:

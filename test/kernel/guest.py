@@ -15,9 +15,9 @@ import sys
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
 
-import kernel_rig  # noqa: E402
-import kernel_scenarios  # noqa: E402,F401  (registers them)
-from guest_run import GuestRun  # noqa: E402
+import kernel_rig
+import kernel_scenarios  # noqa: F401  (registers them)
+from guest_run import GuestRun
 
 
 def main(path):

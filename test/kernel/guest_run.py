@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Inside the kernel: runs one test in a process of its own, and decides whether a failure is to be blamed on a late machine."""
 
+import contextlib
 import json
 import os
 import select
@@ -33,7 +34,7 @@ def run_one(entry, plan):
         entry.function(test)
     except Skip as reason:
         skip = str(reason) if not test.failures else None  # what was found already is judged
-    except Exception as error:  # pylint: disable=broad-except
+    except Exception as error:  # noqa: BLE001
         where = [f"{os.path.basename(s.filename)}:{s.lineno}" for s in traceback.extract_tb(error.__traceback__)][-4:]
         output = "".join(rig.gateway.text()[-600:] for rig in test.rigs if rig.gateway)
         text = f"{type(error).__name__}: {error} ({' > '.join(where)}) {output}"
@@ -96,7 +97,7 @@ class GuestRun(Run):
 
     command = "test/kernel/run"
 
-    def __init__(self, plan):  # pylint: disable=super-init-not-called
+    def __init__(self, plan):
         Session.__init__(self, self.work_off)
         self.plan = plan
         self.limit_s = SOAK_LIMIT_S if plan["group"] == "soak" else FULL_LIMIT_S if plan["full"] else LIMIT_S
@@ -144,17 +145,15 @@ class GuestRun(Run):
             die_with_parent()
             try:
                 answer = run_one(entry, self.plan)
-            except BaseException as error:  # pylint: disable=broad-except
+            except BaseException as error:  # noqa: BLE001
                 answer = died(f"the worker failed: {''.join(traceback.format_exception(error))[-1500:]}")
             with os.fdopen(write_end, "w", encoding="utf-8") as pipe:
                 json.dump(answer, pipe)
             os._exit(0)
         os.close(write_end)
         text = read_all(read_end, self.limit_s)
-        try:
+        with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         os.waitpid(child, 0)
         if text is None:
             return attempt_of(died(f"did not end within {self.limit_s} s of the guest's clock"))

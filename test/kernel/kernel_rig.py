@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The rigs of test/system on interfaces and GPIO lines of a real kernel, and what a scenario here is given."""
 
+import contextlib
 import itertools
 import os
 import time
@@ -153,10 +154,8 @@ class GpioButton:
 
 def remove_marker(interface):
     """What a gateway that was killed left for the next one on this interface: the next test's has another past."""
-    try:
+    with contextlib.suppress(FileNotFoundError):
         os.unlink(f"{MARKERS}/{interface}.armed")
-    except FileNotFoundError:
-        pass
 
 
 class VcanRig(GpioButton, Rig):

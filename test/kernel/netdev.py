@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Network interfaces, queueing disciplines and capabilities, by the programs an administrator would use."""
 
+import contextlib
 import ctypes
 import os
 import socket
@@ -68,7 +69,5 @@ def without_net_admin():
 def remove_all(names):
     for name in names:
         if exists(name):
-            try:
+            with contextlib.suppress(RuntimeError):  # slcan goes with its tty
                 delete(name)
-            except RuntimeError:
-                pass  # slcan goes with its tty

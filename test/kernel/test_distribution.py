@@ -14,7 +14,7 @@ from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
-import distribution  # noqa: E402
+import distribution
 
 
 def answers(*texts, code=0):

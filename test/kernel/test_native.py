@@ -16,8 +16,8 @@ from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
-import campaign  # noqa: E402
-import native  # noqa: E402
+import campaign
+import native
 
 
 def answers(code, text=""):

@@ -15,9 +15,9 @@ from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
-import campaign  # noqa: E402
-import repeated  # noqa: E402
-import report  # noqa: E402
+import campaign
+import repeated
+import report
 
 
 def result(name, verdict="passed", group="estop", **fields):

@@ -13,10 +13,10 @@ from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
-import kernel_rig  # noqa: E402
-from guest_run import GuestRun  # noqa: E402
-from runner import attempt_of  # noqa: E402
-from verdict import RETRIES  # noqa: E402
+import kernel_rig
+from guest_run import GuestRun
+from runner import attempt_of
+from verdict import RETRIES
 
 BEGIN_US, FAULT_US, END_US = 1_000_000, 3_000_000, 5_000_000
 GAP = ["gap: at 2.000 s: 180 ms without a setpoint", "timing", FAULT_US]

@@ -5,6 +5,7 @@ import base64
 import json
 import re
 import shutil
+import signal
 import socket
 import ssl
 import subprocess
@@ -48,8 +49,8 @@ def lines(text):
 # ---- history --------------------------------------------------------------------------------------------------------
 
 
-def cluster_config(rig, cluster, host=" ".join(HOSTS), name="console", **keys):
-    return write_config(rig, host=host, port=cluster.mqtt, stream_port=cluster.nats, ca=rig.path("certs/ca.pem"), certificate=rig.path(f"certs/{name}.pem"),
+def cluster_config(rig, cluster, host="", name="console", **keys):
+    return write_config(rig, host=host or " ".join(HOSTS), port=cluster.mqtt, stream_port=cluster.nats, ca=rig.path("certs/ca.pem"), certificate=rig.path(f"certs/{name}.pem"),
                         key=rig.path(f"certs/{name}.key"), **keys)
 
 
@@ -103,6 +104,23 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     assert {"stop", "estop"} <= {event["message"]["event"] for event in shown} and not any(event["missing_before"] for event in shown), everything
     rows = lines(console(rig, config, "--for", "3", "--json")[1])
     assert [(row["machine"], row["stop_from"], row["cause"]) for row in rows if row["machine"] == "w2"] == [("w2", "stream", "wheel_lost")], rows
+
+
+def test_history_with_a_frozen_first_host_checks_its_end(rig):
+    """A host that accepts connections and never answers takes the time of one greeting, and no more: the next one is asked."""
+    cluster = Cluster(rig)
+    config = cluster_config(rig, cluster)
+    far = machine_at(rig, cluster)
+    publish_stops(far, [("a", 1, 1, -60)])
+    until(lambda: console(rig, config, "history", "w2")[1].count(" stop   ") == 1, 20, "it is stored")
+    cluster.servers[HOSTS[0]].signal(signal.SIGSTOP)
+    try:
+        def checked():
+            code, out, err = console(rig, config, "history", "w2", "--json", timeout=60)
+            return (code == 0 and lines(out)[-1]["end_checked"]) or print("        ", err.strip())
+        until(checked, 60, "the other two have a leader, and the end is checked")
+    finally:
+        cluster.servers[HOSTS[0]].signal(signal.SIGCONT)
 
 
 def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Simulated wheels, gateway, MQTT bridge and broker in one private folder, and a client from outside that may send anything."""
 
+import contextlib
 import json
 import os
 import pwd
@@ -19,9 +20,9 @@ except ImportError:
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "system"))
 
-from bus import now_us  # noqa: E402
-from harness import Process, Rig  # noqa: E402
-from trials import Skip, until  # noqa: E402
+from bus import now_us
+from harness import Process, Rig
+from trials import Skip, until
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
@@ -134,10 +135,8 @@ class Far:
 
 def shut(end):
     """Ends a connection in both directions, if it has not ended yet."""
-    try:
+    with contextlib.suppress(OSError):
         end.shutdown(socket.SHUT_RDWR)
-    except OSError:
-        pass
 
 
 class Line(threading.Thread):

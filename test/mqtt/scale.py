@@ -14,6 +14,8 @@ Processor time is what the kernel counted for each process, so others on the mac
 """
 
 import argparse
+import contextlib
+import itertools
 import json
 import multiprocessing
 import os
@@ -36,10 +38,11 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "system")]
 
-from bus import now_us  # noqa: E402
-from harness import die_with_parent, find_program, percentile  # noqa: E402
-from mqtt_rig import MqttRig, free_port, put_table  # noqa: E402
-from trials import ROOT, Skip, full, until  # noqa: E402
+from bus import now_us
+from harness import die_with_parent, find_program
+from judge_log import percentile
+from mqtt_rig import MqttRig, free_port, put_table
+from trials import ROOT, Skip, full, until
 
 PAGE = ROOT / "docs/mqtt.md"
 STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
@@ -62,7 +65,7 @@ class Tape:
             link = socket.socket(socket.AF_UNIX)
             link.connect(rig.path("watch.sock"))
             watchers[link] = (rate_hz, [], bytearray())
-        for number, cmd in enumerate(("hello", "why")):
+        for cmd in ("hello", "why"):
             self.answers[cmd] = re.sub(r'"id":\d+', '"id":%d', json.dumps(rig.client(name="tape").request(cmd), separators=(",", ":")).replace("%", "%%"), count=1)
         for link, (rate_hz, *_) in watchers.items():
             link.sendall(json.dumps({"cmd": "watch", "id": 1, "topics": ["state", "bus", "estop", "lease", "stop"], "rate_hz": rate_hz}).encode() + b"\n")
@@ -300,7 +303,7 @@ class Load:
         self.console.terminate()
         self.console.wait(20)
         stamps = list(STAMP.iter_unpack(Path(self.folder, "stamps").read_bytes()))
-        cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before)]
+        cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before, strict=False)]
         self.lines_per_s, self.not_taken = lines, self.gateway.count[3]
         return self.judge(stamps, begin_us, end_us, cpu, memory)
 
@@ -309,7 +312,7 @@ class Load:
         for _ in range(15):
             before = self.times()
             time.sleep(2)
-            if sum(now - then for now, then in zip(self.times()[:2], before[:2])) < 0.02 + self.machines / 20000:
+            if sum(now - then for now, then in zip(self.times()[:2], before[:2], strict=False)) < 0.02 + self.machines / 20000:
                 return
 
     def judge(self, stamps, begin_us, end_us, cpu, memory):
@@ -321,7 +324,7 @@ class Load:
                 states.setdefault(boot, []).append(at_us - late_us)
         for told in states.values():
             told.sort()
-            missing += sum(max(0, round((later - before) / 1000 / self.every_ms) - 1) for before, later in zip(told, told[1:]))
+            missing += sum(max(0, round((later - before) / 1000 / self.every_ms) - 1) for before, later in itertools.pairwise(told))
         stops = [(boot, number) for _, boot, _, number, _, _ in stamps if number]
         self.row = {"kind": self.kind, "machines": self.machines, "every_ms": self.every_ms, "states": sum(map(len, states.values())), "missing": missing, "heard": len(states),
                     "kB_s": sum(stamp[4] for stamp in inside) / (end_us - begin_us) * 1000, "cpu": cpu, "memory": memory,
@@ -339,10 +342,8 @@ class Load:
                     child.send_signal(number)
             end = time.monotonic() + 10
             for child in self.children:
-                try:
+                with contextlib.suppress(subprocess.TimeoutExpired):
                     child.wait(max(0.01, end - time.monotonic()))
-                except subprocess.TimeoutExpired:
-                    pass
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
@@ -367,7 +368,7 @@ def run_load(rig, seconds, **load):
         row = one.measure(seconds)
     finally:
         one.close()
-    print("        " + ", ".join(f"{name} {cell}" for name, cell in zip(HEAD, cells(row))), flush=True)
+    print("        " + ", ".join(f"{name} {cell}" for name, cell in zip(HEAD, cells(row), strict=False)), flush=True)
     sent, arrived, doubled = row["stops"]
     assert arrived == sent > 0 and doubled == 0, row
     assert row["heard"] == load["machines"] and row["missing"] <= row["states"] / 20, row
@@ -421,7 +422,7 @@ def main():
                     rows.append(cells(load.measure(options.seconds)))
                 finally:
                     load.close()
-                print(", ".join(f"{name} {cell}" for name, cell in zip(HEAD, rows[-1])))
+                print(", ".join(f"{name} {cell}" for name, cell in zip(HEAD, rows[-1], strict=False)))
                 print(f"        a bridge: {load.bridge_kB[0] / 1000:.1f} MB, of which its own and its share of what is shared {load.bridge_kB[1] / 1000:.1f} MB; "
                       f"{load.not_taken} lines not taken", flush=True)
                 if options.update:

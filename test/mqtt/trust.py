@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: MIT
 """What a broker does not accept, who may be the broker, whose name and files are used, and which refusals are reported."""
 
-import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-from bridge import arm, make_certificates as sign, make_stops, numbers, settle, steer, turns
-from console import Far5, lines, console, write_config
-from fleet import FLEET, HOSTS, Cluster, certificates, fleet_far, start_fleet_broker, use_tls, with_certificate
+from bridge import arm, make_certificates as sign, make_stops, numbers, steer, turns
+from console import console, write_config
+from fleet import HOSTS, Cluster, certificates, fleet_far, start_fleet_broker, use_tls, with_certificate
 from harness import Process
 from mqtt_rig import ID, Far, Line, paho
 from trials import Skip, needs, until
@@ -261,7 +259,9 @@ def test_key_that_others_may_read_is_refused(rig):
     write_settings(rig, host="localhost", ca=rig.path("ca.pem"), certificate=rig.path("machine.pem"), key=str(key))
     for mode, code in ((0o644, 77), (0o640, 77 if os.geteuid() else 0), (0o600, 0)):
         key.chmod(mode)
-        assert check(rig)[0] == code and rig.start_bridge().child.poll() is None or code, (oct(mode), check(rig))
+        said = check(rig)
+        assert said[0] == code, (oct(mode), said)
+        assert code or rig.start_bridge().child.poll() is None, oct(mode)
         rig.bridge and rig.bridge.end()
 
 
@@ -270,8 +270,8 @@ def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
     spool, other = Path(rig.path("spool")), Path(rig.path("other"))
     other.write_text("of somebody", encoding="ascii")
     for prepare, undo in ((lambda: spool.chmod(0o777), lambda: spool.chmod(0o700)), (lambda: os.chown(spool, STRANGER, -1), lambda: os.chown(spool, 0, -1)),
-                          (lambda: (spool / "events").write_bytes(b"") or os.chown(spool / "events", STRANGER, -1), lambda: (spool / "events").unlink()),
-                          (lambda: os.link(other, spool / "events"), lambda: (spool / "events").unlink())):
+                          (lambda: (spool / "events").write_bytes(b"") or os.chown(spool / "events", STRANGER, -1), (spool / "events").unlink),
+                          (lambda: os.link(other, spool / "events"), (spool / "events").unlink)):
         prepare()
         code = rig.start_bridge().wait(5)
         assert code == 73 and "belongs to another user" in rig.words(), (code, rig.words())

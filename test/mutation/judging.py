@@ -29,12 +29,6 @@ def digest(text):
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def versions():
-    """The compilers that prove what is the same code."""
-    return [subprocess.run([name, "-dumpfullversion" if name == "gcc" else "-dumpversion"], capture_output=True, text=True,
-                           check=True).stdout.strip() for name in ("gcc", "clang")]
-
-
 INCLUDED = re.compile(r'^#include "([^"]+)"', re.M)
 
 
@@ -70,12 +64,6 @@ class Judge:
         self.reach = {name: reach(sources) for name, sources in judges.programs.items()}
         self.optimised = {}
 
-    def expect(self, record):
-        """Those that saw a function's mutants before are asked first."""
-        for key, verdict in record.before.items():
-            if verdict.program in self.judges.tests:
-                self.kills[record.mutants[key].file, record.mutants[key].function][verdict.program] += 1
-
     def clean(self):
         """What the judges have against the core as it is; they are worth nothing then."""
         found = self.judges.failing(self.judges.clean, sorted(self.judges.tests))
@@ -108,7 +96,7 @@ class Judge:
                 clean.mkdir(parents=True, exist_ok=True)
                 (clean / file).write_text(self.sources[file])
                 self.optimised[file] = list(self.objects_of(clean, file))
-        return any(changed == clean for changed, clean in zip(self.objects_of(folder, file), self.optimised[file]))
+        return any(changed == clean for changed, clean in zip(self.objects_of(folder, file), self.optimised[file], strict=True))
 
     def killed(self, core, mutant, names):
         found = self.judges.failing(core, names)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Bugs as people make them around the core: in daemon, Linux port and STM32 driver. One change each, by meaning rather than by operator."""
+import itertools
 import re
 
 from mutants import SIDES, Finder
@@ -124,7 +125,7 @@ class Meanings(Finder):
 
     def mean_CallExpr(self, node):
         arguments = node["inner"][1:]
-        for one, other in zip(arguments, arguments[1:]):
+        for one, other in itertools.pairwise(arguments):
             a, b = self.span(one), self.span(other)
             if a and b and one["type"]["qualType"] == other["type"]["qualType"]:
                 self.add("arguments swapped", (a[0], b[1]), self.source[slice(*b)] + self.source[a[1]:b[0]] + self.source[slice(*a)])

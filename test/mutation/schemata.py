@@ -10,11 +10,11 @@ import re
 from core_build import NUMBER
 from mutants import function_spans
 
-WHICH = """extern char *getenv(const char *);
+WHICH = f"""extern char *getenv(const char *);
 extern int atoi(const char *);
 int iw_mutant;
-__attribute__((constructor)) static void iw_choose_mutant(void) { const char *text = getenv("%s"); iw_mutant = text ? atoi(text) : 0; }
-""" % NUMBER
+__attribute__((constructor)) static void iw_choose_mutant(void) {{ const char *text = getenv("{NUMBER}"); iw_mutant = text ? atoi(text) : 0; }}
+"""
 TOLD = "extern int iw_mutant;\n"
 
 

@@ -12,15 +12,15 @@ LOOPBACK = """<CycloneDDS><Domain Id="any"><General><Interfaces><NetworkInterfac
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address="localhost"/></Peers></Discovery></Domain></CycloneDDS>"""
 os.environ["CYCLONEDDS_URI"] = LOOPBACK  # Before cyclonedds is there.
 
-from cyclonedds._clayer import ddspy_take  # noqa: E402
-from cyclonedds.core import Listener, Policy, Qos  # noqa: E402
-from cyclonedds.domain import DomainParticipant  # noqa: E402
-from cyclonedds.idl import make_idl_struct, types  # noqa: E402
-from cyclonedds.pub import DataWriter  # noqa: E402
-from cyclonedds.sub import DataReader  # noqa: E402
-from cyclonedds.topic import Topic  # noqa: E402
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
-from rosbags.interfaces import Nodetype  # noqa: E402
+from cyclonedds._clayer import ddspy_take
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import make_idl_struct, types
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.interfaces import Nodetype
 
 BASES = {
     "bool": bool, "byte": types.uint8, "char": types.uint8, "uint8": types.uint8, "int8": types.int8, "int32": types.int32,

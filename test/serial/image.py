@@ -10,6 +10,7 @@ the image did what the chip forbids.
 
 A machine that is too busy for it makes the board's time pass more slowly, and nothing is late in that time: so it is the one to judge by.
 """
+import contextlib
 import os
 import socket
 import sys
@@ -20,10 +21,10 @@ TARGET = Path(__file__).resolve().parent.parent / "target"
 sys.path.insert(0, str(TARGET))
 sys.dont_write_bytecode = True
 
-from emulator.boards import BOARDS  # noqa: E402
-from emulator.can import Controller, load_model  # noqa: E402
-from emulator.chip import PINRSTF  # noqa: E402
-from emulator.machine import Machine  # noqa: E402
+from emulator.boards import BOARDS
+from emulator.can import Controller, load_model
+from emulator.chip import PINRSTF
+from emulator.machine import Machine
 
 BAUD = 1_000_000
 SLICE_NS = 2_000_000
@@ -82,10 +83,8 @@ class Board:
         machine = self.machine
         self.unread = (self.unread + bytes(machine.uart.sent))[-65536:]
         machine.uart.sent.clear()
-        try:
+        with contextlib.suppress(BlockingIOError, ConnectionError):
             self.unread = self.unread[self.line.send(self.unread):] if self.unread else b""
-        except (BlockingIOError, ConnectionError):
-            pass
         for _ in machine.resets[self.resets:]:
             self.happened("start")
             if self.was_sending:
@@ -120,10 +119,8 @@ def main(board, image, library, link_fd):
     line, link = socket.socket(fileno=0), socket.socket(fileno=int(link_fd))
     line.setblocking(False)
     link.setblocking(False)
-    try:
+    with contextlib.suppress(ConnectionError):  # The rig has ended.
         Board(machine, line, link).run()
-    except ConnectionError:
-        pass  # The rig has ended.
     os._exit(0)  # Nothing to be kept, and the emulator's own end takes its time.
 
 

@@ -25,7 +25,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 SOURCE = os.path.join(HERE, "verdict.py")
 sys.path.insert(0, HERE)
 sys.dont_write_bytecode = True
-import verdict  # noqa: E402
+import verdict
 
 AT_US = 3_000_000
 # What the module must decide is tried on copies of it, each with one of these faults: (what, old, new). Each must fail a test below.
@@ -414,7 +414,7 @@ def seed(old, new):
         faulty.__file__ = os.path.join(folder, "verdict.py")  # Sleepers are started from it.
         with open(faulty.__file__, "w", encoding="utf-8") as file:
             file.write(text.replace(old, new))
-        exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)  # pylint: disable=exec-used
+        exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)
         verdict, result = faulty, unittest.TestResult()
         try:
             suite().run(result)

@@ -13,6 +13,7 @@ name, with the stall. The module depends on no runner: a runner passes a functio
     verdict.py --run NAME COMMAND...    the same for a command that is a test
 """
 
+import contextlib
 import os
 import re
 import shutil
@@ -21,7 +22,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 PASSED, FAILED, SKIPPED, INCONCLUSIVE = "passed", "failed", "skipped", "inconclusive"
 RULE, CRASH, TIMING, CHECK = "rule", "crash", "timing", "check"
@@ -54,14 +55,14 @@ class Failure(NamedTuple):
     text: str
     kind: str = CHECK
     at_us: int = 0  # CLOCK_MONOTONIC; 0: at any time in the test
-    need_us: Optional[float] = None
+    need_us: float | None = None
 
 
 class Attempt(NamedTuple):
     """Stalls are pairs (end_us, late_us). `claims` are stalls that a program under test reports; they count only next to a measured one."""
 
     failures: list = []
-    skip: Optional[str] = None
+    skip: str | None = None
     stalls: list = []
     claims: list = []
     begin_us: int = 0
@@ -171,7 +172,7 @@ class Session:
         begin_us = now_us()
         try:
             attempt = self.attempt(name)
-        except Exception as error:  # pylint: disable=broad-except
+        except Exception as error:  # noqa: BLE001
             attempt = Attempt([Failure(f"the runner failed: {error!r}", CRASH)])
         if not attempt.begin_us:
             attempt = attempt._replace(begin_us=begin_us, end_us=now_us())
@@ -179,7 +180,7 @@ class Session:
 
     def again(self, name):
         """(verdict, attempt, how many): of an inconclusive test, alone, until an attempt is conclusive."""
-        for tries in range(1, RETRIES + 1):
+        for tries in range(1, RETRIES + 1):  # noqa: B007
             self.await_quiet()
             verdict, attempt = self.once(name)
             if verdict != INCONCLUSIVE:
@@ -251,10 +252,8 @@ def sleep_on(file, parent):
 
 def sleepers(path, nice):
     """On each processor one, with the priority of what the tests run."""
-    try:
+    with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, nice)
-    except PermissionError:
-        pass
     parent, own, processors = os.getppid(), os.getpid(), sorted(os.sched_getaffinity(0))[:PROCESSORS_MAX]
     with open(path, "a", encoding="ascii", buffering=1) as file:
         for processor in processors[1:]:

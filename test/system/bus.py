@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A passive listener on the local bus: records every frame with the kernel's time stamp, and can send frames as a node of its own."""
 
+import contextlib
 import socket
 import struct
 import threading
@@ -77,9 +78,7 @@ class Bus:
         return next((signed(f.data, 0) for f in reversed(self.frames) if f.id == wanted and not f.own), None)
 
     def close(self):
-        try:
+        with contextlib.suppress(OSError):
             self.socket.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         self.thread.join(2)
         self.socket.close()

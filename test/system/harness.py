@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Starts simulator and gateway in a private folder, keeps the timeline, and ends what it started, by process id."""
 
+import contextlib
 import ctypes
 import glob
 import grp
@@ -16,9 +17,9 @@ import time
 sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))  # verdict.py
 
 from bus import Bus, now_us
-from client import Client, Closed
+from client import Client
 from judge import Judge
-from judge_log import PAIR_REAL_US, Config, Event, percentile
+from judge_log import PAIR_REAL_US, Config, Event
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PR_SET_PDEATHSIG = 1
@@ -87,10 +88,8 @@ def die_with_parent():
 
 def as_a_service():
     """The priority that a service would have, where that is allowed: these processes must not wait for the scenarios."""
-    try:
+    with contextlib.suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, SERVICE_NICE)
-    except PermissionError:
-        pass
 
 
 class Process:

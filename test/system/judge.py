@@ -37,7 +37,7 @@ class Judge(Reading):
             self._motion([s for s in self.setpoints if s.side == side])
             self._slew([s for s in self.setpoints if s.side == side])
         self._pairs()
-        for session, next_us in zip(self.sessions, self._begins[1:] + [self.finished_us]):
+        for session, next_us in zip(self.sessions, [*self._begins[1:], self.finished_us], strict=False):
             self._presence(session, next_us)
         self._listening()
         self._estop()
@@ -109,7 +109,7 @@ class Judge(Reading):
             if number + 1 == len(drives) or drives[number + 1].done_us >= setpoint.t_us - GAP_US
         ]
         wanted = [(drive.left, drive.right)[setpoint.side] for drive in recent]
-        hull = wanted + [0, previous.speed if previous else 0]
+        hull = [*wanted, 0, previous.speed if previous else 0]
         if not min(hull) - 1 <= setpoint.speed <= max(hull) + 1:
             self._say("beyond_command", setpoint.t_us, f"{setpoint.speed} mm/s, commanded {wanted[-1]} mm/s")
 
@@ -258,7 +258,7 @@ class Judge(Reading):
         return any(event.kind in ("silent", "exit") and begin_us < event.t_us <= next_us for event in self.events)
 
     def _no_gap(self, times):
-        for before, after in zip(times, times[1:]):
+        for before, after in itertools.pairwise(times):
             if after <= before or self._is_dead(before, after):
                 continue
             self.gap_max_us = max(self.gap_max_us, after - before)

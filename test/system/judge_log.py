@@ -13,6 +13,7 @@ Times are integer microseconds of CLOCK_MONOTONIC. Timeline events (Event.kind):
 """
 
 import bisect
+import itertools
 import math
 from typing import NamedTuple
 
@@ -147,7 +148,7 @@ class Reading:
     def bus_stalls(self):
         """When the simulated bus stood still, [(until_us, for_us)]: two wheels send a frame every 4 ms each. A scenario may be the cause."""
         times = [frame.t_us for frame in self.frames if frame.id in SPEED_IDS and not frame.own]
-        return [(b, b - a) for a, b in zip(times, times[1:]) if b - a > BUS_STALL_US]
+        return [(b, b - a) for a, b in itertools.pairwise(times) if b - a > BUS_STALL_US]
 
     def machine_stalls(self):
         """When whatever runs the wheels was stalled for certain, [(until_us, for_us)]; a rig that measures it knows."""

@@ -33,7 +33,7 @@ def work(name, build, keep):
         REGISTRY[name][2](test)
     except Skip as reason:
         skip = str(reason)
-    except Exception as error:  # pylint: disable=broad-except
+    except Exception as error:  # noqa: BLE001
         where = traceback.extract_tb(error.__traceback__)
         here = [f"{os.path.basename(step.filename)}:{step.lineno}" for step in where][-3:]
         output = "".join(rig.gateway.text()[-400:] for rig in test.rigs if rig.gateway)

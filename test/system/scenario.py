@@ -3,7 +3,8 @@
 
 import time
 
-from harness import Rig, percentile
+from harness import Rig
+from judge_log import percentile
 from verdict import CHECK, RULE, TIMING, Failure
 
 REGISTRY = {}

@@ -61,9 +61,9 @@ def plan():
 def towards(now, target, config, how):
     if how == "cut":
         return target
-    steps = [t - n for n, t in zip(now, target)]
-    slopes = [config.accel_mm_s2 if abs(t) > abs(n) or n * t < 0 else config.decel_mm_s2 for n, t in zip(now, target)]
-    return tuple(int(n + max(-slope * 0.02, min(slope * 0.02, step))) for n, step, slope in zip(now, steps, slopes))
+    steps = [t - n for n, t in zip(now, target, strict=False)]
+    slopes = [config.accel_mm_s2 if abs(t) > abs(n) or n * t < 0 else config.decel_mm_s2 for n, t in zip(now, target, strict=False)]
+    return tuple(int(n + max(-slope * 0.02, min(slope * 0.02, step))) for n, step, slope in zip(now, steps, slopes, strict=False))
 
 
 def good(config=CONFIG):
@@ -161,10 +161,10 @@ def faults():
     yield "silence in the hold", between(f, 7_500, 7_700, drop), e, "gap"
     yield "hold 300 ms too short", between(f, 8_050, 8_400, drop), e, "gap"
     yield "no hold after an e-stop", between(f, 3_560, 5_100, drop), e, "gap"
-    yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), e + [Event(10_600 * MS, "silent")], "gap", {
+    yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "silent")], "gap", {
         "finished_us": 10_700 * MS
     }
-    yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), e + [Event(10_600 * MS, "exit")], "gap", {
+    yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "exit")], "gap", {
         "finished_us": 10_700 * MS
     }
     yield "hold that never ends", add(f, *stream), e, "no_silence"
@@ -203,22 +203,14 @@ def faults():
     yield "driving on after stop", between(f, 6_700, 7_600, with_data(1, 200)), e, "nonzero_after_ramp"
     yield "driving on after the lease", f, without(e, "drive", 2_000, 3_510), "lease"
     yield "a drive accepted after the lease", f, without(e, "drive", 2_000, 2_900), "late_drive"
-    yield "a drive accepted after the e-stop", f, e + [
-        Event(3_900 * MS, "drive", 3_901 * MS, left=100, right=100)
-    ], "drive_after_end"
+    yield "a drive accepted after the e-stop", f, [*e, Event(3900 * MS, "drive", 3901 * MS, left=100, right=100)], "drive_after_end"
     yield "an unknown id", add(f, Frame(2_000 * MS, 267, bytes(5))), e, "unknown_id"
     yield "a remote setpoint", add(f, Frame(2_000 * MS, LEFT | 0x40000000, b"")), e, "unknown_id"
     yield "an extended setpoint", add(f, Frame(2_000 * MS, LEFT | 0x80000000, bytes(5))), e, "unknown_id"
-    yield "sending after the process died", f, e + [Event(3_000 * MS, "end")], "nonzero_after_killed"
-    yield "a latching fault answered late", f, e + [Event(3_000 * MS, "cut", within_us=100 * MS)], "nonzero_after_cut"
-    yield "old setpoints out of a queue", f, e + [
-        Event(2_500 * MS, "dead"),
-        Event(3_300 * MS, "alive", 3_300 * MS),
-    ], "motion_on_dead_bus"
-    yield "a bus that lives again before it died", f, e + [
-        Event(2_500 * MS, "alive", 2_500 * MS),
-        Event(2_501 * MS, "dead"),
-    ], "timeline"
+    yield "sending after the process died", f, [*e, Event(3000 * MS, "end")], "nonzero_after_killed"
+    yield "a latching fault answered late", f, [*e, Event(3000 * MS, "cut", within_us=100 * MS)], "nonzero_after_cut"
+    yield "old setpoints out of a queue", f, [*e, Event(2500 * MS, "dead"), Event(3300 * MS, "alive", 3300 * MS)], "motion_on_dead_bus"
+    yield "a bus that lives again before it died", f, [*e, Event(2500 * MS, "alive", 2500 * MS), Event(2501 * MS, "dead")], "timeline"
     off = [
         Event(9_500 * MS, "dead"),
         Event(9_500 * MS, "cut", within_us=50 * MS),
@@ -235,10 +227,8 @@ def faults():
     yield "old frames again and again", add(
         dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)
     ), e + off, "nonzero_after_cut"
-    yield "motion after a restart", add(f, *pair(12_120, 50, 50)), e + [
-        Event(12_100 * MS, "restart_hold")
-    ], "motion_without_drive"
-    yield "no zeros after a crash while armed", f, e + [Event(12_100 * MS, "restart_hold")], "never_sent"
+    yield "motion after a restart", add(f, *pair(12_120, 50, 50)), [*e, Event(12100 * MS, "restart_hold")], "motion_without_drive"
+    yield "no zeros after a crash while armed", f, [*e, Event(12100 * MS, "restart_hold")], "never_sent"
     yield "nonzero current in a zero", between(
         good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)
     ), e, "nonzero_after_ramp", {"config": CONFIG._replace(role="setpoint")}
@@ -298,5 +288,5 @@ def run():
 
 if __name__ == "__main__":
     checks, wrong = run()
-    print("\n".join(wrong + [f"{checks} logs judged, {len(wrong)} wrongly"]))
+    print("\n".join([*wrong, f"{checks} logs judged, {len(wrong)} wrongly"]))
     raise SystemExit(1 if wrong else 0)

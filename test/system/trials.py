@@ -15,7 +15,7 @@ from judge_log import LEFT, RIGHT
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.append(str(ROOT / "test/support"))
-import verdict  # noqa: E402
+import verdict
 
 
 class Skip(Exception):
@@ -83,7 +83,7 @@ def longest_gap_ms(rig, since_us):
     gaps = []
     for wheel in (LEFT, RIGHT):
         times = [since_us] + [t_us for t_us, id_, _ in rig.bus.setpoints(since_us) if id_ == wheel and t_us < until_us]
-        gaps += [after - before for before, after in zip(times, times[1:] + [until_us])]
+        gaps += [after - before for before, after in zip(times, [*times[1:], until_us], strict=False)]
     return max(gaps) / 1000
 
 
@@ -109,7 +109,7 @@ def attempt(function, make_rig):
         return verdict.Attempt()
     except Skip as reason:
         return verdict.Attempt(skip=str(reason))
-    except Exception as error:  # pylint: disable=broad-except
+    except Exception as error:  # noqa: BLE001
         logs = [rig.words()[-800:], rig.gateway.text()[-800:] if rig.gateway else ""] if rig else []
         return verdict.of_text("\n".join([f"{type(error).__name__}: {error}", traceback.format_exc(limit=-4), *logs]))
     finally:

@@ -101,7 +101,7 @@ def attempt(function, *arguments):
     except AssertionError as error:
         line = traceback.extract_tb(error.__traceback__)[-1]
         return f"{error or line.line} (line {line.lineno} of {Path(line.filename).name})"
-    except Exception:
+    except Exception:  # noqa: BLE001
         return traceback.format_exc()
     return None
 
@@ -138,8 +138,8 @@ def groups(chosen, full):
     for board in BOARDS:
         for image, several in scenarios.BY_BOARD[board].items():
             for scenario in several:
-                if board in chosen or f"{board}.{scenario.__name__}" in chosen or not chosen and (
-                        full or board != "stm32f407" or scenario not in scenarios.LONG):
+                if board in chosen or f"{board}.{scenario.__name__}" in chosen or (not chosen and (
+                        full or board != "stm32f407" or scenario not in scenarios.LONG)):
                     found.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
     return sorted(((*alike[:3], several) for alike, several in found.items()), key=lambda group: -len(group[3]))
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
+import itertools
 import random
 
 import beginnings
@@ -239,6 +240,42 @@ def estop_random(rig):
     rig.note(f"edge to zero on the bus at most {worst_ns / MS:.2f} ms")
 
 
+FLOODS = {"config, all keys": {"cmd": "config"}, "config, one key": {"cmd": "config", "key": "drive.max_speed_mm_s"},
+          "config, staged": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 400}, "config, refused": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000},
+          "config, no such key": {"cmd": "config", "key": "drive.lease", "value": 1}, "config, discarded": {"cmd": "config", "commit": False},
+          "config, committed in motion": {"cmd": "config", "commit": True}, "hello": {"cmd": "hello", "name": "a name as long as names may be"}, "status": {"cmd": "status"},
+          "watch": {"cmd": "watch", "topics": ["state", "stop", "estop", "force", "bus", "lease"], "rate_hz": 100}, "why": {"cmd": "why"}, "arm": {"cmd": "arm", "name": "again"},
+          "tare": {"cmd": "tare"}, "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"}, "reset": {"cmd": "reset"}, "unknown": {"cmd": "nonsense"},
+          "text that is no object": b'[1,2,{"cmd":"drive","left_mm_s":100}]', "bytes that are no text": bytes(range(128, 192))}
+
+
+def estop_in_floods(rig):
+    """The line is full of one kind of request, from the driver's channel and another: zero within 5 ms of the edge at any phase of the loop."""
+    host, chance, worst = start_driving(rig), random.Random(49), {}
+    host.open(2)
+    for name, message in FLOODS.items():
+        for _ in range(3):
+            host.keep_driving(SPEED, 300)
+            for turn in range(40): # At least 10 ms of the line, and more than the receive buffer.
+                host.say(2 if turn % 2 else 1, message)
+            rig.run(2 * MS + chance.randrange(3000) * US)
+            assert rig.setpoints()[-1].setpoint()[0] == SPEED, "the wheels are not driven"
+            rig.machine.board.drive("estop", None)
+            pressed_ns = rig.machine.now_ns
+            rig.run(60 * MS)
+            host.listen()
+            zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
+            worst[name] = max(worst.get(name, 0), zero.time_ns - pressed_ns)
+            assert not moving(rig, zero.time_ns), "motion after the e-stop"
+            rig.machine.board.drive("estop", 0)
+            rig.run(1900 * MS)
+            assert host.ask(1, {"cmd": "reset"}, 600)["ok"], host.lines[-1].message
+            host.arm()
+    late = {name: round(span_ns / MS, 2) for name, span_ns in worst.items() if span_ns > EDGE_TO_ZERO_NS}
+    assert not late, f"first zero later than 5 ms after the edge, in ms: {late}"
+    rig.note("edge to zero in ms at most: " + ", ".join(f"{name} {span_ns / MS:.2f}" for name, span_ns in worst.items()))
+
+
 def software_estop(rig):
     """estop needs no lease; its reason comes back; reset and arm do not move."""
     host = start_driving(rig)
@@ -260,7 +297,7 @@ def reset_in_motion(rig):
     """Both resets while the wheels turn: zeros first, another boot, and commands of before feed nothing."""
     host = start_driving(rig)
     boots = {host.boot}
-    for reset in (lambda: rig.machine.reset("pin", PINRSTF), lambda: rig.machine.divert()):
+    for reset in (lambda: rig.machine.reset("pin", PINRSTF), rig.machine.divert):
         reset()
         reset_ns = rig.machine.now_ns
         old = host.boot
@@ -467,7 +504,7 @@ def hostile_line(rig):
     kept, begun_ns = [], rig.machine.now_ns
     good = None
     count = 0
-    for turn in range(60):
+    for _ in range(60):
         for _ in range(12):
             good = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 777, "right_mm_s": 777})) + b"\n"
             kept.append(good)
@@ -548,7 +585,7 @@ def crowd(rig):
     frames = rig.setpoints(begun_ns + 200 * MS)
     assert frames and all(frame.setpoint()[0] == SPEED for frame in frames), "the crowd disturbed the driver"
     times = [frame.time_ns for frame in frames if frame.id == LEFT]
-    gap_ns = max(b - a for a, b in zip(times, times[1:]))
+    gap_ns = max(b - a for a, b in itertools.pairwise(times))
     assert gap_ns < 30 * MS, f"a gap of {gap_ns / MS:.1f} ms"
     assert host.events("lost"), "losses were not told"
     served = {line.channel for line in host.lines if line.message.get("id") is not None and "left" in line.message}
@@ -557,5 +594,5 @@ def crowd(rig):
 
 
 SCENARIOS = (talks, both_words_and_turns, lease_alone, close_ends, silent_relay, relay_killed_and_anew, relay_stopped_goes_on, stale_in_every_way,
-             nobody_feeds_another, estop_random, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, learnt_in_flash, power_cut_while_learning, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
-LONG = (both_words_and_turns, estop_random, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)
+             nobody_feeds_another, estop_random, estop_in_floods, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, learnt_in_flash, power_cut_while_learning, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
+LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)

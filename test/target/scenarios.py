@@ -3,6 +3,7 @@
 
 Verdicts are passed on the bus, the lamp and the count of resets: on what can be seen from outside.
 """
+import itertools
 import re
 
 import beginnings
@@ -25,7 +26,7 @@ def assert_zero(frames):
 
 def assert_pairs(frames):
     """Left and right alternate, the right one within a millisecond."""
-    for left, right in zip(frames[0::2], frames[1::2]):
+    for left, right in zip(frames[0::2], frames[1::2], strict=False):
         assert (left.id, right.id) == (LEFT, RIGHT), f"no pair at {left.time_ns / MS:.3f} ms"
         assert right.time_ns - left.time_ns < MS, f"the right setpoint is late at {right.time_ns / MS:.3f} ms"
     for frame in frames:
@@ -34,7 +35,7 @@ def assert_pairs(frames):
 
 def assert_gaps(frames, longest_ns, side=LEFT):
     times = [frame.time_ns for frame in frames if frame.id == side]
-    worst = max((b - a for a, b in zip(times, times[1:])), default=0)
+    worst = max((b - a for a, b in itertools.pairwise(times)), default=0)
     assert times and worst <= longest_ns, f"a gap of {worst / MS:.1f} ms between setpoints"
 
 
@@ -587,7 +588,7 @@ def crystal_dies(rig):
     died_ns = rig.machine.now_ns
     rig.machine.clocks.set_crystal(False)
     rig.run(500 * MS)
-    assert not [frame for frame in rig.setpoints(died_ns + 2 * MS)], "it went on sending"
+    assert not list(rig.setpoints(died_ns + 2 * MS)), "it went on sending"
     rig.machine.clocks.set_crystal(True)
     back_ns = rig.machine.now_ns
     rig.run(3 * SECOND)

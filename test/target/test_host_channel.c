@@ -95,6 +95,17 @@ static void test_flash_is_not_written_while_an_arm_waits(void) {
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
 }
 
+static void test_take_of_two_lines_carries_out_one_a_time(void) {
+    say(1, "{\"cmd\":\"hello\",\"id\":1}");
+    say(1, "{\"cmd\":\"hello\",\"id\":2}");
+    answer[0] = '\0';
+    TEST_ASSERT_TRUE(iw_host_take(&host, rig.now_us));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":1"), answer);
+    TEST_ASSERT_TRUE(iw_host_take(&host, rig.now_us));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":2"), answer);
+    TEST_ASSERT_FALSE(iw_host_take(&host, rig.now_us));
+}
+
 static void test_channel_that_only_watches_may_not_arm(void) {
     run_until_listening();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
@@ -207,6 +218,7 @@ int main(void) {
     RUN_TEST(test_channel_of_a_relay_that_is_alive_stays);
     RUN_TEST(test_command_older_than_a_short_lease_is_stale);
     RUN_TEST(test_command_within_a_long_lease_is_not_stale);
+    RUN_TEST(test_take_of_two_lines_carries_out_one_a_time);
     RUN_TEST(test_channel_that_only_watches_may_not_arm);
     RUN_TEST(test_channel_closed_leaves_the_others);
     RUN_TEST(test_flash_is_not_written_while_an_arm_waits);

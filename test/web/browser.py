@@ -32,7 +32,7 @@ def page_of(rig, size="desk", scheme="light", url=None, **device):
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
         try:
-            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size])), color_scheme=scheme, accept_downloads=True, **device)
+            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size], strict=False)), color_scheme=scheme, accept_downloads=True, **device)
             page.set_default_timeout(15000)
             page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
             page.on("pageerror", lambda error: said.append(str(error)))
@@ -339,7 +339,7 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
         assert page.evaluate(newest) == frozen
         page.focus("#left .plot [role=img]")
         page.keyboard.press("+")
-        seen(page, f"plots.left.speed.uplot.scales.x.max - plots.left.speed.uplot.scales.x.min < 31")
+        seen(page, "plots.left.speed.uplot.scales.x.max - plots.left.speed.uplot.scales.x.min < 31")
         page.click("#live")
         seen(page, f"{newest} > {frozen}")
         for ending, least in (("CSV", 100), ("PNG", 1000)):

@@ -13,9 +13,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
-from bus import now_us  # noqa: E402
-from harness import Process, Rig  # noqa: E402
-from trials import until  # noqa: E402
+from bus import now_us
+from harness import Process, Rig
+from trials import until
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}

@@ -17,7 +17,6 @@
 
 #define SHORTEST_US 500000U
 #define LONGEST_US  30000000U
-#define GREETING_US 10000000U
 /// A connection that ends before this after it was accepted is a short one; so many in a row are mentioned, once a minute.
 #define SHORT_US      2000000U
 #define SHORT_MAX     3U
@@ -289,7 +288,7 @@ static void end_connecting(mqtt_broker_t *self) {
         return;
     }
     self->state = MQTT_GREETING;
-    self->until_us = self->now_us + GREETING_US;
+    self->until_us = self->now_us + MQTT_GREETING_US;
 }
 
 // ---- working ------------------------------------------------------------------------------------------------------

@@ -18,6 +18,9 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+/// A broker that has not answered for so long after the connection was made is lost, and the next host is tried.
+#define MQTT_GREETING_US 10000000U
+
 /// What MQTT 5 carries beside a message; by 3.1.1 nothing of it is sent, and nothing comes.
 typedef struct {
     uint32_t expiry_s; ///< The broker drops what it could not deliver in this time; 0: never. Not read of what comes.

@@ -19,8 +19,9 @@
 /// The stream is read from so long before the span: a machine's clock may be ahead of the servers', and a gap at the beginning of the span
 /// shows only by the event before it. Of a single machine all of it is read.
 #define AHEAD_US 86400000000LL
-/// For the broker to accept the connection, and from then on for the next retained message.
-#define INFO_UP_US   5000000U
+/// Each host gets the time that a broker has for its greeting, so that one host without an answer does not hide the next one.
+#define INFO_HOST_US (MQTT_GREETING_US + 1000000U)
+/// The longest wait for the next retained message, from the accepted connection on.
 #define INFO_NEXT_US 1000000U
 
 typedef struct {
@@ -189,15 +190,19 @@ static void info_came(void *context, const struct mosquitto_message *message, co
 /// What the machines retain of themselves at the broker. Without a broker the history says that its end is not checked. An exit code.
 static int read_info(const mqtt_settings_t *settings, const fleet_wanted_t *wanted, history_t *history) {
     static mqtt_broker_t broker; // A thread of it may wait for the network longer than this function.
-    asking_info_t self = {history, bridge_now_us() + INFO_UP_US};
+    asking_info_t self = {history, bridge_now_us()};
     char topic[64];
     char name[40];
+    char host[MQTT_HOST_SIZE];
     const char *const topics[] = {topic, NULL};
     const mqtt_broker_listener_t listener = {
         "iwheel-fleet",       name,     topics, NULL, &self, info_up, fleet_ignore, fleet_ignore_sent,
         fleet_ignore_refused, info_came};
     (void)snprintf(topic, sizeof topic, "iwheel/%s/info", (wanted->span.machine != NULL) ? wanted->span.machine : "+");
     (void)snprintf(name, sizeof name, "iwheel-fleet-history-%d", (int)getpid());
+    for (size_t i = 0; mqtt_settings_host(settings, i, host); i++) {
+        self.until_us += INFO_HOST_US;
+    }
     const int code = mqtt_broker_open(&broker, settings, &listener);
     while (code == 0 && bridge_now_us() < self.until_us) {
         bool writes = false;

@@ -38,9 +38,8 @@ static relay_channel_t *free_channel(relay_t *self) {
 
 static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
     gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
-    iwn_refusal_t refusal = {.error = IWN_BUS_DOWN};
-    iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
-    IWN_TEXT_JOIN(&text, "no board on the serial line: ", why);
+    iwn_refusal_t refusal;
+    (void)IWN_REFUSE(&refusal, IWN_BUS_DOWN, "no board on the serial line: ", why);
     gw_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
     gw_client_finish(client, self->now_us);
 }
@@ -196,13 +195,12 @@ static void pass_reply(relay_t *self, gw_client_t *owner, const serial_request_t
 static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *client) {
     const serial_request_t *request;
     while ((request = serial_queue_answered(&channel->queue)) != NULL) {
-        iwn_refusal_t refusal = {.error = request->error};
         if (request->state == SERIAL_HELD) {
             pass_reply(self, client, request, request->json, request->length);
         } else {
-            iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
-            IWN_TEXT_JOIN(&text, request->reason);
+            iwn_refusal_t refusal;
             gw_client_t *who = relay_guest_or(self, client, request);
+            (void)IWN_REFUSE(&refusal, request->error, request->reason);
             if (who != NULL) {
                 gw_clients_refuse(&self->clients, who, &request->id, &refusal);
             }

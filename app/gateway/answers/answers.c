@@ -62,35 +62,29 @@ void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, si
     }
 }
 
-static bool refuse(iwn_server_t *server, iwn_error_t error, const char *message) {
-    server->refusal.error = error;
-    (void)snprintf(server->refusal.message, sizeof server->refusal.message, "%s", message);
-    return false;
-}
-
 /// A request that permits motion and waited here, behind an earlier one of its client, is not to undo a stop that came meanwhile. Each
 /// arm gets a key of its own.
 bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     gw_answers_t *self = gw_answers_of(server);
     const bool arms = server->request.cmd == IWN_CMD_ARM;
     if (arms && self->wheels->shutting_down) {
-        return refuse(server, IWN_DENIED, "the gateway is shutting down; wait until it is started again");
+        return IWN_REFUSE(&server->refusal, IWN_DENIED, "the gateway is shutting down; wait until it is started again");
     }
     if (gw_client_waited_through_stop(gw_answers_connection(self, client))) {
-        return refuse(
-            server, IWN_STALE_COMMAND,
+        return IWN_REFUSE(
+            &server->refusal, IWN_STALE_COMMAND,
             "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send "
             "it anew");
     }
     return !arms || gw_grant_draw_key(self->key) ||
-           refuse(server, IWN_INTERNAL,
-                  "the kernel has no random numbers for a key yet; wait a second, then arm again");
+           IWN_REFUSE(&server->refusal, IWN_INTERNAL,
+                      "the kernel has no random numbers for a key yet; wait a second, then arm again");
 }
 
 bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const char *key) {
     return gw_grant_is_same_key(key, ((const gw_served_t *)client)->key) ||
-           refuse(
-               server, IWN_NOT_HOLDER,
+           IWN_REFUSE(
+               &server->refusal, IWN_NOT_HOLDER,
                "the key is not the one that the reply to the last arm gave; arm, and drive with the key of its reply");
 }
 
@@ -202,9 +196,9 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
         gw_recordings_ask(self, client);
         break;
     default: // A file that an administrator writes is not to be changed by whoever may drive.
-        (void)refuse(server, IWN_DENIED,
-                     "this gateway's configuration is a file: change it, look at it with "
-                     "iwheel-gateway --check -c FILE, and start the gateway again");
+        (void)IWN_REFUSE(&server->refusal, IWN_DENIED,
+                         "this gateway's configuration is a file: change it, look at it with "
+                         "iwheel-gateway --check -c FILE, and start the gateway again");
         iwn_server_refuse(server, client, &server->request.id);
         break;
     }
@@ -259,7 +253,7 @@ static void welcome(void *context, gw_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);
     memset(served, 0, sizeof *served);
-    iwn_server_welcome(&self->server, &served->client, connection->id, connection->right == GW_WATCH);
+    iwn_server_welcome(&served->client, connection->id, connection->right == GW_WATCH);
     if (connection->right != GW_STOP) {
         self->server.now_us = self->wheels->now_us;
         iwn_server_hello(&self->server, &served->client);

@@ -7,9 +7,7 @@
 #include <string.h>
 
 static void refuse(gw_answers_t *self, iwn_client_t *client, const iwn_id_t *id, iwn_error_t error, const char *words) {
-    iwn_refusal_t *refusal = &self->server.refusal;
-    refusal->error = error;
-    (void)snprintf(refusal->message, sizeof refusal->message, "%.*s", (int)sizeof refusal->message - 1, words);
+    (void)IWN_REFUSE(&self->server.refusal, error, words);
     iwn_server_refuse(&self->server, client, id);
 }
 

@@ -248,14 +248,11 @@ void gw_knowledge_tend(gw_knowledge_t *self) {
 static void refuse(iw_ledger_item_t item, gw_found_t verdict, iwn_refusal_t *out_refusal) {
     const char *name = iwn_ledger_item_name(item);
     if (verdict == GW_FOUND_UNSET) {
-        out_refusal->error = IWN_TYPE_NOT_SET;
-        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
-                       "%s is not configured, so there is nothing to confirm; set it under [wheels] first", name);
+        (void)IWN_REFUSE(out_refusal, IWN_TYPE_NOT_SET, name,
+                         " is not configured, so there is nothing to confirm; set it under [wheels] first");
     } else {
-        out_refusal->error = IWN_BAD_VALUE;
-        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
-                       "value of %s must be %s; leave it out to confirm what is configured", name,
-                       gw_assumption_values(item));
+        (void)IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "value of ", name, " must be ", gw_assumption_values(item),
+                         "; leave it out to confirm what is configured");
     }
 }
 

@@ -7,12 +7,14 @@ No task runs behind the program's back, and nothing repeats a command: when the 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import time
 import warnings
 from collections import deque
 from types import TracebackType
-from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, Union, cast
+from typing import Any, cast
+from collections.abc import AsyncIterator, Generator, Mapping
 
 from ._connection import EVENTS_KEPT, ends_in_children
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
@@ -60,21 +62,21 @@ class _Stream(asyncio.Protocol):
 
     def __init__(self, path: str, sock: socket.socket) -> None:
         self.path = path
-        self.hello: "asyncio.Future[Message]" = asyncio.get_running_loop().create_future()
+        self.hello: asyncio.Future[Message] = asyncio.get_running_loop().create_future()
         """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
         self.hello.add_done_callback(_retrieved)
         self.arms = 0
         self.told = False
         """That it ended, to whoever reads the events."""
         self.came = asyncio.Event()
-        self.events: Deque[Event] = deque()
-        self.error: Optional[GatewayUnavailable] = None
+        self.events: deque[Event] = deque()
+        self.error: GatewayUnavailable | None = None
         self._lost = 0
         self._latest = False
         self._wire = Wire()
-        self._waiting: Dict[int, "asyncio.Future[Message]"] = {}
+        self._waiting: dict[int, asyncio.Future[Message]] = {}
         self._socket, self._loop = sock, asyncio.get_running_loop()
-        self._transport: Optional[asyncio.Transport] = None
+        self._transport: asyncio.Transport | None = None
         ends_in_children(self)
 
     @classmethod
@@ -104,10 +106,8 @@ class _Stream(asyncio.Protocol):
     def close(self, reason: str = "the connection is closed") -> None:
         """Ends the connection, and with it the lease, if it was ours. Works from any thread, with any state of the loop."""
         error = GatewayUnavailable(f"{self.path}: {reason}")
-        try:
+        with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            pass
         if self._loop.is_closed():
             self.error = self.error or error
             self._socket.close()
@@ -120,18 +120,18 @@ class _Stream(asyncio.Protocol):
         self.error = GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
         self._socket.close()
 
-    def post(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> "asyncio.Future[Message]":
+    def post(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> asyncio.Future[Message]:
         """Hands the request over at once; its reply comes with the future. NoAnswer, with the connection closed, if it does not come in time."""
         if not self.open or self._transport is None:
             raise self.error or GatewayUnavailable(f"{self.path}: the connection is closed")
         if _running_loop() is not self._loop:
             raise RuntimeError("this AsyncGateway belongs to another event loop; give each event loop its own")
         number, line = self._wire.request(cmd, fields)
-        future: "asyncio.Future[Message]" = self._loop.create_future()
+        future: asyncio.Future[Message] = self._loop.create_future()
         self._waiting[number] = future
         timer = self._loop.call_later(timeout, self._no_answer, future, cmd, timeout)
 
-        def forget(done: "asyncio.Future[Message]") -> None:
+        def forget(done: asyncio.Future[Message]) -> None:
             timer.cancel()
             self._waiting.pop(number, None)
             _retrieved(done)
@@ -143,7 +143,7 @@ class _Stream(asyncio.Protocol):
     async def ask(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
         return await self.post(cmd, fields, timeout)
 
-    async def something(self, seconds: Optional[float]) -> None:
+    async def something(self, seconds: float | None) -> None:
         """Until an event came, or the connection ended, or that time is over."""
         self.came.clear()
         timer = None if seconds is None else self._loop.call_later(max(0.0, seconds), self.came.set)
@@ -153,7 +153,7 @@ class _Stream(asyncio.Protocol):
             if timer is not None:
                 timer.cancel()
 
-    def take_event(self, latest: bool = False) -> Optional[Event]:
+    def take_event(self, latest: bool = False) -> Event | None:
         self._latest = latest
         if latest:
             self._leave_out()
@@ -180,7 +180,7 @@ class _Stream(asyncio.Protocol):
         except GatewayUnavailable as error:
             self._fail(error)
 
-    def connection_lost(self, problem: Optional[Exception]) -> None:
+    def connection_lost(self, problem: Exception | None) -> None:
         broke = "the gateway closed the connection" if problem is None else f"the connection broke ({problem})"
         self._fail(GatewayUnavailable(f"{self.path}: {broke}"))
 
@@ -205,7 +205,7 @@ class _Stream(asyncio.Protocol):
         self.events.append(message)
         self.came.set()
 
-    def _no_answer(self, future: "asyncio.Future[Message]", cmd: str, timeout: float) -> None:
+    def _no_answer(self, future: asyncio.Future[Message], cmd: str, timeout: float) -> None:
         if not future.done():
             what = f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed"
             future.set_exception(NoAnswer(what))
@@ -245,18 +245,18 @@ async def _connected_socket(path: str, until: float) -> socket.socket:
         raise
 
 
-def _end_wait(future: "asyncio.Future[Message]", error: GatewayUnavailable) -> None:
+def _end_wait(future: asyncio.Future[Message], error: GatewayUnavailable) -> None:
     if not future.done():
         future.set_exception(error)
 
 
-def _retrieved(future: "asyncio.Future[Message]") -> None:
+def _retrieved(future: asyncio.Future[Message]) -> None:
     """An error that no task waits for any more, because it was cancelled, is no news."""
     if not future.cancelled():
         future.exception()
 
 
-def _running_loop() -> Optional[asyncio.AbstractEventLoop]:
+def _running_loop() -> asyncio.AbstractEventLoop | None:
     try:
         return asyncio.get_running_loop()
     except RuntimeError:
@@ -266,12 +266,12 @@ def _running_loop() -> Optional[asyncio.AbstractEventLoop]:
 class AsyncGateway:
     """As `Gateway`. Any number of tasks of one event loop may use it; each watcher of events should have its own."""
 
-    def __init__(self, socket: Optional[str] = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
+    def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
         self._path = socket
         self._timeout = timeout
         self._wait = wait
-        self._stream: Optional[_Stream] = None
-        self._subscription: Optional[Message] = None
+        self._stream: _Stream | None = None
+        self._subscription: Message | None = None
         self._connecting = asyncio.Lock()
         self._kept = False
 
@@ -280,7 +280,7 @@ class AsyncGateway:
         return self
 
     async def __aexit__(
-        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._kept = False
         self.close()
@@ -305,8 +305,8 @@ class AsyncGateway:
     async def why(self) -> Stop:
         return cast(Stop, without_envelope(await self._ask("why")))
 
-    async def recordings(self) -> List[RecordingEntry]:
-        return cast(List[RecordingEntry], (await self._ask("recordings"))["recordings"])
+    async def recordings(self) -> list[RecordingEntry]:
+        return cast(list[RecordingEntry], (await self._ask("recordings"))["recordings"])
 
     async def recording(self, name: str) -> bytes:
         data = bytearray()
@@ -314,13 +314,13 @@ class AsyncGateway:
             pass
         return bytes(data)
 
-    async def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
+    async def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
         fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}
         granted = await self._ask("watch", **fields)
         self._subscription = fields if topics else None
         return cast(Watched, without_envelope(granted))
 
-    async def events(self, timeout: Optional[float] = None, *, latest: bool = False) -> AsyncIterator[Event]:
+    async def events(self, timeout: float | None = None, *, latest: bool = False) -> AsyncIterator[Event]:
         """As `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
         while True:
             event = await self._next_event(timeout, latest)
@@ -331,7 +331,7 @@ class AsyncGateway:
     async def stop(self) -> State:
         return cast(State, (await self._stop("stop"))["state"])
 
-    async def estop(self, reason: Optional[str] = None) -> State:
+    async def estop(self, reason: str | None = None) -> State:
         return cast(State, (await self._stop("estop", reason=reason))["state"])
 
     async def reset(self) -> State:
@@ -340,27 +340,27 @@ class AsyncGateway:
     async def release(self) -> State:
         return cast(State, (await self._ask("release"))["state"])
 
-    async def tare(self, side: Optional[str] = None) -> Tared:
+    async def tare(self, side: str | None = None) -> Tared:
         return cast(Tared, without_envelope(await self._ask("tare", side=side)))
 
-    async def confirm(self, item: str, value: Union[str, Whole, None] = None, how: Optional[str] = None) -> Confirmed:
+    async def confirm(self, item: str, value: str | Whole | None = None, how: str | None = None) -> Confirmed:
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found, how=how)))
 
     async def config(
-        self, key: Optional[str] = None, value: Union[str, Whole, None] = None, *, commit: Optional[bool] = None
+        self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None
     ) -> Configured:
         """As `Gateway.config`."""
         wanted = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Configured, without_envelope(await self._ask("config", key=key, value=wanted, commit=commit)))
 
-    def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
+    def arm(self, name: str | None = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
         """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`. `wait` as in `Gateway.arm`."""
         return _Arming(self, name, takeover, wait)
 
     # The inside ------------------------------------------------------------------------------------------------------
 
-    async def _connected(self, deadline: Optional[float], any_api: bool = False) -> _Stream:
+    async def _connected(self, deadline: float | None, any_api: bool = False) -> _Stream:
         async with self._connecting:
             stream = self._stream
             if stream is None or not stream.open:
@@ -373,7 +373,7 @@ class AsyncGateway:
                     raise
             return stream
 
-    async def _connect(self, deadline: Optional[float]) -> _Stream:
+    async def _connect(self, deadline: float | None) -> _Stream:
         pause = 0.02
         while True:
             try:
@@ -416,7 +416,7 @@ class AsyncGateway:
                 raise
         return await self._ask(cmd, **fields)  # It may come yet.
 
-    async def _arm(self, name: Optional[str], takeover: bool, wait: float) -> AsyncArmed:
+    async def _arm(self, name: str | None, takeover: bool, wait: float) -> AsyncArmed:
         until = time.monotonic() + wait
         fields = {"name": name, "takeover": takeover or None}
         while True:
@@ -431,7 +431,7 @@ class AsyncGateway:
                 raise
             await asyncio.sleep(ARM_AGAIN_S)
 
-    async def _next_event(self, timeout: Optional[float], latest: bool) -> Optional[Event]:
+    async def _next_event(self, timeout: float | None, latest: bool) -> Event | None:
         deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
         if self._stream is None:
             await self._connected(None)
@@ -448,7 +448,7 @@ class AsyncGateway:
             await stream.something(left if timeout is not None else None)
         return None
 
-    async def _gone(self, stream: _Stream, deadline: float) -> Optional[Event]:
+    async def _gone(self, stream: _Stream, deadline: float) -> Event | None:
         if not stream.told:
             stream.told = True
             return {"event": "disconnected", "message": str(stream.error)}
@@ -471,9 +471,9 @@ class AsyncGateway:
 class _Arming:
     """What `AsyncGateway.arm` returns: to be awaited, or entered with `async with`."""
 
-    def __init__(self, gateway: AsyncGateway, name: Optional[str], takeover: bool, wait: float) -> None:
+    def __init__(self, gateway: AsyncGateway, name: str | None, takeover: bool, wait: float) -> None:
         self._gateway, self._name, self._takeover, self._wait = gateway, name, takeover, wait
-        self._armed: Optional[AsyncArmed] = None
+        self._armed: AsyncArmed | None = None
 
     def __await__(self) -> Generator[Any, None, AsyncArmed]:
         return self._gateway._arm(self._name, self._takeover, self._wait).__await__()
@@ -488,7 +488,7 @@ class _Arming:
         return self._armed
 
     async def __aexit__(
-        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._armed is not None
         await self._armed.__aexit__(kind, error, trace)
@@ -501,13 +501,13 @@ class AsyncArmed:
         self.terms = terms
         self._gateway = gateway
         self._stream = stream
-        self._ended: Optional[str] = None
+        self._ended: str | None = None
         self._fed = time.monotonic() + (terms.first_lease_ms - terms.lease_ms) / 1000
         stream.arms += 1
         self._number = stream.arms
 
     async def drive(
-        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Optional[Whole] = None, right_mA: Optional[Whole] = None
+        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None
     ) -> Applied:
         fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
         return await self._command("drive", fields)
@@ -520,11 +520,11 @@ class AsyncArmed:
         seconds: float,
         left_mm_s: Whole,
         right_mm_s: Whole,
-        left_mA: Optional[Whole] = None,
-        right_mA: Optional[Whole] = None,
+        left_mA: Whole | None = None,
+        right_mA: Whole | None = None,
         *,
-        on_status: Optional[OnStatus] = None,
-        rate_hz: Optional[float] = None,
+        on_status: OnStatus | None = None,
+        rate_hz: float | None = None,
     ) -> Applied:
         """As `Armed.drive_for`; `on_status` is an ordinary function here too."""
         end = time.monotonic() + seconds_of(seconds)
@@ -552,7 +552,7 @@ class AsyncArmed:
         return self
 
     async def __aexit__(
-        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is GeneratorExit:  # Its task was dropped: no wait is possible any more.
             self._end("its block was dropped")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import select
@@ -10,7 +11,8 @@ import socket
 import time
 import weakref
 from collections import deque
-from typing import Any, Deque, Dict, Mapping, Optional, Protocol, Set
+from typing import Any, Protocol
+from collections.abc import Mapping
 
 from ._errors import GatewayUnavailable, NoAnswer, ProtocolError
 from ._types import Event
@@ -30,22 +32,22 @@ class Connection:
 
     def __init__(self, path: str, timeout: float) -> None:
         self.path = path
-        self.hello: Optional[Message] = None
+        self.hello: Message | None = None
         """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
         self.arms = 0
         """How often this connection was armed: only the last one counts."""
-        self.events: Deque[Event] = deque()
+        self.events: deque[Event] = deque()
         self._latest = False
-        self.untold: Optional[str] = None
+        self.untold: str | None = None
         """What ended the connection, if whoever reads the events has not been told."""
         self._lost = 0
         self._wire = Wire()
-        self._replies: Dict[int, Message] = {}
-        self._wanted: Set[int] = set()
+        self._replies: dict[int, Message] = {}
+        self._wanted: set[int] = set()
         self._sending = False
-        self._error: Optional[GatewayUnavailable] = None
+        self._error: GatewayUnavailable | None = None
         """What ended it, if it was not us."""
-        self._socket: Optional[socket.socket] = socket.socket(socket.AF_UNIX)
+        self._socket: socket.socket | None = socket.socket(socket.AF_UNIX)
         self._socket.settimeout(timeout)
         try:
             self._socket.connect(path)
@@ -68,10 +70,8 @@ class Connection:
         """The end of the connection ends the lease, if it was ours. Works at any time."""
         gone, self._socket = self._socket, None
         if gone is not None:
-            try:
+            with contextlib.suppress(OSError):
                 gone.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
             gone.close()
 
     def leave(self) -> None:
@@ -115,7 +115,7 @@ class Connection:
         if self._readable(min(SLICE_S, max(0.0, deadline - time.monotonic()))):
             self._read()
 
-    def take_event(self) -> Optional[Event]:
+    def take_event(self) -> Event | None:
         """The oldest event that came; None: none is there."""
         if self._lost > 0:
             count, self._lost = self._lost, 0
@@ -209,7 +209,7 @@ class Connection:
         self.events.append(message)
 
 
-_alive: "weakref.WeakSet[_Left]" = weakref.WeakSet()
+_alive: weakref.WeakSet[_Left] = weakref.WeakSet()
 
 
 def ends_in_children(connection: _Left) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from typing import Optional
 
 
 class IWheelError(Exception):
@@ -28,7 +27,7 @@ class LeaseEnded(IWheelError):
     `error`: the name of the refusal by which the gateway told it (`not_armed`, `latched` ...); None if it was known without asking.
     """
 
-    def __init__(self, message: str, error: Optional[str] = None) -> None:
+    def __init__(self, message: str, error: str | None = None) -> None:
         super().__init__(message)
         self.error = error
 

@@ -8,7 +8,8 @@ import time
 import warnings
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Iterator, List, Optional, Type, Union, cast
+from typing import Any, cast
+from collections.abc import Iterator
 
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
@@ -50,12 +51,12 @@ class Gateway:
     One thread at a time: give each thread its own Gateway. `with` closes the connection at its end.
     """
 
-    def __init__(self, socket: Optional[str] = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
+    def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
         self._path = socket
         self._timeout = timeout
         self._wait = wait
-        self._connection: Optional[Connection] = None
-        self._subscription: Optional[Message] = None
+        self._connection: Connection | None = None
+        self._subscription: Message | None = None
         self._busy = threading.RLock()
         self._kept = False
 
@@ -64,7 +65,7 @@ class Gateway:
         return self
 
     def __exit__(
-        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._kept = False
         self.close()
@@ -89,9 +90,9 @@ class Gateway:
         """The last stop; `sentence` tells it in plain English."""
         return cast(Stop, without_envelope(self._ask("why")))
 
-    def recordings(self) -> List[RecordingEntry]:
+    def recordings(self) -> list[RecordingEntry]:
         """The recordings of stops on the gateway's disk, the oldest first: `name cause wall_us log_bytes jsonl_bytes conf_bytes`."""
-        return cast(List[RecordingEntry], self._ask("recordings")["recordings"])
+        return cast(list[RecordingEntry], self._ask("recordings")["recordings"])
 
     def recording(self, name: str) -> bytes:
         """A file of one of them, whole and checked: `name` as `recordings` tells it, with .log, .jsonl or .conf behind it."""
@@ -100,7 +101,7 @@ class Gateway:
             pass
         return bytes(data)
 
-    def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
+    def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
         """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`.
 
         Returns what was granted: `topics rate_hz limited`.
@@ -110,7 +111,7 @@ class Gateway:
         self._subscription = fields if topics else None
         return cast(Watched, without_envelope(granted))
 
-    def events(self, timeout: Optional[float] = None, *, latest: bool = False) -> Iterator[Event]:
+    def events(self, timeout: float | None = None, *, latest: bool = False) -> Iterator[Event]:
         """Events as they come; ends when none came for `timeout` seconds (None: never ends).
 
         A lost connection is an event too: `disconnected`, then `reconnected` as soon as the gateway is back, with the same
@@ -131,7 +132,7 @@ class Gateway:
         """Ramp to zero, whoever drives. The state after that."""
         return cast(State, self._stop("stop")["state"])
 
-    def estop(self, reason: Optional[str] = None) -> State:
+    def estop(self, reason: str | None = None) -> State:
         """Zero without ramp, latched until `reset`. No substitute for the button that cuts power."""
         return cast(State, self._stop("estop", reason=reason)["state"])
 
@@ -145,14 +146,14 @@ class Gateway:
         """Ends a hold (`after_stop = hold`): on a slope the wheels roll then. Set the parking brake first."""
         return cast(State, self._ask("release")["state"])
 
-    def tare(self, side: Optional[str] = None) -> Tared:
+    def tare(self, side: str | None = None) -> Tared:
         """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing.
 
         Returns, for each of them, the new zero and how good it is, and the one before.
         """
         return cast(Tared, without_envelope(self._ask("tare", side=side)))
 
-    def confirm(self, item: str, value: Union[str, Whole, None] = None, how: Optional[str] = None) -> Confirmed:
+    def confirm(self, item: str, value: str | Whole | None = None, how: str | None = None) -> Confirmed:
         """The operator's word on an item of the assumption ledger (docs/ledger.md). Moves nothing.
 
         `value` is what was found at the machine; without it what is configured is confirmed. Returns the item's entry: another value
@@ -163,7 +164,7 @@ class Gateway:
         return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
 
     def config(
-        self, key: Optional[str] = None, value: Union[str, Whole, None] = None, *, commit: Optional[bool] = None
+        self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None
     ) -> Configured:
         """The configuration of a gateway that keeps it itself (a board, docs/serial.md); a daemon's is its file, and it raises Refused.
 
@@ -173,7 +174,7 @@ class Gateway:
         wanted = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Configured, without_envelope(self._ask("config", key=key, value=wanted, commit=commit)))
 
-    def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
+    def arm(self, name: str | None = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
         """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.
 
         `name` is shown to others. `takeover` takes the lease from somebody else, with the wheels at rest. `wait`: seconds in which a
@@ -209,7 +210,7 @@ class Gateway:
         finally:
             self._busy.release()
 
-    def _connected(self, deadline: Optional[float], any_api: bool = False) -> Connection:
+    def _connected(self, deadline: float | None, any_api: bool = False) -> Connection:
         """The connection, made anew if it broke. Tries until the deadline (None: once)."""
         connection = self._connection
         if connection is None or not connection.alive():
@@ -222,7 +223,7 @@ class Gateway:
                 raise
         return connection
 
-    def _connect(self, deadline: Optional[float]) -> Connection:
+    def _connect(self, deadline: float | None) -> Connection:
         pause = 0.02
         while True:
             try:
@@ -272,7 +273,7 @@ class Gateway:
             connection.alive()
             return result_of(cmd, connection.ask(cmd, fields, self._timeout))
 
-    def _next_event(self, timeout: Optional[float], latest: bool) -> Optional[Event]:
+    def _next_event(self, timeout: float | None, latest: bool) -> Event | None:
         with self._alone():
             deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
             if self._connection is not None and not self._connection.open:
@@ -293,7 +294,7 @@ class Gateway:
                         connection.untold = None
                         return {"event": "disconnected", "message": str(error)}
 
-    def _back_again(self, deadline: float) -> Optional[Event]:
+    def _back_again(self, deadline: float) -> Event | None:
         assert self._connection is not None
         left = self._connection.take_event()
         if left is not None:
@@ -328,13 +329,13 @@ class Armed:
         self.terms = terms
         self._gateway = gateway
         self._connection = connection
-        self._ended: Optional[str] = None
+        self._ended: str | None = None
         self._fed = time.monotonic() + (terms.first_lease_ms - terms.lease_ms) / 1000
         connection.arms += 1
         self._number = connection.arms
 
     def drive(
-        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Optional[Whole] = None, right_mA: Optional[Whole] = None
+        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None
     ) -> Applied:
         """Sets both wheels' speed. The currents may be left out, both, unless the configuration says current_role = setpoint."""
         fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
@@ -349,11 +350,11 @@ class Armed:
         seconds: float,
         left_mm_s: Whole,
         right_mm_s: Whole,
-        left_mA: Optional[Whole] = None,
-        right_mA: Optional[Whole] = None,
+        left_mA: Whole | None = None,
+        right_mA: Whole | None = None,
         *,
-        on_status: Optional[OnStatus] = None,
-        rate_hz: Optional[float] = None,
+        on_status: OnStatus | None = None,
+        rate_hz: float | None = None,
     ) -> Applied:
         """Repeats the command for that long, three times per lease or at `rate_hz`, and returns while it still holds.
 
@@ -383,7 +384,7 @@ class Armed:
         return self
 
     def __exit__(
-        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         trouble = "one of them still turns"
         at_rest = False

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Dict, List, Literal, Optional, TypedDict
+from typing import Literal, TypedDict
 
 API = 1
 REQUEST_MAX = 4096
@@ -59,13 +59,13 @@ Cause = Literal[
 class LeaseStatus(TypedDict):
     """Who may drive. All None if nobody may, but lease_ms."""
 
-    holder: Optional[int]
+    holder: int | None
     """of the client"""
-    name: Optional[str]
+    name: str | None
     """that it gave itself"""
-    pid: Optional[int]
+    pid: int | None
     """of its process"""
-    remaining_ms: Optional[int]
+    remaining_ms: int | None
     lease_ms: int
     """as configured"""
 
@@ -82,11 +82,11 @@ class BusStatus(TypedDict):
     state: BusState
     timing: Timing
     echo: Echo
-    bitrate: Optional[int]
-    sample_point_permille: Optional[int]
-    load_permille: Optional[int]
+    bitrate: int | None
+    sample_point_permille: int | None
+    load_permille: int | None
     """of the last second, without stuff bits"""
-    lost_frames: Optional[int]
+    lost_frames: int | None
     """that came faster than they were read"""
 
 
@@ -94,14 +94,17 @@ EstopState = Literal["released", "pressed", "unreadable", "disagrees", "none"]
 
 EstopContact = Literal["neither", "line", "line2", "both"]
 
-_EstopStatusPartly = TypedDict("_EstopStatusPartly", {"line2": str, "pressed_at": EstopContact}, total=False)
+
+class _EstopStatusPartly(TypedDict, total=False):
+    line2: str
+    pressed_at: EstopContact
 
 
 class EstopStatus(_EstopStatusPartly):
     line: str
     state: EstopState
     simulated: bool
-    tried_wall_us: Optional[int]
+    tried_wall_us: int | None
     """when its button was last seen pressed and released on this wiring; None: never"""
 
 
@@ -143,50 +146,50 @@ class WheelStatus(TypedDict):
 
     heard: bool
     """its speed, within wheel_silent_ms"""
-    at_rest: Optional[bool]
+    at_rest: bool | None
     """for rest_ms; None while not heard"""
-    speed_rpm: Optional[int]
-    speed_mm_s: Optional[int]
-    acceleration_raw: Optional[int]
-    commanded_mm_s: Optional[int]
+    speed_rpm: int | None
+    speed_mm_s: int | None
+    acceleration_raw: int | None
+    commanded_mm_s: int | None
     """what the client wants; None if nothing is wanted"""
-    commanded_mA: Optional[int]
-    applied_mm_s: Optional[int]
+    commanded_mA: int | None
+    applied_mm_s: int | None
     """what the wheel was told last; None in silence"""
-    applied_mA: Optional[int]
-    speed_age_ms: Optional[int]
+    applied_mA: int | None
+    speed_age_ms: int | None
     """None: never"""
-    battery_dV: Optional[int]
-    temperature_degC: Optional[int]
-    cpu_percent: Optional[int]
-    ticks: Optional[int]
+    battery_dV: int | None
+    temperature_degC: int | None
+    cpu_percent: int | None
+    ticks: int | None
     """64 bits, unwrapped"""
-    distance_mm: Optional[int]
-    status_age_ms: Optional[int]
+    distance_mm: int | None
+    status_age_ms: int | None
     reboots: int
     """seen since the gateway started"""
     valid: WheelValid
     saturated: WheelSaturated
-    force_raw: Optional[int]
-    force_raw_mN: Optional[int]
-    force_offset_mN: Optional[int]
-    force_net_mN: Optional[int]
+    force_raw: int | None
+    force_raw_mN: int | None
+    force_offset_mN: int | None
+    force_net_mN: int | None
     """None unless force_validity is valid"""
     force_validity: ForceValidity
-    force_age_ms: Optional[int]
+    force_age_ms: int | None
     offset_provenance: Provenance
     """where the zero in force comes from"""
-    offset_origin: Optional[Origin]
+    offset_origin: Origin | None
     """what it was when it was taken, also if it is stored now"""
-    offset_age_ms: Optional[int]
-    offset_contaminated: Optional[bool]
+    offset_age_ms: int | None
+    offset_contaminated: bool | None
     """it, or the attempt at one, was taken while the wheel turned, or under load or unrest; None: nobody saw"""
     offset_window: Window
     """the two seconds after the wheel's start, or after ours"""
-    offset_samples: Optional[int]
-    offset_deviation_mN: Optional[int]
-    offset_drift_mN: Optional[int]
-    wheel_offset_mN: Optional[int]
+    offset_samples: int | None
+    offset_deviation_mN: int | None
+    offset_drift_mN: int | None
+    wheel_offset_mN: int | None
     """the wheel's own, in force or not; None: not heard since its start"""
     unit_evidence: UnitEvidence
 
@@ -194,13 +197,13 @@ class WheelStatus(TypedDict):
 class Pose(TypedDict):
     """As the right wheel sends it."""
 
-    x_mm: Optional[int]
-    y_mm: Optional[int]
-    z_mm: Optional[int]
-    psi_mrad: Optional[int]
+    x_mm: int | None
+    y_mm: int | None
+    z_mm: int | None
+    psi_mrad: int | None
     limited: bool
     """a coordinate stands at the end of its range"""
-    age_ms: Optional[int]
+    age_ms: int | None
 
 
 LedgerState = Literal["assumed", "confirmed", "contradicted"]
@@ -213,18 +216,18 @@ class LedgerEntry(TypedDict):
 
     state: LedgerState
     evidence: Evidence
-    figure: Optional[int]
+    figure: int | None
     """measured, by the bus only"""
-    value: Optional[str]
+    value: str | None
     """in force"""
-    found: Optional[str]
+    found: str | None
     """by the operator, if told"""
-    how: Optional[str]
+    how: str | None
     """by what it was found, if told"""
-    since_wall_us: Optional[int]
+    since_wall_us: int | None
     reason: str
     """the evidence in words"""
-    disabled: Optional[str]
+    disabled: str | None
     """by a contradiction: what, and the cure"""
 
 
@@ -253,18 +256,18 @@ class Memory(TypedDict):
 
     file: str
     state: MemoryState
-    reason: Optional[str]
+    reason: str | None
     """of ignored and failed"""
 
 
 class Gaps(TypedDict):
     """Between setpoint pairs since the gateway's start, while they are sent."""
 
-    limits_ms: List[int]
+    limits_ms: list[int]
     """upper bounds of all buckets but the last"""
-    count: List[int]
+    count: list[int]
     """per bucket"""
-    worst_us: Optional[int]
+    worst_us: int | None
 
 
 class Budget(TypedDict):
@@ -321,9 +324,9 @@ class Status(TypedDict):
     state: State
     arming: bool
     """a zero pair was sent and is not proven yet"""
-    cause: Optional[Cause]
+    cause: Cause | None
     """why stopping or latched"""
-    present: List[Cause]
+    present: list[Cause]
     """what keeps arm or reset from succeeding now"""
     lease: LeaseStatus
     bus: BusStatus
@@ -331,7 +334,7 @@ class Status(TypedDict):
     left: WheelStatus
     right: WheelStatus
     pose: Pose
-    ledger: Dict[LedgerItem, LedgerEntry]
+    ledger: dict[LedgerItem, LedgerEntry]
     memory: Memory
     gaps: Gaps
     budget: Budget
@@ -344,7 +347,7 @@ class Status(TypedDict):
     """a wheel turns faster than 100 mm/s and nothing is sent to it"""
     listen_only: bool
     shutting_down: bool
-    warnings: List[str]
+    warnings: list[str]
 
 
 Topic = Literal["state", "bus", "estop", "lease", "stop", "force", "frame"]
@@ -353,7 +356,7 @@ Topic = Literal["state", "bus", "estop", "lease", "stop", "force", "frame"]
 class Watched(TypedDict):
     """What was granted."""
 
-    topics: List[Topic]
+    topics: list[Topic]
     rate_hz: int
     limited: bool
     """it is slower than what was asked"""
@@ -366,11 +369,13 @@ class TaredWheel(TypedDict):
     samples: int
     deviation_mN: int
     drift_mN: int
-    before_mN: Optional[int]
+    before_mN: int | None
     before_provenance: Provenance
 
 
-_TaredPartly = TypedDict("_TaredPartly", {"left": TaredWheel, "right": TaredWheel}, total=False)
+class _TaredPartly(TypedDict, total=False):
+    left: TaredWheel
+    right: TaredWheel
 
 
 class Tared(_TaredPartly):
@@ -395,10 +400,10 @@ class Frame(TypedDict):
     data: str
     """hexadecimal"""
     kind: FrameKind
-    flags: List[FrameFlag]
+    flags: list[FrameFlag]
 
 
-_StopSummaryNamed = TypedDict("_StopSummaryNamed", {"from": Optional[State]})
+_StopSummaryNamed = TypedDict("_StopSummaryNamed", {"from": State | None})
 
 
 class StopSummary(_StopSummaryNamed):
@@ -406,19 +411,19 @@ class StopSummary(_StopSummaryNamed):
 
     number: int
     """of the stop since the gateway's start"""
-    cause: Optional[Cause]
-    side: Optional[Sides]
-    detail: Optional[int]
+    cause: Cause | None
+    side: Sides | None
+    detail: int | None
     latched: bool
-    client: Optional[int]
+    client: int | None
     """who held the lease or asked for the stop"""
-    client_name: Optional[str]
-    applied_left_mm_s: Optional[int]
-    applied_right_mm_s: Optional[int]
-    at_us: Optional[int]
-    wall_us: Optional[int]
+    client_name: str | None
+    applied_left_mm_s: int | None
+    applied_right_mm_s: int | None
+    at_us: int | None
+    wall_us: int | None
     """when the stop was seen"""
-    age_ms: Optional[int]
+    age_ms: int | None
     sentence: str
 
 
@@ -427,13 +432,13 @@ class Stop(StopSummary):
 
     directory: str
     """of the recordings"""
-    recording: Optional[str]
+    recording: str | None
     """the file of this stop; None: not latched, or not written yet"""
-    recording_error: Optional[str]
+    recording_error: str | None
     """why it could not be written"""
-    frames_before: List[Frame]
+    frames_before: list[Frame]
     """up to 40"""
-    frames_after: List[Frame]
+    frames_after: list[Frame]
     """up to 40"""
 
 
@@ -450,18 +455,18 @@ class RecordingEntry(TypedDict):
     """of its files, without .log, .jsonl or .conf"""
     cause: str
     """a cause, gateway_died or rolling"""
-    wall_us: Optional[int]
+    wall_us: int | None
     """when its .conf was written, at the stop"""
-    log_bytes: Optional[int]
+    log_bytes: int | None
     """None: there is no such file"""
-    jsonl_bytes: Optional[int]
-    conf_bytes: Optional[int]
+    jsonl_bytes: int | None
+    conf_bytes: int | None
 
 
 class Recordings(TypedDict):
     """The reply to `recordings`."""
 
-    recordings: List[RecordingEntry]
+    recordings: list[RecordingEntry]
     """the oldest first; of more than 64 the newest"""
 
 
@@ -478,7 +483,7 @@ class Piece(TypedDict):
     """base64 (RFC 4648): 24576 bytes, or what is left"""
     crc32: int
     """CRC-32 (as zlib's) of these bytes"""
-    file_crc32: Optional[int]
+    file_crc32: int | None
     """of the whole file; None unless this is its last piece"""
 
 
@@ -487,14 +492,14 @@ class ConfiguredEntry(TypedDict):
 
     key: str
     """section.key, as in the configuration file"""
-    value: Optional[str]
+    value: str | None
     """as staged, else as in force; None: not set"""
 
 
 class Configured(TypedDict):
     """The reply to `config`."""
 
-    keys: List[ConfiguredEntry]
+    keys: list[ConfiguredEntry]
     """all there are"""
     staged: bool
     """something is staged and not committed"""

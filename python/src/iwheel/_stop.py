@@ -6,7 +6,8 @@ from __future__ import annotations
 import os
 import socket
 import time
-from typing import Any, Mapping, Optional
+from typing import Any
+from collections.abc import Mapping
 
 from ._errors import GatewayUnavailable, NoAnswer
 from ._wire import WATCH_FOLDER, Message, Wire, cannot_connect
@@ -29,7 +30,7 @@ def stop_by_either(path: str, cmd: str, fields: Mapping[str, Any], timeout: floa
     Tries both sockets until the time is over. GatewayUnavailable tells what was wrong with `path`.
     """
     deadline = time.monotonic() + timeout
-    first: Optional[GatewayUnavailable] = None
+    first: GatewayUnavailable | None = None
     while True:
         passing = False
         for one in (path, other_socket(path)):
@@ -61,7 +62,7 @@ def _attempt(path: str, cmd: str, fields: Mapping[str, Any], timeout: float) -> 
                         return message
                     if message.get("error") == "too_many_clients":
                         raise GatewayUnavailable(f"{path}: too_many_clients: {message.get('message')}")
-        except (BlockingIOError, socket.timeout) as error:
+        except (TimeoutError, BlockingIOError) as error:
             raise NoAnswer(f"{path}: no answer to {cmd} within {timeout:g} s") from error
         except OSError as error:
             raise cannot_connect(path, error) from error

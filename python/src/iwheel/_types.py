@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Callable, Dict, Optional, SupportsIndex, Union
+from typing import Any, SupportsIndex
+from collections.abc import Callable
 
 from ._protocol import Status
 
-Event = Dict[str, Any]
+Event = dict[str, Any]
 """An event as it came: `event` is its name. Names and fields that are not known must be ignored."""
 
-Whole = Union[SupportsIndex, float]
+Whole = SupportsIndex | float
 """A whole number of any type: 200, 200.0, numpy.int64(200). 200.5, True, NaN are refused when it is used."""
 
 OnStatus = Callable[[Status], object]
@@ -43,5 +44,5 @@ class Terms:
     stop_budget_mm: int
     """... and how far."""
     warnings: tuple[str, ...]
-    key: Optional[str] = field(default=None, repr=False)
+    key: str | None = field(default=None, repr=False)
     """The secret of this lease; None: a microcontroller gives none."""

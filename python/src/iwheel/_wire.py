@@ -11,7 +11,8 @@ import numbers
 import operator
 import os
 import zlib
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple, cast
+from typing import Any, cast
+from collections.abc import Iterable, Mapping
 
 from ._errors import ConnectionLost, GatewayUnavailable, LeaseEnded, ProtocolError, Refused
 from ._protocol import API, LINE_MAX, REQUEST_MAX, Piece
@@ -38,7 +39,7 @@ RATE_MAX_HZ = 100
 DISTINCTIONS = {"fault": ("cause",), "offset": ("side",), "ledger": ("item",), "frame": ("id", "kind")}
 """What makes two events of one name different things."""
 
-Message = Dict[str, Any]
+Message = dict[str, Any]
 NoneType = type(None)
 
 
@@ -57,7 +58,7 @@ def default_socket() -> str:
     return watch if may_use(watch) and not may_use(drive) else drive
 
 
-def sockets_in(folder: str) -> Set[str]:
+def sockets_in(folder: str) -> set[str]:
     try:
         return {name for name in os.listdir(folder) if name.endswith(".sock")}
     except OSError:
@@ -95,7 +96,7 @@ class Wire:
             raise ValueError(f"{cmd}: a request has at most {REQUEST_MAX} bytes, this one {len(line) - 1}")
         return self._number, line
 
-    def feed(self, data: bytes) -> List[Message]:
+    def feed(self, data: bytes) -> list[Message]:
         """All messages that are complete now. ProtocolError if that is no northbound protocol."""
         self._pending += data
         *lines, rest = self._pending.split(b"\n")
@@ -158,7 +159,7 @@ def seconds_of(value: float) -> float:
     return value
 
 
-def period_of(terms: Terms, rate_hz: Optional[float]) -> float:
+def period_of(terms: Terms, rate_hz: float | None) -> float:
     """Seconds between two commands: three per lease, or more if that is asked for."""
     if rate_hz is not None and not 0 < rate_hz <= RATE_MAX_HZ:
         raise ValueError(f"rate_hz must be a number above 0 and at most {RATE_MAX_HZ}, not {rate_hz}")
@@ -228,9 +229,9 @@ def lost_event(count: int) -> Event:
     return {"event": "lost", "count": count}
 
 
-def newest(events: Iterable[Event]) -> Tuple[List[Event], int]:
+def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
     """Of each thing only the newest event, and how many were left out: here, or by the gateway (`lost`)."""
-    kept: Dict[Tuple[str, ...], Event] = {}
+    kept: dict[tuple[str, ...], Event] = {}
     left_out = 0
     for event in events:
         name = event["event"]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What more clients cost: watchers at 50 Hz and one who floods, over the local bus: gaps between setpoints, and the gateway's processor time."""
 
+import contextlib
+import itertools
 import json
 import os
 import selectors
@@ -16,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent.parent
 sys.path[:0] = [str(ROOT / "test/system")]
 
-from bus import Bus  # noqa: E402
+from bus import Bus
 
 ID_LEFT = 0x10A
 WATCHERS = (0, 1, 4, 16)
@@ -58,10 +60,8 @@ def watch(path, count, rate_hz, topics):
 def flood(path):
     """In a process of its own: asks as fast as it can and hardly ever reads."""
     while True:
-        try:
+        with contextlib.suppress(ConnectionError):
             flood_until_sent_away(connect(path))
-        except ConnectionError:
-            pass
 
 
 def flood_until_sent_away(sock):
@@ -71,10 +71,8 @@ def flood_until_sent_away(sock):
             sock.send(FLOOD)
         except BlockingIOError:
             time.sleep(0.0002)
-        try:
+        with contextlib.suppress(BlockingIOError):
             sock.recv(1 << 16)
-        except BlockingIOError:
-            pass
 
 
 def percentile(values, percent):
@@ -129,7 +127,7 @@ def one(pair, client, watchers, hostile, seconds, wish=STATE):
     bus.close()
     crowd.end()
     at = [frame.t_us for frame in bus.frames if frame.id == ID_LEFT]
-    return {"gap_p99": percentile([b - a for a, b in zip(at, at[1:])], 99), "cpu": share}
+    return {"gap_p99": percentile([b - a for a, b in itertools.pairwise(at)], 99), "cpu": share}
 
 
 def measure(pair, client_type, rounds=3, seconds=6.0):

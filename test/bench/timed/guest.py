@@ -16,8 +16,8 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 TEST = os.path.dirname(os.path.dirname(HERE))
 sys.path[:0] = [HERE, os.path.join(TEST, "kernel"), os.path.join(TEST, "system")]
 
-from measures import MEASURES  # noqa: E402
-from surroundings import Surroundings  # noqa: E402
+from measures import MEASURES
+from surroundings import Surroundings
 
 STALL_US = 10_000
 TRIES = 3
@@ -53,7 +53,7 @@ def play_round(around, measure, candidates, tell):
     for candidate in candidates:
         try:
             tell(candidate=candidate, figures=one_turn(around, measure, candidate))
-        except Exception as error:  # pylint: disable=broad-except
+        except Exception as error:  # noqa: BLE001
             tell(candidate=candidate, failed=f"{type(error).__name__}: {error}", where=traceback.format_exc()[-1500:])
 
 

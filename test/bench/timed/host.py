@@ -13,7 +13,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent.parent
 sys.path[:0] = [str(ROOT / "test/kernel"), str(ROOT / "test/system"), str(HERE)]
 
-from boot import Boot, find_kernel  # noqa: E402
+from boot import Boot, find_kernel
 
 CODEC = HERE.parent / "codec"
 INCLUDES = [f"-I{CODEC}", f"-I{ROOT / 'core/include'}"]
@@ -131,7 +131,7 @@ def middle(rounds, key):
 
 def ratio(of, candidate, key):
     """Of the same round, so that a slow minute hits both."""
-    return statistics.median(mine[key] / max(floor[key], 0.001) for mine, floor in zip(of[candidate], of["floor"]))
+    return statistics.median(mine[key] / max(floor[key], 0.001) for mine, floor in zip(of[candidate], of["floor"], strict=True))
 
 
 def times(value):

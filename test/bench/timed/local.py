@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Floor and gateway in turns on the machine's own kernel, over the local bus: the same small programs as on vcan, real system calls."""
 
+import itertools
 import statistics
 import subprocess
 import threading
@@ -60,7 +61,7 @@ class Local:
 
     def off_period(self, bus):
         at = self.run("stamps", bus, "10A", PERIOD_S)
-        return [abs(b - a - PERIOD_US) for a, b in zip(at, at[1:])]
+        return [abs(b - a - PERIOD_US) for a, b in itertools.pairwise(at)]
 
     def period_floor(self):
         floor = self.beside("floor_period", self.bus, PERIOD_US)
@@ -141,6 +142,6 @@ def rows(taken):
                                    ("line", "p90", "client's line to frame on the bus, p90", "≤ 1.4 ×")):
         of = taken[name]
         if of["floor"]:
-            ratio = statistics.median(mine[key] / max(floor[key], 0.5) for mine, floor in zip(of["gateway"], of["floor"]))
+            ratio = statistics.median(mine[key] / max(floor[key], 0.5) for mine, floor in zip(of["gateway"], of["floor"], strict=True))
             floor_us = statistics.median(figures[key] for figures in of["floor"])
             yield (words, f"{ratio:.2f} × floor ({floor_us:.0f} µs)", goal)

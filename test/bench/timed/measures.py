@@ -2,6 +2,7 @@
 """Inside the kernel: what is measured. Each measure has candidates, and each candidate is one turn: it returns figures."""
 
 import contextlib
+import itertools
 import os
 import re
 import subprocess
@@ -113,7 +114,7 @@ class Period(Measure):
         stamps = numbers(self.around.tool("stamps", self.around.interface, "10A", self.plan["period_s"], piped=True).text(60))
         if process is not None:
             process.end()
-        gaps = [(b - a) / 1000 for a, b in zip(stamps, stamps[1:])]
+        gaps = [(b - a) / 1000 for a, b in itertools.pairwise(stamps)]
         if len(gaps) < self.plan["period_s"] * 1e6 / PERIOD_US * 0.8:
             raise RuntimeError(f"{len(gaps)} pairs in {self.plan['period_s']} s")
         off = [abs(gap - PERIOD_US) for gap in gaps]

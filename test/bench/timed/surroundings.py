@@ -26,7 +26,7 @@ class Started:
 
     def __init__(self, command, folder, standard_input=None, environment=None, piped=False, served=False):
         self.words = list(map(str, command))
-        self.errors = open(os.path.join(folder, f"{os.path.basename(self.words[0])}.err"), "ab")
+        self.errors = open(os.path.join(folder, f"{os.path.basename(self.words[0])}.err"), "ab")  # noqa: SIM115
         self.child = subprocess.Popen(
             self.words, stdin=standard_input or subprocess.DEVNULL, stdout=subprocess.PIPE if piped else subprocess.DEVNULL,
             stderr=self.errors, env=environment, preexec_fn=as_a_service if served else None

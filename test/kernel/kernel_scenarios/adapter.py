@@ -19,7 +19,7 @@ from scenarios import bus_states
 from scenarios.bus_faults import wait_reset
 from scenarios.process import driving
 
-from .interface import back_to_driving, fault, lose_interface, stale_after
+from .interface import back_to_driving, lose_interface, stale_after
 
 TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most, per measurement and with room
 

@@ -197,7 +197,7 @@ def row30_gives_way(t):
 
 @kernel_test("the first gateway is killed: its interface is free again at once", "host", 30)
 def row30_after_a_crash(t):
-    rig, client = t.running()
+    rig, _client = t.running()
     rig.kill_gateway(signal.SIGKILL)
     rig.start_gateway()
     again = rig.client()
@@ -208,7 +208,7 @@ def row30_after_a_crash(t):
 
 @kernel_test("killed in motion; a gateway with its socket elsewhere finds the marker: zeros first", "host", 25)
 def row25_marker_found_elsewhere(t):
-    rig, client, stream = driving(t)
+    rig, _client, stream = driving(t)
     killed_us = now_us()
     rig.kill_gateway(signal.SIGKILL)
     stream.stop()

@@ -412,7 +412,6 @@ def power_cut(t, setup):
     if "plug" in netdev.command("tc", "qdisc", "show", "dev", rig.interface):
         netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "release_indefinite")
     time.sleep(0.01)
-    back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(held_us, "alive", held_us))
     time.sleep(1.0)
@@ -433,7 +432,7 @@ def row18_power_cut_purged(t):
 
 @kernel_test("wheel power cut for 10 s at full command, link may not be restarted: one old frame, its zero behind it", "echo", 18)
 def row18_power_cut_no_rights(t):
-    rig, client, late, moving = power_cut(t, netdev.without_net_admin)
+    rig, client, late, _moving = power_cut(t, netdev.without_net_admin)
     for side in (LEFT, RIGHT):
         here = [(at, speed) for at, can_id, speed in late if can_id == side]
         old = [number for number, (_, speed) in enumerate(here) if speed]

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import time
+from pathlib import Path
 
 import netdev
 from bus import ERROR, EXTENDED, FRAME, REMOTE, now_us
@@ -58,7 +59,7 @@ def plumbing_vcan(t):
 def plumbing_discipline(t):
     bus = fresh_bus("vcan9")
     echo = bool(netdev.flags("vcan9") & netdev.IFF_ECHO)
-    t.check(echo == ("vcan.echo=1" in open("/proc/cmdline", encoding="ascii").read()), f"IFF_ECHO is {echo}")
+    t.check(echo == ("vcan.echo=1" in Path("/proc/cmdline").read_text(encoding="ascii")), f"IFF_ECHO is {echo}")
     with open_raw("vcan9") as other:
         netdev.discipline("vcan9", "netem", "delay", "200ms")
         sent_us = now_us()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """All scenarios; importing this package registers them. `rowNN` names a row of the fault catalogue."""
 
-from . import (
+from . import (  # noqa: F401
     basic,
     clients,
     clients_many,
@@ -17,4 +17,4 @@ from . import (
     ledger,
     frames_together,
     memory,
-)  # noqa: F401
+)

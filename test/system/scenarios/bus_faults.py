@@ -56,7 +56,7 @@ def power_cut(t, seconds, speed):
         len([e for e in moving if e[1] == LEFT]) <= 1 and len([e for e in moving if e[1] == RIGHT]) <= 1,
         f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}",
     )
-    t.check(max((abs(rig.bus.speed_rpm(side)) for side in (0, 1))) <= 2, "the wheels stand")
+    t.check(max(abs(rig.bus.speed_rpm(side)) for side in (0, 1)) <= 2, "the wheels stand")
     wait_reset(t, client)
     t.figure(f"{why['cause']}, {len(moving)} old and {len(late) - len(moving)} zero frames afterwards")
     t.arm(client)

@@ -69,7 +69,7 @@ def row03_client_never_reads(t):
         try:
             client.send_raw(b'{"cmd":"drive","left_mm_s":250,"right_mm_s":250}\n' + b'{"cmd":"status"}\n' * 12)
             rig.timeline.append(Event(t_us, "drive", now_us(), True, 250, 250))
-        except (BrokenPipeError, ConnectionResetError, socket.timeout):
+        except (TimeoutError, BrokenPipeError, ConnectionResetError):
             dropped = True
         asked_us = now_us()
         observer.request("hello")

@@ -2,6 +2,7 @@
 """Rows 5 and 33: observers that die, flood, connect a thousand times, use up descriptors and places."""
 
 import base64
+import contextlib
 import os
 import resource
 import select
@@ -111,10 +112,8 @@ def row05_out_of_descriptors(t):
     for _ in range(40):
         sock = socket.socket(socket.AF_UNIX)
         sock.setblocking(False)
-        try:
+        with contextlib.suppress(OSError):
             sock.connect(rig.path("gateway.sock"))
-        except OSError:
-            pass
         crowd.append(sock)
     time.sleep(0.2)
     t.check(rig.gateway.descriptors() >= limit - 1, f"{rig.gateway.descriptors()} of {limit} descriptors are in use")
@@ -150,15 +149,11 @@ def row05_sixty_observers(t):
         while not over.is_set():
             readable, writable, _ = select.select(crowd, crowd, [], 0.1)
             for sock in writable[::7]:
-                try:
+                with contextlib.suppress(OSError):
                     sock.send(b'{"cmd":"status"}\n')
-                except OSError:
-                    pass
             for sock in readable:
-                try:
+                with contextlib.suppress(OSError):
                     sock.recv(1 << 20)
-                except OSError:
-                    pass
 
     thread = threading.Thread(target=observe)
     thread.start()

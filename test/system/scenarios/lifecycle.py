@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Rows 25, 28, 30 and listen-only: how the gateway starts and ends."""
 
+import itertools
 import os
 import signal
 import struct
@@ -73,7 +74,7 @@ def hold_until_release(t):
     time.sleep(3)
     t.check(client.request("status")["holding"], "the next start resumes it")
     sent = [at for at, _, _ in rig.bus.setpoints(now_us() - 1_000_000)]
-    t.check(len(sent) > 90 and max(b - a for a, b in zip(sent, sent[1:])) < 100_000, f"{len(sent)} zeros in a second, without a gap")
+    t.check(len(sent) > 90 and max(b - a for a, b in itertools.pairwise(sent)) < 100_000, f"{len(sent)} zeros in a second, without a gap")
     t.expect(client.request("release"))
     time.sleep(0.2)
     begin_us = now_us()

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Rows 24, 26 and 27: a gateway whose process stands still, sleeps, is stuck, or cannot write its log."""
 
+import contextlib
 import fcntl
+import itertools
 import os
 import re
 import signal
@@ -106,10 +108,8 @@ class Watchdog:
         heard, deadline = [], time.monotonic() + seconds
         while True:
             self.socket.settimeout(max(0.001, deadline - time.monotonic()))
-            try:
+            with contextlib.suppress(TimeoutError):
                 heard.append((now_us(), self.socket.recv(100).decode()))
-            except TimeoutError:
-                pass
             if time.monotonic() >= deadline:
                 return heard
 
@@ -144,7 +144,7 @@ def stuck(t, where):
     words = watchdog.hear(1.2)
     t.check(any(word == "READY=1" for _, word in words), f"it says that it is ready: {words[:3]}")
     fed = [at for at, word in words if word == "WATCHDOG=1"]
-    gap_ms = max((b - a for a, b in zip(fed, fed[1:])), default=10**9) / 1000
+    gap_ms = max((b - a for a, b in itertools.pairwise(fed)), default=10**9) / 1000
     t.check(gap_ms < WATCHDOG_MS, f"while all is well the watchdog is fed every {gap_ms:.0f} ms", True)
     order(rig, where)
     stuck_us = now_us()

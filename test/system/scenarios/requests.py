@@ -139,13 +139,13 @@ def row10_out_of_range(t):
     t.arm(client)
     begin = time.monotonic()
     bad = [
-        dict(left_mm_s=100, right_mm_s=40000),
-        dict(left_mm_s=-32769, right_mm_s=100),
-        dict(left_mm_s=100, right_mm_s=4294967396),
-        dict(left_mm_s=100, right_mm_s=10**25),
-        dict(left_mm_s=100, right_mm_s=100, left_mA=500, right_mA=2001),
-        dict(left_mm_s=100, right_mm_s=100, left_mA=-2001, right_mA=0),
-        dict(left_mm_s=2**63, right_mm_s=0),
+        {"left_mm_s": 100, "right_mm_s": 40000},
+        {"left_mm_s": -32769, "right_mm_s": 100},
+        {"left_mm_s": 100, "right_mm_s": 4294967396},
+        {"left_mm_s": 100, "right_mm_s": 10**25},
+        {"left_mm_s": 100, "right_mm_s": 100, "left_mA": 500, "right_mA": 2001},
+        {"left_mm_s": 100, "right_mm_s": 100, "left_mA": -2001, "right_mA": 0},
+        {"left_mm_s": 2**63, "right_mm_s": 0},
     ]
     while time.monotonic() - begin < 1.4:
         for fields in bad:

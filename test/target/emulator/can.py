@@ -128,7 +128,7 @@ class Wheel:
 
     def power(self, on, now_ns):
         self.powered, self.queue, self.target_mm_s, self.speed_mm_s = on, [], 0, 0.0
-        self.due = {kind: now_ns + self.phase_ns for kind in ("speed", "status", "force")} if on else {}
+        self.due = dict.fromkeys(("speed", "status", "force"), now_ns + self.phase_ns) if on else {}
         self.next_ns = now_ns + self.phase_ns if on else None
 
     def hear(self, frame):
@@ -191,7 +191,7 @@ class Bus:
             times.append(self.idle_ns if self.idle_ns > now_ns else None)
             times.append(self.suspended_ns if self.suspended_ns > now_ns else None)
             times.append(None if at_rest else now_ns + 11 * BIT_NS)
-        self.calm = bool(self.current) or not self.stuck and at_rest
+        self.calm = bool(self.current) or (not self.stuck and at_rest)
         return min([time for time in times if time is not None], default=None)
 
     def hold_dominant(self, on):

@@ -55,7 +55,7 @@ class Clocks:
         self.cr = self.cr & ~(HSERDY | PLLRDY) | (HSERDY if hse else 0) | (PLLRDY if pll else 0)
         self.settled = all(ready_ns is None or now_ns >= ready_ns for ready_ns in (self.hse_ready_ns, self.pll_ready_ns))
         switched = self.cfgr & 3
-        if switched == 2 and not pll or switched == 1 and not hse:
+        if (switched == 2 and not pll) or (switched == 1 and not hse):
             switched = 0
         self.cfgr = self.cfgr & ~0xC | switched << 2
         self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
@@ -279,9 +279,8 @@ class Exti:
         self.selection, self.last = 0, None
 
     def look(self, level):
-        if self.last is not None and level != self.last:
-            if self.registers[0x8 if level else 0xC] & 1:
-                self.registers[0x14] |= 1
+        if self.last is not None and level != self.last and self.registers[0x8 if level else 0xC] & 1:
+            self.registers[0x14] |= 1
         self.last = level
 
     def line(self):
@@ -353,7 +352,7 @@ class Uart:
         return self.idle_ns
 
     def line(self):
-        return bool(self.flags & 0x10 and self.cr1 & 0x10 or self.flags & 0xE and self.cr3 & 1)
+        return bool((self.flags & 0x10 and self.cr1 & 0x10) or (self.flags & 0xE and self.cr3 & 1))
 
     def read(self, offset):
         now_ns = self.chip.now_ns
@@ -404,7 +403,7 @@ class DmaChannel:
         self.left = self.length = self.registers["count"]
         self.start_ns = max(self.chip.now_ns, self.chip.uart.free_ns)
         self.chip.expect(self.registers["peripheral"] == 0x40004404, "the DMA does not serve the USART's data register")
-        self.chip.expect(0x20000000 <= self.registers["memory"] and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
+        self.chip.expect(self.registers["memory"] >= 0x20000000 and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
                          "the DMA reaches where no RAM is")
 
     def put(self, byte):
@@ -442,7 +441,7 @@ class DmaChannel:
         return self.start_ns + (self.left - 1) * self.chip.uart.byte_ns()
 
     def line(self):
-        return bool(self.half and self.control() & self.HALF or self.end and self.control() & self.END)
+        return bool((self.half and self.control() & self.HALF) or (self.end and self.control() & self.END))
 
 
 class ChannelF1(DmaChannel):
@@ -477,7 +476,7 @@ class Dma:
         return self.transmit.next_event_ns()
 
     def find(self, offset):
-        for channel, base in zip((self.receive, self.transmit), self.bases):
+        for channel, base in zip((self.receive, self.transmit), self.bases, strict=True):
             index = (offset - base) // 4
             if 0 <= index < len(channel.offsets):
                 return channel, channel.offsets[index]
@@ -494,7 +493,7 @@ class Dma:
 
     def write(self, offset, value):
         if offset == self.clear_offset:
-            for channel, bit in zip((self.receive, self.transmit), self.bits):
+            for channel, bit in zip((self.receive, self.transmit), self.bits, strict=True):
                 channel.half &= not value >> bit[0] & 1
                 channel.end &= not value >> bit[1] & 1
             return
@@ -584,7 +583,7 @@ class Flash:
         if offset == 0:
             self.chip.clocks.acr = value & ~0x1800
         elif offset == 4:
-            self.keys = (self.keys + [value])[-2:]
+            self.keys = ([*self.keys, value])[-2:]
             self.cr &= ~self.lock if self.keys == [0x45670123, 0xCDEF89AB] else ~0
         elif offset == 0xC:
             self.sr &= ~value
@@ -637,7 +636,7 @@ class Watchdog:
     def write(self, offset, value, now_ns):
         if offset == 0:
             self.unlocked = value == 0x5555
-            if value == 0xCCCC or value == 0xAAAA and self.deadline_ns is not None:
+            if value == 0xCCCC or (value == 0xAAAA and self.deadline_ns is not None):
                 self.deadline_ns = now_ns + self.timeout_ns()
         elif self.unlocked:
             self.busy_until_ns = now_ns + 5 * 10**9 // self.lsi_hz

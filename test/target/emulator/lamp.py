@@ -24,6 +24,6 @@ class Lamp:
         samples = [self.was_lit(time_ns) for time_ns in range(max(now_ns - 1000 * MS, 0), now_ns, MS)]
         if all(samples) or not any(samples):
             return "steady" if samples[0] else "dark"
-        flashes = sum(1 for before, after in zip([samples[-1]] + samples, samples) if after and not before)
+        flashes = sum(1 for before, after in zip([samples[-1], *samples], samples, strict=False) if after and not before)
         share = sum(samples) / len(samples)
         return f"{flashes} flashes, {round(share * 100 / 6.25) * 6.25:g} % lit"

@@ -136,7 +136,7 @@ class Machine:
             if self.now_ns >= self.quiet_until_ns:
                 self.attend()
             next_ns = max(min(end_ns, self.due_ns), self.now_ns + 1)
-            if self.frozen or self.sleeping and not self.pending:
+            if self.frozen or (self.sleeping and not self.pending):
                 self.now_ns = next_ns
                 continue
             self.sleeping = False
@@ -283,7 +283,7 @@ class Machine:
                 if size != 4:
                     self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
                 return read(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1) & 0xFFFFFFFF
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001
                 return self.fail(error)
 
         def on_write(_, offset, size, value, __):
@@ -292,7 +292,7 @@ class Machine:
                 if size != 4:
                     self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
                 write(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1, value)
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001
                 self.fail(error)
 
         callbacks = (MMIO_READ_CFUNC(on_read), MMIO_WRITE_CFUNC(on_write))
@@ -321,7 +321,7 @@ class Machine:
         def guard(function, *arguments):
             try:
                 return function(*arguments)
-            except Exception as error:
+            except Exception as error:  # noqa: BLE001
                 return self.fail(error)
 
         callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(fetch, base + offset, size)),

@@ -79,6 +79,12 @@ void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value) {
     iwn_out_span(self, name, (iwn_span_t){first, (size_t)(end - first)});
 }
 
+void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values) {
+    for (; *names != '\0'; names += strlen(names) + 1U) {
+        iwn_out_int(self, names, (int64_t)*values++);
+    }
+}
+
 /// Whether a byte stands in a text as it is.
 static bool is_plain(char c) {
     return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';

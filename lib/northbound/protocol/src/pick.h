@@ -5,7 +5,7 @@
 
 #include "iwheel_northbound/words.h"
 
-#define PICK(table, index)                                                                                             \
-    (((size_t)(index) < sizeof(table) / sizeof((table)[0]) && (table)[index] != NULL) ? (table)[index] : "unknown")
+#define PICK(table, index) iwn_pick((table), sizeof(table) / sizeof((table)[0]), (size_t)(index))
+const char *iwn_pick(const char *const *table, size_t size, size_t index);
 
 #endif

@@ -33,7 +33,6 @@ IW_STATIC_ASSERT(sizeof cmd_names / sizeof cmd_names[0] == IWN_CMDS, a_name_for_
 IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
 IW_STATIC_ASSERT(IWN_CMDS <= 24 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
 
-#define REFUSE(refusal, error, ...) refuse((refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
 #define NOT_PLAIN                                                                                                      \
     " without characters that move a terminal (control characters, line separators, marks of writing direction)"
 
@@ -56,7 +55,7 @@ static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
     return out_digits;
 }
 
-static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const *texts) {
+bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const *texts) {
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = error;
     iwn_text_join(&message, texts);
@@ -112,21 +111,21 @@ static bool is_too_deep(const char *line, size_t length) {
 static bool read_text(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
     char digits[NUMBER_SIZE];
     if (!iwn_json_text(value, target, field->max + 1U) || *target == '\0' || !iwn_plain_text(target)) {
-        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be a text of 1 to ", number(field->max, digits),
-                      " bytes", NOT_PLAIN);
+        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be a text of 1 to ",
+                          number(field->max, digits), " bytes", NOT_PLAIN);
     }
     return true;
 }
 
 static bool read_integer(const field_t *field, iwn_json_t value, int64_t *target, iwn_refusal_t *out_refusal) {
     if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
-        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name,
-                      " must be an integer: no fraction, no exponent, no quotes");
+        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, field->name,
+                          " must be an integer: no fraction, no exponent, no quotes");
     }
     *target = iwn_json_integer(value);
     if (field->kind == RATE && *target < 1) {
-        return REFUSE(out_refusal, IWN_OUT_OF_RANGE, field->name,
-                      " must be at least 1; to end watching send an empty topics list");
+        return IWN_REFUSE(out_refusal, IWN_OUT_OF_RANGE, field->name,
+                          " must be at least 1; to end watching send an empty topics list");
     }
     return true;
 }
@@ -148,7 +147,7 @@ static bool read_side(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refu
     } else if (iwn_json_is(value, "right")) {
         *target = IW_SIDES_RIGHT;
     } else {
-        return REFUSE(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
+        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
     }
     return true;
 }
@@ -160,8 +159,8 @@ static bool read_item(iwn_json_t value, iw_ledger_item_t *target, iwn_refusal_t 
             return true;
         }
     }
-    return REFUSE(out_refusal, IWN_BAD_VALUE,
-                  "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
+    return IWN_REFUSE(out_refusal, IWN_BAD_VALUE,
+                      "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
 }
 
 /// A number becomes its digits, so that 192 and "192" are the same.
@@ -178,7 +177,7 @@ static bool read_flag(const field_t *field, iwn_json_t value, bool *target, iwn_
     const iwn_json_kind_t kind = iwn_json_kind(value);
     *target = kind == IWN_JSON_TRUE;
     return *target || kind == IWN_JSON_FALSE ||
-           REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be true or false");
+           IWN_REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be true or false");
 }
 
 static bool read_field(const field_t *field, iwn_json_t value, iwn_request_t *request, iwn_refusal_t *out_refusal) {
@@ -213,13 +212,13 @@ static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refus
         out_id->kind = IWN_ID_TEXT;
         return true;
     }
-    return REFUSE(out_refusal, IWN_BAD_VALUE, "id must be an integer or a text of at most ",
-                  number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
+    return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "id must be an integer or a text of at most ",
+                      number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
 }
 
 static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
     if (iwn_json_kind(value) != IWN_JSON_TEXT) {
-        return REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+        return IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
     }
     const unsigned cmd = find_word(value, cmd_word);
     if (cmd == IWN_CMDS) {
@@ -247,7 +246,7 @@ static bool read_common(iwn_json_t root, iwn_request_t *request, iwn_refusal_t *
         return false;
     }
     if (cmd.at == NULL) {
-        return REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
+        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
     }
     return read_cmd(cmd, &request->cmd, out_refusal);
 }
@@ -307,7 +306,7 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     for (unsigned i = 0; i < FIELDS; i++) {
         const bool needed = fields[i].required != 0U && (fields[i].allowed & 1U << request->cmd) != 0U;
         if (needed && (seen & 1U << i) == 0U) {
-            return REFUSE(out_refusal, IWN_MISSING_FIELD, cmd_names[request->cmd], " needs ", fields[i].name);
+            return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, cmd_names[request->cmd], " needs ", fields[i].name);
         }
     }
     request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
@@ -315,7 +314,7 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     request->has_t_us = (seen & 1U << FIELD_t_us) != 0U;
     request->has_stop = (seen & 1U << FIELD_stop) != 0U;
     if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
-        return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+        return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
     }
     return true;
 }
@@ -332,7 +331,7 @@ static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_jso
         return iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
     }
     return is_too_deep(line, length)
-               ? REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
+               ? IWN_REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
                : false;
 }
 
@@ -344,8 +343,8 @@ bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_req
     uint32_t seen = 0;
     *out_request = request;
     if (length > IWN_LINE_MAX) {
-        return REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
-                      " bytes; end each with a newline");
+        return IWN_REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
+                          " bytes; end each with a newline");
     }
     return read_line(line, length, work, &root, out_refusal) && read_common(root, out_request, out_refusal) &&
            read_fields(root, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);

@@ -2,6 +2,10 @@
 // Apart from the other words: an image without the protocol has these alone.
 #include "pick.h"
 
+const char *iwn_pick(const char *const *table, size_t size, size_t index) {
+    return (index < size && table[index] != NULL) ? table[index] : "unknown";
+}
+
 const char *iwn_state_name(iw_state_t state) {
     static const char *const names[] = {
         [IW_STATE_LISTENING] = "listening",

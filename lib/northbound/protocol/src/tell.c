@@ -81,7 +81,7 @@ static void write_wheel(const iw_snapshot_t *seen, const iwn_surroundings_t *aro
     iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
     write_motion(seen, side, json);
     write_condition(seen, side, json);
-    iwn_tell_wheel_force(seen, around, side, json);
+    iwn_tell_wheel_force(seen, around, side, false, json);
     iwn_out_close(json, '}');
 }
 
@@ -175,10 +175,8 @@ void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *aroun
 static void write_budget(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
     iwn_out_open(json, "budget", '{');
-    iwn_out_int(json, "client_lost_ms", budget.client_lost_ms);
-    iwn_out_int(json, "client_lost_mm", budget.client_lost_mm);
-    iwn_out_int(json, "killed_ms", budget.killed_ms);
-    iwn_out_int(json, "killed_mm", budget.killed_mm);
+    IWN_OUT_NUMBERS(json, "client_lost_ms\0client_lost_mm\0killed_ms\0killed_mm\0", budget.client_lost_ms,
+                    budget.client_lost_mm, budget.killed_ms, budget.killed_mm);
     iwn_out_close(json, '}');
 }
 
@@ -194,23 +192,14 @@ static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_counters_t *counters = seen->counters;
     const iw_sent_t *sent = seen->sent;
     iwn_out_open(json, "counters", '{');
-    iwn_out_int(json, "received", counters->received);
-    iwn_out_int(json, "echoes", counters->echoes);
-    iwn_out_int(json, "bad_format", counters->bad_format);
-    iwn_out_int(json, "bad_length", counters->bad_length);
-    iwn_out_int(json, "unknown", counters->unknown);
-    iwn_out_int(json, "foreign", counters->foreign);
-    iwn_out_int(json, "late_steps", counters->late_steps);
-    iwn_out_int(json, "out_of_range", counters->out_of_range);
-    iwn_out_int(json, "purges", counters->purges);
-    iwn_out_int(json, "left_behind", counters->left_behind);
-    iwn_out_int(json, "pairs", sent->pairs);
-    iwn_out_int(json, "send_later", sent->later);
-    iwn_out_int(json, "clamped", sent->clamped);
-    iwn_out_int(json, "gate_stopped", seen->stopped);
-    iwn_out_int(json, "stray_echoes", seen->stray_echoes);
-    iwn_out_int(json, "gap_max_us", sent->gap_max_us);
-    iwn_out_int(json, "still_moving", seen->still_moving);
+    IWN_OUT_NUMBERS(
+        json,
+        "received\0echoes\0bad_format\0bad_length\0unknown\0foreign\0late_steps\0out_of_range\0purges\0left_behind\0"
+        "pairs\0send_later\0clamped\0gate_stopped\0stray_echoes\0gap_max_us\0still_moving\0",
+        counters->received, counters->echoes, counters->bad_format, counters->bad_length, counters->unknown,
+        counters->foreign, counters->late_steps, counters->out_of_range, counters->purges, counters->left_behind,
+        sent->pairs, sent->later, sent->clamped, seen->stopped, seen->stray_echoes, sent->gap_max_us,
+        seen->still_moving);
     iwn_out_close(json, '}');
 }
 

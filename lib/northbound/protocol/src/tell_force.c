@@ -66,53 +66,47 @@ static bool is_heard(const iw_force_t *force, iw_time_us_t now_us) {
     return force->raw_us != IW_NEVER && now_us - force->raw_us < IW_FORCE_STALE_US;
 }
 
-void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side,
+void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side, bool alone,
                           iwn_out_t *json) {
+    const size_t force_prefix = alone ? sizeof "force_" - 1U : 0U;
+    const size_t zero_prefix = alone ? sizeof "offset_" - 1U : 0U;
     const iw_force_t *force = seen->wheel[side].force;
     const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
     const bool heard = is_heard(force, seen->at_us);
-    const bool offset = force->provenance != IW_OFFSET_NONE;
     const iwn_zero_note_t *noted = &around->zero[side];
     const zero_t zero = describe_zero(seen, around, side);
-    iwn_out_known32(json, "force_raw", heard, force->raw);
-    iwn_out_known32(json, "force_raw_mN", heard, iw_force_raw_mN(force));
-    iwn_out_known32(json, "force_offset_mN", offset, force->offset_mN);
-    iwn_out_known32(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-    iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
-    iwn_tell_age("force_age_ms", seen->at_us, force->raw_us, json);
-    iwn_out_text(json, "offset_provenance", zero.word);
-    iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
+    iwn_out_known32(json, &"force_raw"[force_prefix], heard, force -> raw);
+    iwn_out_known32(json, &"force_raw_mN"[force_prefix], heard, iw_force_raw_mN(force));
+    iwn_out_known32(json, &"force_offset_mN"[force_prefix], force -> provenance != IW_OFFSET_NONE, force -> offset_mN);
+    iwn_out_known32(json, &"force_net_mN"[force_prefix], validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    iwn_out_text(json, &"force_validity"[force_prefix], iwn_force_validity_name(validity));
+    if (alone) {
+        iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
+    }
+    iwn_tell_age(&"force_age_ms"[force_prefix], seen -> at_us, force -> raw_us, json);
+    iwn_out_text(json, &"offset_provenance"[zero_prefix], zero.word);
+    if (!alone) {
+        iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
+    }
     iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
-    write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
-    iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
-    iwn_out_known(json, "offset_samples", zero.measured, zero.samples);
-    iwn_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
-    iwn_out_known32(json, "offset_drift_mN", zero.measured, zero.drift_mN);
-    iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_heard, (int32_t)force->wheel_offset_dN * 100);
-    iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
+    write_known_bool(json, &"offset_contaminated"[zero_prefix], zero.judged, zero.contaminated);
+    if (!alone) {
+        iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
+    }
+    iwn_out_known(json, &"offset_samples"[zero_prefix], zero.measured, zero.samples);
+    iwn_out_known(json, &"offset_deviation_mN"[zero_prefix], zero.measured, zero.deviation_mN);
+    if (!alone) {
+        iwn_out_known32(json, "offset_drift_mN", zero.measured, zero.drift_mN);
+        iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_heard, (int32_t)force->wheel_offset_dN * 100);
+        iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
+    }
 }
 
 void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     iwn_out_int(json, "t_us", (int64_t)seen->at_us);
-    for (unsigned i = 0; i < IW_SIDES; i++) {
-        const iw_side_t side = (iw_side_t)i;
-        const iw_force_t *force = seen->wheel[side].force;
-        const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
-        const bool heard = is_heard(force, seen->at_us);
-        const zero_t zero = describe_zero(seen, around, side);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
-        iwn_out_known32(json, "raw", heard, force->raw);
-        iwn_out_known32(json, "raw_mN", heard, iw_force_raw_mN(force));
-        iwn_out_known32(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
-        iwn_out_known32(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-        iwn_out_text(json, "validity", iwn_force_validity_name(validity));
-        iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
-        iwn_tell_age("age_ms", seen->at_us, force->raw_us, json);
-        iwn_out_text(json, "provenance", zero.word);
-        iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
-        write_known_bool(json, "contaminated", zero.judged, zero.contaminated);
-        iwn_out_known(json, "samples", zero.measured, zero.samples);
-        iwn_out_known(json, "deviation_mN", zero.measured, zero.deviation_mN);
+        iwn_tell_wheel_force(seen, around, (iw_side_t)side, true, json);
         iwn_out_close(json, '}');
     }
 }

@@ -72,10 +72,8 @@ void iwn_tell_applied(const iw_applied_t *applied, iwn_out_t *json) {
 void iwn_tell_terms(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
     iwn_out_text(json, "state", iwn_state_name(seen->state));
-    iwn_out_int(json, "lease_ms", seen->config->lease_ms);
-    iwn_out_int(json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
-    iwn_out_int(json, "stop_budget_ms", budget.client_lost_ms);
-    iwn_out_int(json, "stop_budget_mm", budget.client_lost_mm);
+    IWN_OUT_NUMBERS(json, "lease_ms\0first_lease_ms\0stop_budget_ms\0stop_budget_mm\0", seen->config->lease_ms,
+                    IW_FIRST_LEASE_US / IW_US_PER_MS, budget.client_lost_ms, budget.client_lost_mm);
     iwn_tell_warnings(around, json);
 }
 

@@ -30,10 +30,8 @@ static void reply_state(iwn_server_t *self, iwn_client_t *client) {
 }
 
 static void do_hello(iwn_server_t *self, iwn_client_t *client) {
-    const iwn_hello_t hello = {self->version, self->bus, iw_gateway_state(self->core), client->id,
-                               client->watches_only};
     iwn_out_t json = iwn_server_begin_reply(self, &self->request.id);
-    iwn_tell_hello(&hello, &json);
+    iwn_server_write_hello(self, client, &json);
     iwn_server_send_reply(self, client, &json);
 }
 

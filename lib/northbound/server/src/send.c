@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Lines to clients, and the queries about them.
-#include "iwheel_server/target.h"
+#include "server_calls.h"
 
 #include <string.h>
 
-void iwn_server_welcome(iwn_server_t *self, iwn_client_t *client, iw_client_t id, bool watches_only) {
-    (void)self;
+void iwn_server_welcome(iwn_client_t *client, iw_client_t id, bool watches_only) {
     memset(client, 0, sizeof *client);
     client->id = id;
     client->watches_only = watches_only;
@@ -60,24 +59,32 @@ iwn_out_t iwn_server_begin_event(iwn_server_t *self, const char *name) {
     return iwn_tell_event(line, size, name);
 }
 
-void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *json) {
+/// Closes an event and sends it to those who watch the topic.
+static void send_event(iwn_server_t *self, iwn_topic_t topic, bool due_only, iwn_out_t *json) {
     iwn_out_close(json, '}');
     const size_t length = iwn_out_finish(json);
     for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
-        if (watches(client, topic)) {
+        if (watches(client, topic) && (client->due || !due_only)) {
             iwn_target_event(self, client, json->data, length);
         }
     }
 }
 
+void iwn_server_send_event(iwn_server_t *self, iwn_topic_t topic, iwn_out_t *json) {
+    send_event(self, topic, false, json);
+}
+
+void iwn_server_write_hello(iwn_server_t *self, const iwn_client_t *client, iwn_out_t *json) {
+    iwn_tell_hello(
+        &(iwn_hello_t){self->version, self->bus, iw_gateway_state(self->core), client->id, client->watches_only}, json);
+}
+
 void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
-    const iwn_hello_t hello = {self->version, self->bus, iw_gateway_state(self->core), client->id,
-                               client->watches_only};
     iwn_out_t json = iwn_server_begin_event(self, "hello");
-    iwn_tell_hello(&hello, &json);
+    iwn_server_write_hello(self, client, &json);
     iwn_out_int(&json, "t_us", (int64_t)self->now_us);
     iwn_server_send_reply(self, client,
-                          &json); // A client waits for it before it says anything: it is not to be dropped.
+                          &json); // A client waits for it before it sends anything, so it must not be dropped.
 }
 
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
@@ -119,13 +126,7 @@ static void send_force(iwn_server_t *self, const iw_snapshot_t *seen) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
     iwn_out_t json = iwn_server_begin_event(self, "force");
     iwn_tell_force(seen, &around, &json);
-    iwn_out_close(&json, '}');
-    const size_t length = iwn_out_finish(&json);
-    for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
-        if (client->due && watches(client, IWN_TOPIC_FORCE)) {
-            iwn_target_event(self, client, json.data, length);
-        }
-    }
+    send_event(self, IWN_TOPIC_FORCE, true, &json);
 }
 
 void iwn_server_periodic(iwn_server_t *self) {

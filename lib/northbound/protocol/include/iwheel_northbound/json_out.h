@@ -50,6 +50,10 @@ void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *j
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value);
 /// A whole number.
 void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value);
+/// Whole numbers one after the other. Each of `names` ends with a zero byte, and the last with another one.
+void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values);
+/// The same with the values as arguments: IWN_OUT_NUMBERS(json, "first\0second\0", 1, 2). A literal adds the last byte.
+#define IWN_OUT_NUMBERS(self, names, ...) iwn_out_numbers((self), (names), (const uint32_t[]){__VA_ARGS__})
 /// A NULL text is `null`.
 void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
 /// As `iwn_out_open`, the name as a span.

@@ -97,6 +97,11 @@ typedef struct {
     char message[512]; ///< The words, terminated.
 } iwn_refusal_t;
 
+/// Writes a refusal, whose words are texts one behind the other, the last of which is NULL. False, so that it can be returned.
+bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const *texts);
+/// The same with the texts as arguments.
+#define IWN_REFUSE(out_refusal, error, ...) iwn_refuse((out_refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
+
 /// Reads `length` bytes (no newline among them). True: `*out_request` is complete. False: `*out_refusal` tells why, and
 /// `out_request->id` holds the id as far as it could be read. What is wrong with the whole line comes first, then the id, then
 /// the command, then its fields in their order, then what is missing.

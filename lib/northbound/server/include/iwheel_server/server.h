@@ -88,7 +88,7 @@ typedef struct iwn_server {
 void iwn_server_begin(iwn_server_t *self);
 
 /// A new client: empty except for its number and right.
-void iwn_server_welcome(iwn_server_t *self, iwn_client_t *client, iw_client_t id, bool watches_only);
+void iwn_server_welcome(iwn_client_t *client, iw_client_t id, bool watches_only);
 
 /// Carries out `self->request` whole or not at all, answers it (an arm may be answered later), and tells what came of it.
 void iwn_server_request(iwn_server_t *self, iwn_client_t *client);
