@@ -53,7 +53,7 @@ static bool compare(iw_host_t *self, bool *out_same) {
                has_failed(self, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
     if (!iw_settings_value(&self->settings, key, value)) {
-        return has_failed(self, IWN_TYPE_NOT_SET,
+        return has_failed(self, (request->item == IW_LEDGER_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
     if (is_told && !iw_settings_set(&found, key, request->value, &why)) {

@@ -121,6 +121,9 @@ static void advise_listening(const json_t *status, advice_t *self) {
     if (is_unset(status, "current_role")) {
         add(self, "cannot arm: set current_role (limit or setpoint) under [wheels]");
     }
+    if (is_unset(status, "track")) {
+        add(self, "cannot arm: set track_mm under [wheels]; iwheelctl bringup measures it");
+    }
     add_contradictions(status, self);
     if (self->lines == 0) {
         add(self, "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels");

@@ -248,7 +248,7 @@ void gw_knowledge_tend(gw_knowledge_t *self) {
 static void refuse(iw_ledger_item_t item, gw_found_t verdict, iwn_refusal_t *out_refusal) {
     const char *name = iwn_ledger_item_name(item);
     if (verdict == GW_FOUND_UNSET) {
-        out_refusal->error = IWN_TYPE_NOT_SET;
+        out_refusal->error = (item == IW_LEDGER_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET;
         (void)snprintf(out_refusal->message, sizeof out_refusal->message,
                        "%s is not configured, so there is nothing to confirm; set it under [wheels] first", name);
     } else {
