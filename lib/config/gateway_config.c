@@ -395,10 +395,9 @@ void gateway_config_print_noted(const gateway_config_t *config, gateway_config_n
     gateway_config_t defaults;
     gateway_config_default(&defaults);
     defaults.core.rest_rpm = iw_config_rest(&config->core).standard;
-    (void)fputs(
-        "; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. Three have "
-        "no\n; default, and without them no wheel moves: setpoint_type, current_role and track_mm.\n",
-        out);
+    (void)fputs("; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. "
+                "Without\n; setpoint_type, current_role and track_mm, which have none, no wheel moves.\n",
+                out);
     if (config->core.listen_only) {
         (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);
     }

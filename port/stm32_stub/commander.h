@@ -4,12 +4,12 @@
 ///
 /// A source is one file, which CMake chooses. The first is beside this file, the others are in app/board:
 ///
-/// | file                | chosen by                                      | does                                        |
-/// |---------------------|------------------------------------------------|---------------------------------------------|
-/// | commander_none.c    | nothing configured                             | nothing: the image listens, silently        |
-/// | commander_zero.c    | IWHEEL_SETPOINT_TYPE, _CURRENT_ROLE, _TRACK_MM | arms when it may, holds both wheels at 0/0  |
-/// | commander_demo.c    | these and IWHEEL_DEMO                          | as zero; pressing PA1 starts a slow profile |
-/// | commander_gateway.c | IWHEEL_GATEWAY                                 | what a host asks over the serial line       |
+/// | file                | chosen by                                    | does                                        |
+/// |---------------------|----------------------------------------------|---------------------------------------------|
+/// | commander_none.c    | nothing configured                           | nothing: the image listens, silently        |
+/// | commander_zero.c    | setpoint type, current role and track        | arms when it may, holds both wheels at 0/0  |
+/// | commander_demo.c    | these and IWHEEL_DEMO                        | as zero; pressing PA1 starts a slow profile |
+/// | commander_gateway.c | IWHEEL_GATEWAY                               | what a host asks over the serial line       |
 ///
 /// The first three have commander.c, console.c and report.c beside them; the last one brings what these do.
 ///
