@@ -96,8 +96,8 @@ static const settings_key_t keys[] = {
     {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
      .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
     {"wheels", "track_mm", " mm",
-     "Distance between the wheels: turns a twist into speeds, and yaw into their difference.",
-     CORE(track_mm, IW_CONFIG_TRACK)},
+     "Between the wheels, for all that turns: no default, no arming until it is set. `iwheelctl bringup` measures it.",
+     CORE(track_mm, IW_CONFIG_TRACK), .unset_is_0 = true},
     {"wheels", "setpoint_dlc", "", "Length of a setpoint frame, zero padded; the document's table has 5 bytes.",
      CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
 
@@ -396,7 +396,7 @@ void gateway_config_print_noted(const gateway_config_t *config, gateway_config_n
     gateway_config_default(&defaults);
     defaults.core.rest_rpm = iw_config_rest(&config->core).standard;
     (void)fputs("; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. "
-                "Two have no\n; default and must be set before the wheels may move: setpoint_type and current_role.\n",
+                "Without\n; setpoint_type, current_role and track_mm, which have none, no wheel moves.\n",
                 out);
     if (config->core.listen_only) {
         (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);

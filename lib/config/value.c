@@ -235,7 +235,8 @@ static bool settings_value_format(const settings_key_t *row, const void *values,
     out[0] = '\0';
     switch (row->kind) {
     case SETTINGS_NUMBER:
-        if (row->set != 0U && ((const unsigned char *)values)[row->set] == 0U) {
+        if ((row->set != 0U && ((const unsigned char *)values)[row->set] == 0U) ||
+            (row->unset_is_0 && load(row, values) == 0U)) {
             return false;
         }
         (void)snprintf(out, SETTINGS_MESSAGE_SIZE, "%u", (unsigned)load(row, values));
