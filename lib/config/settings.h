@@ -39,6 +39,9 @@ typedef struct {
     uint8_t value;
 } settings_word_t;
 
+/// The words of a switch.
+extern const settings_word_t settings_no_yes[];
+
 /// One key. Where its value lives is told as a place in the program's structure of values.
 typedef struct {
     const char *section;

@@ -7,6 +7,8 @@
 #define GROUP_NAME_MAX   32U
 #define OWNER_READ_WRITE 0600U
 
+const settings_word_t settings_no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+
 bool settings_wrong(char out_why[SETTINGS_MESSAGE_SIZE], const char *format, ...) {
     va_list list;
     va_start(list, format);

@@ -242,7 +242,7 @@ int main(int count, char **arguments) {
     if (code >= 0) {
         return code;
     }
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     if (words.path != NULL || access(SETTINGS_PATH, F_OK) == 0) {
         code = settings_load(&mqtt_settings_form, (words.path != NULL) ? words.path : SETTINGS_PATH, &settings, stderr);
     }

@@ -52,7 +52,8 @@ typedef struct {
     } drive;
 } mqtt_settings_t;
 
-void mqtt_settings_default(mqtt_settings_t *out_settings);
+/// The defaults.
+extern const mqtt_settings_t mqtt_settings_standard;
 
 extern const settings_form_t mqtt_settings_form;
 

@@ -119,7 +119,6 @@ static int check(const ros_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static ros_settings_t settings;
-    static ros_settings_t standard;
     const bridge_program_t program = {
         .form = &ros_settings_form,
         .path = ROS_SETTINGS_PATH,
@@ -129,11 +128,10 @@ int main(int count, char **arguments) {
         .exit_codes = "exit codes: 0 ok, 1 a check failed, 64 usage, 69 DDS unavailable,\n"
                       "77 the gateway's socket may not be used, 78 configuration\n",
         .settings = &settings,
-        .standard = &standard,
+        .standard = &ros_settings_standard,
     };
     int action = BRIDGE_RUN;
-    ros_settings_default(&settings);
-    ros_settings_default(&standard);
+    settings = ros_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     if (code != BRIDGE_GO) {
         return code;

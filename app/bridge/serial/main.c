@@ -56,7 +56,6 @@ static int act(int action, const serial_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static serial_settings_t settings;
-    static serial_settings_t standard;
     const bridge_program_t program = {
         .form = &serial_settings_form,
         .path = SERIAL_SETTINGS_PATH,
@@ -75,11 +74,10 @@ int main(int count, char **arguments) {
                 {"socket", "northbound.socket"},
                 {"watch-socket", "northbound.watch_socket"}},
         .settings = &settings,
-        .standard = &standard,
+        .standard = &serial_settings_standard,
     };
     int action = BRIDGE_RUN;
-    serial_settings_default(&settings);
-    serial_settings_default(&standard);
+    settings = serial_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     return (code == BRIDGE_GO) ? act(action, &settings) : code;
 }

@@ -127,7 +127,6 @@ static int run(const web_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static web_settings_t settings;
-    static web_settings_t standard;
     const bridge_program_t program = {
         .form = &web_settings_form,
         .path = WEB_SETTINGS_PATH,
@@ -141,11 +140,10 @@ int main(int count, char **arguments) {
                       "78 configuration\n",
         .own = {{"url", NULL}, {"read-secret", NULL}},
         .settings = &settings,
-        .standard = &standard,
+        .standard = &web_settings_standard,
     };
     int action = BRIDGE_RUN;
-    web_settings_default(&settings);
-    web_settings_default(&standard);
+    settings = web_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     if (code != BRIDGE_GO) {
         return code;
