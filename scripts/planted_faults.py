@@ -271,6 +271,21 @@ def pages(folder, fault):
     return run(SCRIPTS / "pages.py", folder)
 
 
+def man(folder, fault):
+    """The manual pages of the build, one of them with one change: (page, old, new)."""
+    build = ROOT / "build/default"
+    if not (build / "man/iwheelctl.1.scd").exists():
+        return 77, "build/default has no manual pages"
+    shutil.copytree(build / "man", folder / "man")
+    (folder / "app").symlink_to(build / "app")
+    page, old, new = fault
+    text = (folder / "man" / page).read_text()
+    if old not in text:
+        return 0, f"{old} is not in {page}"
+    (folder / "man" / page).write_text(text.replace(old, new))
+    return run(sys.executable, ROOT / "test/man/test_pages.py", folder, "-k", "has_its_help", "-k", "has_the_help", "-k", "running_one")
+
+
 def python_pins(folder, fault):
     """The pinned PyPI packages with one change: file, what stands there, what stands there then; and a program beside them."""
     (folder / "scripts").mkdir()
@@ -601,6 +616,11 @@ CASES = [
     (proofs, "python3", "clean", str, False),
     (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
     (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),
+    (man, "python3", "clean", ("iwheelctl.1.scd", "", ""), False),
+    (man, "python3", "a verb whose page is not what it prints", ("iwheelctl.1.scd", "REASON appears", "REASON is shown"), True),
+    (man, "python3", "an option that a program has no more", ("iwheel-gateway.1.scd", "--listen-only ", "--listen "), True),
+    (man, "python3", "a verb without a summary", ("iwheelctl.1.scd", "  disarm   the same as stop\n", ""), True),
+    (man, "python3", "a command that the simulator has not", ("iwheel-sim.1.scd", "unmute left", "unmuted left"), True),
     (proofs, "python3", "a step without a row", lambda table: re.sub(r"^demo,.*\n", "", table, flags=re.M), True),
     (proofs, "python3", "a proof that changes its list", lambda table: re.sub(r"^(kernel.check,.*),check$", r"\1,full", table, flags=re.M), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),

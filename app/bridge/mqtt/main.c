@@ -5,6 +5,8 @@
 #include "common/reach.h"
 #include "common/service.h"
 
+#include "mqtt_texts.h"
+
 #include <sysexits.h>
 #include <unistd.h>
 
@@ -59,11 +61,7 @@ int main(int count, char **arguments) {
     const bridge_program_t program = {
         .form = &mqtt_settings_form,
         .path = MQTT_SETTINGS_PATH,
-        .about = "iwheel-mqtt: tells an MQTT broker what the wheels do, loses no stop or fault, and\n"
-                 "passes on stop and estop. It drives only if configured to. No safety function.\n",
-        .options = "      --check         check configuration and files; connect to nothing\n",
-        .exit_codes = "exit codes: 0 ok, 64 usage, 69 reachable, 71 no memory, 73 no directory for events,\n"
-                      "77 permission, 78 configuration\n",
+        .help = mqtt_help,
         .settings = &settings,
         .standard = &mqtt_settings_standard,
     };

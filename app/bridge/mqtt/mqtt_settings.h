@@ -6,7 +6,8 @@
 #include "config/settings.h"
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
-#define MQTT_SETTINGS_PATH "/etc/iwheel/mqtt.conf"
+#define MQTT_SETTINGS_PATH  "/etc/iwheel/mqtt.conf"
+#define FLEET_SETTINGS_PATH "/etc/iwheel/fleet.conf"
 /// Bytes of a machine's id with its terminator.
 #define MQTT_ID_SIZE   33U
 #define MQTT_HOST_SIZE 256U

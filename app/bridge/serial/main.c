@@ -3,6 +3,8 @@
 
 #include "common/program.h"
 
+#include "serial_texts.h"
+
 #include <stdlib.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -59,16 +61,7 @@ int main(int count, char **arguments) {
     const bridge_program_t program = {
         .form = &serial_settings_form,
         .path = SERIAL_SETTINGS_PATH,
-        .about = "iwheel-serial: joins a board that is a gateway of its own, on a serial port,\n"
-                 "to the sockets that iwheelctl, the clients and the bridges know.\n"
-                 "It moves nothing itself.\n",
-        .options = "      --port PATH     serial port of the board\n"
-                   "      --baud RATE     its speed, as the image was built\n"
-                   "      --socket PATH   where clients connect\n"
-                   "      --watch-socket PATH  where clients connect that may not drive, or none\n"
-                   "      --check         check configuration and board; move nothing\n",
-        .exit_codes = "exit codes: 0 ok, 1 a check failed, 64 usage, 69 port or socket in use,\n"
-                      "77 permission, 78 configuration\n",
+        .help = serial_help,
         .own = {{"port", "board.port"},
                 {"baud", "board.baud"},
                 {"socket", "northbound.socket"},
