@@ -11,6 +11,7 @@ bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t n
     config.setpoint_type = 1U; // Yours comes from the wheels' vendor: the document lists no values.
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT; // The same.
+    config.track_mm = 540U;              // Of your machine, from the middle of one tyre to that of the other.
     config.max_speed_mm_s = 500U;
     return iw_gateway_init(gateway, &config, hal, now_us, restarted) == IW_CONFIG_OK;
 }

@@ -1,31 +1,25 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Keeps the manual pages in man/ true: what the programs print about themselves is copied into them, between two comment lines.
+"""Prints a manual page in scdoc's form: that of man/, with what the programs print, and documents of ours, in place of its lines
 
-usage: man_pages.py --check | --update [--build DIR]
-
-    ; help PROGRAM       what `PROGRAM --help` prints
-    ; verbs iwheelctl    the same for each of its verbs
-    ; commands           what `iwheel-sim help` lists
-    ; configuration      what `iwheel-gateway --print-config` makes of share/gateway.conf
+    ; file FILE...       files of ours as they are, in one block
     ; document FILE      a document of ours, from Markdown
     ; header FILE        the contract in a public header
-    ; file FILE          a file of ours as it is
-    ; end
+    ; iwheelctl          what `iwheelctl --help` prints
+    ; verbs              the same for each of its verbs
+
+usage: man_pages.py PAGE.scd [--depends FILE PAGE]    FILE: for make, what PAGE is made of
+
+It runs none of the programs: a cross build makes the same pages.
 """
 
 import argparse
 import os
 import re
-import subprocess
 import sys
-import tempfile
-import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "bridge/ros2", "iwheel-serial": "bridge/serial", "iwheel-web": "bridge/web",
-           "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt"}
-BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
+LINE = re.compile(r"^; (\S+)((?: \S+)*)\n", re.MULTILINE)
 UNDERLINE = re.compile(r"([_*\\])")
 
 
@@ -34,52 +28,37 @@ def literal(text):
 
 
 class Sources:
-    def __init__(self, build):
-        self.build = build
+    def __init__(self):
+        self.used = []
 
-    def program(self, name):
-        return os.path.join(self.build, "app", FOLDERS[name], name)
+    def read(self, name):
+        path = os.path.join(ROOT, name)
+        self.used.append(path)
+        with open(path, encoding="utf-8") as file:
+            return file.read()
 
-    def output(self, name, *arguments):
-        return subprocess.run([self.program(name), *arguments], check=True, capture_output=True, text=True).stdout
+    def verb_pages(self):
+        """In the order of the program's table."""
+        return {verb: self.read(f"app/ctl/help/{verb}.txt") for verb in re.findall(r"\{VERB\((\w+),", self.read("app/ctl/help.c"))}
 
-    def help(self, name):
-        return literal(self.output(name, "--help"))
+    def iwheelctl(self):
+        """As help_print() does it."""
+        summaries = "".join(f"  {verb:<9}{page.split(f'{verb}: ', 1)[1].split(chr(10), 1)[0]}\n" for verb, page in self.verb_pages().items())
+        return literal(self.read("app/ctl/help/iwheelctl.txt").replace("\nVERBS\n", "\n" + summaries, 1))
 
-    def verbs(self, name):
-        names = re.findall(r"^  ([a-z]+) {2,}\S", self.output(name, "--help"), re.MULTILINE)
-        pages = [self.output(name, verb, "--help").split("\n", 1) for verb in names]
-        return "\n".join(f"## {verb}\n\n" + literal(usage + "\n" + rest) for verb, (usage, rest) in zip(names, pages, strict=False))
+    def verbs(self):
+        return "\n".join(f"## {verb}\n\n" + literal(page) for verb, page in self.verb_pages().items())
 
-    def commands(self, _):
-        """The list of a running simulator."""
-        with tempfile.TemporaryDirectory() as folder:
-            control = os.path.join(folder, "control")
-            command = [self.program("iwheel-sim"), "--quiet", "--can", f"unix:{folder}/bus", "--estop", f"{folder}/button"]
-            with subprocess.Popen([*command, "--control", control], stdout=subprocess.DEVNULL) as simulator:
-                while not os.path.exists(control) and simulator.poll() is None:
-                    time.sleep(0.01)
-                try:
-                    return literal(self.output("iwheel-sim", "--control", control, "help"))
-                finally:
-                    simulator.terminate()
-
-    def configuration(self, _):
-        return literal(self.output("iwheel-gateway", "--print-config", "-c", os.path.join(ROOT, "share", "gateway.conf")))
-
-    def file(self, name):
-        with open(os.path.join(ROOT, name), encoding="utf-8") as file:
-            return literal(file.read())
+    def file(self, *names):
+        return literal("".join(self.read(name) for name in names))
 
     def header(self, name):
         """Without what only a compiler needs."""
-        with open(os.path.join(ROOT, name), encoding="utf-8") as file:
-            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", file.read(), flags=re.M)
+        text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", self.read(name), flags=re.M)
         return literal(re.sub(r"\n{3,}", "\n\n", text.replace("IWC_API ", "")))
 
     def document(self, name):
-        with open(os.path.join(ROOT, name), encoding="utf-8") as file:
-            return from_markdown(file.read())
+        return from_markdown(self.read(name))
 
 
 def inline(text):
@@ -127,46 +106,26 @@ def from_markdown(text):
     return re.sub(r"\n{3,}", "\n\n", "\n".join(out).strip() + "\n")
 
 
-def renew(text, sources):
-    def block(match):
-        kind, argument, _ = match.groups()
-        first = f"; {kind}" + (f" {argument}" if argument else "")
-        return f"{first}\n{getattr(sources, kind)(argument)}; end\n"
-
-    return BLOCK.sub(block, text)
-
-
 def main():
-    parser = argparse.ArgumentParser(description="Keeps the manual pages true to what the programs print.")
-    group = parser.add_mutually_exclusive_group(required=True)
-    group.add_argument("--check", action="store_true", help="fail if a page is not true any more")
-    group.add_argument("--update", action="store_true", help="write them anew")
-    parser.add_argument("--build", default=os.path.join(ROOT, "build", "default"))
+    parser = argparse.ArgumentParser(description="Prints a manual page in scdoc's form.")
+    parser.add_argument("page", metavar="PAGE.scd")
+    parser.add_argument("--depends", nargs=2, metavar=("FILE", "PAGE"), help="write into FILE, for make, what PAGE is made of")
     options = parser.parse_args()
-    sources, stale = Sources(os.path.abspath(options.build)), []
-    for name in sorted(os.listdir(os.path.join(ROOT, "man"))):
-        path = os.path.join(ROOT, "man", name)
-        if name == "iwheel-web.1.scd" and not os.path.exists(sources.program("iwheel-web")):
-            print(f"note: man/{name} is not looked at: iwheel-web was not built, libmicrohttpd-dev or uPlot is missing")
-            continue
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
-        if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):
-            print(f"note: man/{name} is not looked at: iwheel-ros2 was not built, cyclonedds-dev is missing")
-            continue
-        if name in ("iwheel-fleet.1.scd", "iwheel-mqtt.1.scd") and not os.path.exists(sources.program(name.split(".", maxsplit=1)[0])):
-            print(f"note: man/{name} is not looked at: libmosquitto-dev or libnats-dev is missing")
-            continue
-        new = renew(text, sources)
-        if new != text:
-            stale.append(name)
-            if options.update:
-                with open(path, "w", encoding="utf-8") as file:
-                    file.write(new)
-    for name in stale:
-        print(f"man/{name}: " + ("written anew" if options.update else "not true any more; run: scripts/man_pages.py --update"))
-    return 1 if stale and options.check else 0
+    sources = Sources()
+    sys.stdout.reconfigure(encoding="utf-8")
+
+    def block(match):
+        kind, names = match.groups()
+        if kind not in ("file", "document", "header", "iwheelctl", "verbs"):
+            sys.exit(f"{options.page}: there is no \"; {kind}\"")
+        return getattr(sources, kind)(*names.split())
+
+    print(LINE.sub(block, sources.read(os.path.abspath(options.page))), end="")
+    if options.depends:
+        file, page = options.depends
+        with open(file, "w", encoding="utf-8") as out:
+            out.write(f"{page}: " + " ".join(sources.used) + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -90,17 +90,31 @@ def warnings(folder, code, compiler="gcc"):
 
 
 def analyzer(folder, code):
-    """A build that compiles one file of an application."""
-    (folder / "app").mkdir()
-    (folder / "app/planted.c").write_text(code)
-    command = f"gcc -std=c99 -O2 -o planted.o -c {folder / 'app/planted.c'}"
-    (folder / "compile_commands.json").write_text(json.dumps([{"file": str(folder / "app/planted.c"), "command": command}]))
-    return run(SCRIPTS / "analyzer_gate.py", "--root", folder, folder)
-
-
-def tidy(folder, code):
+    """With what the preset adds."""
+    presets = json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]
+    flags = next(preset["environment"]["CFLAGS"] for preset in presets if preset["name"] == "analyzer")
     (folder / "planted.c").write_text(code)
-    return run("clang-tidy", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", folder / "planted.c", "--", "-std=c99")
+    return run("gcc", "-std=c99", "-O2", *flags.split(), "-Werror", "-c", folder / "planted.c", "-o", folder / "planted.o")
+
+
+def tidy(folder, code, part="app"):
+    """A file of a program, by all that .clang-tidy says there."""
+    for name in (".clang-tidy", "core/.clang-tidy", "lib/northbound/.clang-tidy"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    source = folder / part / "planted.c"
+    source.parent.mkdir(exist_ok=True)
+    source.write_text(code)
+    (folder / "compile_commands.json").write_text(json.dumps([{"directory": str(folder), "file": str(source), "command": f"clang -std=c99 -c {source}"}]))
+    return run("run-clang-tidy", "-quiet", "-p", folder, cwd=folder)
+
+
+def tidy_core(folder, code):
+    return tidy(folder, code, "core/src")
+
+
+def tidy_northbound(folder, code):
+    return tidy(folder, code, "lib/northbound")
 
 
 def cppcheck(folder, code, suppressions=""):
@@ -256,6 +270,21 @@ def pages(folder, fault):
     return run(SCRIPTS / "pages.py", folder)
 
 
+def man(folder, fault):
+    """The manual pages of the build, one of them with one change: (page, old, new)."""
+    build = ROOT / "build/default"
+    if not (build / "man/iwheelctl.1.scd").exists():
+        return 77, "build/default has no manual pages"
+    shutil.copytree(build / "man", folder / "man")
+    (folder / "app").symlink_to(build / "app")
+    page, old, new = fault
+    text = (folder / "man" / page).read_text()
+    if old not in text:
+        return 0, f"{old} is not in {page}"
+    (folder / "man" / page).write_text(text.replace(old, new))
+    return run(sys.executable, ROOT / "test/man/test_pages.py", folder, "-k", "has_its_help", "-k", "has_the_help", "-k", "running_one")
+
+
 def python_pins(folder, fault):
     """The pinned PyPI packages with one change: file, what stands there, what stands there then; and a program beside them."""
     (folder / "scripts").mkdir()
@@ -359,6 +388,11 @@ def function(body, parameters="int a"):
     return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
 
 
+def nested(depth):
+    """As many conditions inside each other: cognitive complexity 1 + 2 + ... + depth."""
+    return "".join(f"    if (a > {n}) {{\n" for n in range(depth)) + "    a++;\n" + "    }\n" * depth + "    return a;\n"
+
+
 def junit(status, output):
     return f'<testcase name="t" status="{status}"><system-out>{output}</system-out></testcase>'
 
@@ -413,6 +447,15 @@ CASES = [
     (eva_core, "frama-c", "the core: negation of any number", "eva-negation-of-any-number", True),
     (tidy, "clang-tidy", "clean", CLEAN, False),
     (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
+    (tidy, "clang-tidy", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), False),
+    (tidy, "clang-tidy", "81 lines", function("    a++;\n" * 78 + "    return a;\n"), True),
+    (tidy, "clang-tidy", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
+    (tidy, "clang-tidy", "cognitive complexity 28", function(nested(7)), True),
+    (tidy_core, "clang-tidy", "60 lines", function("    a++;\n" * 57 + "    return a;\n"), False),
+    (tidy_core, "clang-tidy", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
+    (tidy_core, "clang-tidy", "cognitive complexity 15", function(nested(5)), False),
+    (tidy_core, "clang-tidy", "cognitive complexity 21", function(nested(6)), True),
+    (tidy_northbound, "clang-tidy", "cognitive complexity 21", function(nested(6)), True),
     (cppcheck, "cppcheck", "clean", CLEAN, False),
     (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
     (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
@@ -537,6 +580,11 @@ CASES = [
     (proofs, "python3", "clean", str, False),
     (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
     (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),
+    (man, "python3", "clean", ("iwheelctl.1.scd", "", ""), False),
+    (man, "python3", "a verb whose page is not what it prints", ("iwheelctl.1.scd", "REASON appears", "REASON is shown"), True),
+    (man, "python3", "an option that a program has no more", ("iwheel-gateway.1.scd", "--listen-only ", "--listen "), True),
+    (man, "python3", "a verb without a summary", ("iwheelctl.1.scd", "  disarm   the same as stop\n", ""), True),
+    (man, "python3", "a command that the simulator has not", ("iwheel-sim.1.scd", "unmute left", "unmuted left"), True),
     (proofs, "python3", "a step without a row", lambda table: re.sub(r"^demo,.*\n", "", table, flags=re.M), True),
     (proofs, "python3", "a proof that changes its list", lambda table: re.sub(r"^(kernel.check,.*),check$", r"\1,full", table, flags=re.M), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),

@@ -226,7 +226,7 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->bus_cure = "check cable, termination, transceiver and that the wheels have power";
     context->timing = "the bit timing of the bus is wrong; report this";
     context->contradiction = "an assumption that motion depends on is contradicted; see: iwheelctl ledger";
-    context->configure = "by the request config (wheels.setpoint_type and wheels.current_role) and commit";
+    context->configure = "by the request config (of section wheels) and commit";
     context->listen_only = "the image never sends; build it without listen only";
 }
 

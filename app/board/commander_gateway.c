@@ -13,11 +13,6 @@
 #include "report.h"
 #include "serial.h"
 
-/// Of a machine whose builder did not say; only twist needs it.
-#ifndef IWHEEL_TRACK_MM
-#define IWHEEL_TRACK_MM 540U
-#endif
-
 static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD,
               "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
 
@@ -46,7 +41,6 @@ void iw_commander_open(bool power_on, bool in_motion) {
 
 void iw_commander_configure(iw_config_t *config) {
     iw_settings_t settings;
-    config->track_mm = IWHEEL_TRACK_MM;
     if (iw_kept_settings(&kept, &settings)) {
         iw_settings_to(&settings, config);
     }

@@ -46,7 +46,8 @@ static bool compare(iw_host_t *self, bool *out_same) {
                IWN_REFUSE(&self->server.refusal, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
     if (!iw_settings_value(&self->settings, key, value)) {
-        return IWN_REFUSE(&self->server.refusal, IWN_TYPE_NOT_SET,
+        return IWN_REFUSE(&self->server.refusal,
+                          (request->item == IW_LEDGER_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
     if (is_told && !iw_settings_set(&found, key, request->value, &why)) {

@@ -277,7 +277,7 @@ static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[
         iwn_text_add(&text, "/");
         iwn_text_int(&text, self->value[row->at + 1U]);
     }
-    return row->kind != BYTE || value != UNSET;
+    return within(value, range_of(row)); // Neither an unset type nor a track of 0 is.
 }
 
 bool iw_settings_value(const iw_settings_t *self, const char *key, char out_text[IW_SETTINGS_TEXT]) {

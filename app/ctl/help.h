@@ -10,9 +10,8 @@
 typedef struct {
     const char *name;
     ctl_verb_t run;
-    const char *words;   ///< What follows the name.
-    const char *summary; ///< One line.
-    const char *details; ///< More, for the verb's own help; lines end with '\n' and may be of any length.
+    const char
+        *page; ///< What its --help prints: "Usage: " with the verb's words, an empty line, "NAME: SUMMARY", the rest.
     const char *no_json; ///< Why it refuses --json, and what to do instead; null: it answers in JSON.
     /// The words that may follow, by their number from 0 on, null behind the last; a null pointer: others, or none.
     const char *(*choice)(unsigned number);
@@ -24,8 +23,8 @@ const verb_t *help_find(const char *name);
 /// The page of the program.
 void help_print(FILE *out);
 
-/// The page of a verb.
-void help_print_verb(const verb_t *verb, FILE *out);
+/// The verb of that place in the program's page, or a null pointer behind the last.
+const verb_t *help_verb(unsigned number);
 
 /// Tells that there is no such verb and which one may be meant; with "" that there is none at all. Returns CTL_USAGE.
 int help_unknown(const char *name);

@@ -79,7 +79,7 @@ static int dispatch(const arguments_t *arguments) {
         return help_unknown((arguments->verb != NULL) ? arguments->verb : "");
     }
     if (arguments->help) {
-        help_print_verb(verb, stdout);
+        (void)fputs(verb->page, stdout);
         return CTL_OK;
     }
     if (arguments->ctl->json && verb->no_json != NULL) {

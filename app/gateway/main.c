@@ -8,6 +8,8 @@
 
 #include "iwheel_linux/clock.h"
 
+#include "gateway_texts.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -187,7 +189,7 @@ int main(int argc, char **argv) {
         return 0;
     }
     if (options.action == GW_HELP) {
-        gw_options_help(stdout);
+        (void)fputs(gateway_help, stdout);
         return 0;
     }
     gw_daemon_t *daemon = (gw_daemon_t *)calloc(1, sizeof *daemon);

@@ -3,6 +3,8 @@
 
 #include "begin/begin.h"
 
+#include "sim_texts.h"
+
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,30 +13,6 @@
 #include <unistd.h>
 
 #define AGE_MAX_ms INT64_C(86400000)
-
-static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simulated wheels and their bus\n"
-                            "       iwheel-sim [--control PATH] COMMAND tell a running one, like: power off\n"
-                            "\n"
-                            "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
-                            "  --can IFACE         or a CAN interface, for example vcan0\n"
-                            "  --estop PATH        the e-stop button: a local socket\n"
-                            "  --estop2 PATH       a second contact of the same button; else it has one\n"
-                            "  --control PATH      where commands come in, one a line; iwheel-sim help\n"
-                            "                      lists them\n"
-                            "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`,\n"
-                            "                      `estop press`, # comment\n"
-                            "  --log FILE          every frame on the bus as candump log, stamps of\n"
-                            "                      CLOCK_MONOTONIC; - is standard output. Lines\n"
-                            "                      `# SECONDS COMMAND` tell what was done to the wheels\n"
-                            "  --log-direction     ends each line of the log in T (a client sent it) or R\n"
-                            "  --no-keys           on a terminal: no faults at the touch of a key\n"
-                            "  --seed N            same seed, same noise (1)\n"
-                            "  --uptime SECONDS    the wheels have been running so long already (0: boot)\n"
-                            "  --quiet             print only errors\n"
-                            "  --version, --help\n"
-                            "\n"
-                            "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage,\n"
-                            "65 faulty script, 69 unavailable.\n";
 
 /// Only q, V and h are letters of the command line as well.
 static const struct option long_options[] = {
@@ -128,7 +106,7 @@ static int set_option(sim_options_t *options, int option, const char *value) {
         (void)puts("iwheel-sim " IWHEEL_VERSION);
         return EX_OK;
     case 'h':
-        (void)fputs(usage, stdout);
+        (void)fputs(sim_help, stdout);
         return EX_OK;
     case '?':
         return complain("the command line is not right", "");

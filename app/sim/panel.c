@@ -1,27 +1,41 @@
 // SPDX-License-Identifier: MIT
 #include "sim_command.h"
 
+#include "sim_texts.h"
+
 #include <stdio.h>
 #include <string.h>
 
-#define SIM_BOTH ((1U << IW_LEFT) | (1U << IW_RIGHT))
+#define SIM_USAGE_COLUMNS 42U
+#define SIM_BOTH          ((1U << IW_LEFT) | (1U << IW_RIGHT))
 
 const char SIM_USAGE[] = "usage";
 
 static const sim_command_t *const tables[] = {sim_wheel_commands, sim_bus_commands};
 #define TABLES (sizeof tables / sizeof tables[0])
 
+static const char *const lists[TABLES] = {sim_commands_wheel, sim_commands_bus};
+
 static sim_outcome_t help(sim_panel_t *self) {
-    size_t used = 0U;
+    (void)snprintf(self->answer, sizeof self->answer, "%s%s.\n", lists[0], lists[1]);
+    return SIM_ASKED;
+}
+
+/// The beginning of the command's line in its list: name and arguments, up to where they are explained.
+static int usage_of(const char *name, const char **out_usage) {
+    size_t const length = strlen(name);
     for (size_t i = 0U; i < TABLES; i++) {
-        for (const sim_command_t *each = tables[i]; each->name != NULL; each++) {
-            char call[64];
-            (void)snprintf(call, sizeof call, "%s %s", each->name, each->arguments);
-            used += (size_t)snprintf(&self->answer[used], sizeof self->answer - used, "%-42s %s\n", call, each->help);
+        for (const char *line = lists[i]; *line != '\0'; line = strchr(line, '\n') + 1U) {
+            if (strncmp(line, name, length) == 0 && line[length] == ' ') {
+                size_t used = SIM_USAGE_COLUMNS + strcspn(line + SIM_USAGE_COLUMNS, " "); // Some are longer.
+                for (; line[used - 1U] == ' '; used--) {
+                }
+                *out_usage = line;
+                return (int)used;
+            }
         }
     }
-    (void)snprintf(&self->answer[used], sizeof self->answer - used, "%-42s %s\n.\n", "help", "this list");
-    return SIM_ASKED;
+    return 0;
 }
 
 static const sim_command_t *find(const char *name) {
@@ -97,9 +111,10 @@ static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, sim_ca
         reason = (command->run != NULL) ? command->run(call) : NULL;
     }
     if (reason == SIM_USAGE) {
-        char usage[128];
-        (void)snprintf(usage, sizeof usage, "%s %s", command->name, command->arguments);
-        return refuse(self, "that is not right; usage: ", usage);
+        const char *usage = "";
+        const int length = usage_of(command->name, &usage);
+        (void)snprintf(self->answer, sizeof self->answer, "error that is not right; usage: %.*s\n", length, usage);
+        return SIM_REFUSED;
     }
     if (reason != NULL) {
         return refuse(self, reason, "");

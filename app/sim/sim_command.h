@@ -36,9 +36,7 @@ typedef struct {
 } sim_call_t;
 
 typedef struct {
-    const char *name;
-    const char *arguments; ///< For the usage line.
-    const char *help;
+    const char *name; ///< Its line in commands_wheel.txt or commands_bus.txt begins with it.
     sim_argument_t argument[SIM_ARGUMENTS];
     /// NULL: done. SIM_USAGE: the arguments are not right. Else the reason why not. Nothing may have changed unless
     /// NULL. May be missing.
@@ -61,9 +59,7 @@ extern const sim_command_t sim_bus_commands[];
 #define ON_OFF                CHOICE("on", "off")
 
 // A row of the tables: a command for each wheel, and one for the whole.
-#define EACH(name_, arguments_, help_, each_, ...)                                                                     \
-    .name = (name_), .arguments = arguments_, .help = (help_), .each = (each_), .argument = {__VA_ARGS__}
-#define ONCE(name_, arguments_, help_, run_, ...)                                                                      \
-    .name = (name_), .arguments = (arguments_), .help = (help_), .run = (run_), .argument = {__VA_ARGS__}
+#define EACH(name_, each_, ...) .name = (name_), .each = (each_), .argument = {__VA_ARGS__}
+#define ONCE(name_, run_, ...)  .name = (name_), .run = (run_), .argument = {__VA_ARGS__}
 
 #endif

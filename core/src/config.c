@@ -29,7 +29,6 @@ static const iw_config_t standard = {
     .wheel_lag_ms = 60,
     .max_yaw_mrad_s = 1000,
     .yaw_accel_mrad_s2 = 2000,
-    .track_mm = 540,
     .radius_mm = 192,
     .gear_turns = 1,
     .gear_per = 1,
@@ -62,7 +61,7 @@ static const iw_config_range_t ranges[] = {
     {10, 300},                          // wheel_lag_ms
     {50, 10000},                        // max_yaw_mrad_s
     {100, 10000},                       // yaw_accel_mrad_s2
-    {200, 1500},                        // track_mm
+    {200, 1500},                        // track_mm; or 0, not set
     {60, RADIUS_MAX_MM},                // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per
@@ -139,6 +138,9 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
 iw_config_fault_t iw_config_check(const iw_config_t *config) {
     uint16_t numbers[FIELDS];
     memcpy(numbers, (const uint8_t *)config + FIRST, sizeof numbers);
+    if (config->track_mm == 0U) {
+        numbers[IW_CONFIG_TRACK - IW_CONFIG_PERIOD] = ranges[IW_CONFIG_TRACK - IW_CONFIG_PERIOD].min;
+    }
     for (size_t i = 0; i < FIELDS; i++) {
         if (numbers[i] < ranges[i].min || numbers[i] > ranges[i].max) {
             return (iw_config_fault_t)(IW_CONFIG_PERIOD + i);

@@ -17,6 +17,9 @@ static void assume(iw_gateway_t *self) {
     if (config->current_role != IW_ROLE_UNSET) {
         iw_ledger_assume(ledger, IW_LEDGER_CURRENT_ROLE, IW_EVIDENCE_CONFIGURATION);
     }
+    if (config->track_mm != 0U) {
+        iw_ledger_assume(ledger, IW_LEDGER_TRACK, IW_EVIDENCE_CONFIGURATION);
+    }
     if (config->force_unit[IW_LEFT] != IW_FORCE_CN) {
         iw_ledger_assume(ledger, IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_CONFIGURATION);
     }

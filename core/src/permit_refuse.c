@@ -42,6 +42,9 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (!iw_refuse_may_send(self->config)) {
         return IW_REFUSE_TYPE_NOT_SET;
     }
+    if (self->config->track_mm == 0U) {
+        return IW_REFUSE_TRACK_NOT_SET;
+    }
     if (present != IW_REFUSE_NONE) {
         return present;
     }

@@ -6,7 +6,7 @@
 
 #include "iwheel/private/permit.h"
 
-/// True if the configuration allows sending at all.
+/// True if the configuration allows sending at all. Zeros of a restart need no track: no stop depends on it.
 bool iw_refuse_may_send(const iw_config_t *config);
 
 /// The wheels did not follow: whoever drove is refused for that until the hold ends.

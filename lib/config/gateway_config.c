@@ -20,7 +20,6 @@
 
 #define REST_RULE "rule R15, a wheel that rolls must not count as at rest"
 
-static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t release_hold[] = {{"release", 0}, {"hold", 1}, {NULL, 0}};
 static const settings_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};
 static const settings_word_t low_high[] = {{"low", 0}, {"high", 1}, {NULL, 0}};
@@ -96,17 +95,17 @@ static const settings_key_t keys[] = {
     {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
      .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
     {"wheels", "track_mm", " mm",
-     "Distance between the wheels: turns a twist into speeds, and yaw into their difference.",
-     CORE(track_mm, IW_CONFIG_TRACK)},
+     "Between the wheels, for all that turns: no default, no arming until it is set. `iwheelctl bringup` measures it.",
+     CORE(track_mm, IW_CONFIG_TRACK), .unset_is_0 = true},
     {"wheels", "setpoint_dlc", "", "Length of a setpoint frame, zero padded; the document's table has 5 bytes.",
      CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
 
     {"left", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
-     WORD(core.invert[IW_LEFT], no_yes)},
+     WORD(core.invert[IW_LEFT], settings_no_yes)},
     {"left", "force_unit", "", "Unit of the raw normal force. cN as documented; `iwheelctl status` shows the evidence.",
      WORD(core.force_unit[IW_LEFT], units)},
     {"right", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
-     WORD(core.invert[IW_RIGHT], no_yes)},
+     WORD(core.invert[IW_RIGHT], settings_no_yes)},
     {"right", "force_unit", "",
      "Unit of the raw normal force. dN as documented; `iwheelctl status` shows the evidence.",
      WORD(core.force_unit[IW_RIGHT], units)},
@@ -135,7 +134,7 @@ static const settings_key_t keys[] = {
      CORE(min_current_mA, IW_CONFIG_MIN_CURRENT)},
     {"drive", "asymmetric_current", "",
      "no: both wheels get the larger limit of a client, since unequal torque turns the machine.",
-     WORD(core.asymmetric_current, no_yes)},
+     WORD(core.asymmetric_current, settings_no_yes)},
     {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
     {"drive", "hold_max_s", " s", "With a wheel still moving zeros go on, but end after this: then the parking brake.",
      CORE(hold_max_s, IW_CONFIG_HOLD_MAX)},
@@ -396,7 +395,7 @@ void gateway_config_print_noted(const gateway_config_t *config, gateway_config_n
     gateway_config_default(&defaults);
     defaults.core.rest_rpm = iw_config_rest(&config->core).standard;
     (void)fputs("; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. "
-                "Two have no\n; default and must be set before the wheels may move: setpoint_type and current_role.\n",
+                "Without\n; setpoint_type, current_role and track_mm, which have none, no wheel moves.\n",
                 out);
     if (config->core.listen_only) {
         (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);

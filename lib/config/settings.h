@@ -39,6 +39,9 @@ typedef struct {
     uint8_t value;
 } settings_word_t;
 
+/// The words of a switch.
+extern const settings_word_t settings_no_yes[];
+
 /// One key. Where its value lives is told as a place in the program's structure of values.
 typedef struct {
     const char *section;
@@ -48,8 +51,9 @@ typedef struct {
     settings_kind_t kind;
     uint16_t offset; ///< Into the values.
     uint16_t size;   ///< Of the field: a number of 1, 2 or 4 bytes, or a text with its terminator.
-    uint16_t set;   ///< SETTINGS_NUMBER: offset of a bool that is true once the key is given; 0: it always has a value.
-    uint16_t range; ///< SETTINGS_NUMBER: passed to the form's `range`; 0: `min` and `max` apply.
+    uint16_t set; ///< SETTINGS_NUMBER: offset of a bool that is true once the key is given; 0: it always has a value.
+    bool unset_is_0; ///< SETTINGS_NUMBER: while it is 0, which is outside its range, the key is not given.
+    uint16_t range;  ///< SETTINGS_NUMBER: passed to the form's `range`; 0: `min` and `max` apply.
     uint32_t min;
     uint32_t max;
     const char *not_zero;         ///< SETTINGS_NUMBER: why 0 is refused, if it is worth a sentence.

@@ -7,6 +7,8 @@
 #define GROUP_NAME_MAX   32U
 #define OWNER_READ_WRITE 0600U
 
+const settings_word_t settings_no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+
 bool settings_wrong(char out_why[SETTINGS_MESSAGE_SIZE], const char *format, ...) {
     va_list list;
     va_start(list, format);
@@ -235,7 +237,8 @@ static bool settings_value_format(const settings_key_t *row, const void *values,
     out[0] = '\0';
     switch (row->kind) {
     case SETTINGS_NUMBER:
-        if (row->set != 0U && ((const unsigned char *)values)[row->set] == 0U) {
+        if ((row->set != 0U && ((const unsigned char *)values)[row->set] == 0U) ||
+            (row->unset_is_0 && load(row, values) == 0U)) {
             return false;
         }
         (void)snprintf(out, SETTINGS_MESSAGE_SIZE, "%u", (unsigned)load(row, values));

@@ -41,7 +41,9 @@ void gw_assumption_value(const gw_configured_t *configured, iw_ledger_item_t ite
         (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", config->radius_mm);
         return;
     case IW_LEDGER_TRACK:
-        (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", configured->track_mm);
+        if (configured->track_mm != 0U) {
+            (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", configured->track_mm);
+        }
         return;
     case IW_LEDGER_GEAR_RATIO:
         write_gear(config, out_value);

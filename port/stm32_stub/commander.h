@@ -7,7 +7,7 @@
 /// | file                | chosen by                                    | does                                        |
 /// |---------------------|----------------------------------------------|---------------------------------------------|
 /// | commander_none.c    | nothing configured                           | nothing: the image listens, silently        |
-/// | commander_zero.c    | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE | arms when it may, holds both wheels at 0/0  |
+/// | commander_zero.c    | setpoint type, current role and track        | arms when it may, holds both wheels at 0/0  |
 /// | commander_demo.c    | these and IWHEEL_DEMO                        | as zero; pressing PA1 starts a slow profile |
 /// | commander_gateway.c | IWHEEL_GATEWAY                               | what a host asks over the serial line       |
 ///

@@ -91,6 +91,7 @@ static iw_config_t configuration(void) {
     config.setpoint_type = IWHEEL_SETPOINT_TYPE_VALUE;
     config.setpoint_type_set = IWHEEL_SETPOINT_TYPE_IS_SET;
     config.current_role = IWHEEL_CURRENT_ROLE_VALUE;
+    config.track_mm = IWHEEL_TRACK_MM_VALUE;
     iw_commander_configure(&config);
     return config;
 }

@@ -70,7 +70,7 @@ class Pair:
         self.preload = self.folder / "count_allocations.so"
         subprocess.run(["gcc", "-shared", "-fPIC", "-O1", "-o", self.preload, HERE / "daemon/count_allocations.c"], check=True)
         (self.folder / "gateway.conf").write_text(
-            f"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\n{TRACED}[northbound]\nmax_clients = 64\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\n"
+            f"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ntrack_mm = 540\n{TRACED}[northbound]\nmax_clients = 64\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\n"
             f"directory = {self.folder}\n")
         self.simulator = subprocess.Popen([self.build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", "--can",
                                            f"unix:{self.folder}/bus", "--estop", f"{self.folder}/estop", "--control", f"{self.folder}/control"])

@@ -191,6 +191,8 @@ class Bringup(unittest.TestCase):
                         "gear both 4", "rpm both rotor", "track 620"):
             self.rig.sim.ask(command)
         os.mkdir(self.records)
+        with open(self.out + ".from", "a", encoding="utf-8") as file:
+            file.write("[wheels]\ntrack_mm = 540\n")
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 160)
         operator.answer("types to try", "0-7")
@@ -652,11 +654,13 @@ class Bringup(unittest.TestCase):
         operator.answer("How many full turns", "2.5")
         operator.expect("Full turns only")
         self.turn_around(operator, "turn 3", turns=2)  # Counted wrongly.
-        operator.expect("Configured were 540 mm")
+        operator.expect("None was configured. A tape")
         operator.answer("Take that?", "")
         operator.answer("How many full turns", "")
-        self.assertIsNone(self.write(operator)["track_mm"])
-        self.assertEqual("540", self.value("wheels", "track_mm"))
+        operator.expect("Without a track no machine is armed: set track_mm under [wheels]")
+        self.assertNotIn("track_mm", self.write(operator))
+        with open(self.out, encoding="utf-8") as file:
+            self.assertIn("\n;track_mm = ?", file.read())
         self.assertFalse([frame for frame in self.rig.bus.frames[-200:] if frame.id in (266, 298)], "nothing was sent")
 
     # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------

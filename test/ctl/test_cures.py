@@ -551,7 +551,7 @@ class Check(unittest.TestCase):
 
     def test_configuration_before_commissioning_is_right_for_listening_and_the_gateway_starts_with_it(self):
         right = dict(self.rig.settings["wheels"])
-        for missing in ("setpoint_type", "current_role"):
+        for missing, error in (("setpoint_type", "type_not_set"), ("current_role", "type_not_set"), ("track_mm", "track_not_set")):
             del self.rig.settings["wheels"][missing]
             self.rig.write_config()
             code, text = self.only("warn", f"{missing} not configured: it starts and listens, arm will be refused")
@@ -561,7 +561,7 @@ class Check(unittest.TestCase):
             self.assertEqual((0, []), (code, [text for text in found.get("warn", []) if "configured" in text]), done.stdout)
             self.rig.start_gateway()
             refused = self.rig.client().request("arm")
-            self.assertEqual((False, "type_not_set"), (refused["ok"], refused.get("error")))
+            self.assertEqual((False, error), (refused["ok"], refused.get("error")))
             self.rig.kill_gateway(signal.SIGTERM)
             self.set("wheels", **{missing: right[missing]})
         self.assertEqual(0, self.gone("warn", "not configured"))

@@ -117,6 +117,17 @@ class Doctor(unittest.TestCase):
         self.assertIn("serves unix:", checks["gateway"][0]["text"])
         self.assertIn("ledger", checks)
 
+    def test_gateway_whose_configuration_lacks_what_arm_needs(self):
+        for key in ("setpoint_type", "current_role", "track_mm"):
+            right = self.rig.settings["wheels"].pop(key)
+            self.rig.write_config()
+            self.rig.start_gateway()
+            code, checks, _ = self.doctor()
+            self.assertEqual((0, [f"{key} not configured: arm is refused"]), (code, [finding["text"] for finding in checks["config"]]))
+            self.assertIn("iwheelctl bringup finds it", checks["config"][0]["cure"])
+            self.rig.kill_gateway(signal.SIGTERM)
+            self.rig.settings["wheels"][key] = right
+
     def test_second_master_beside_a_gateway(self):
         self.rig.start_gateway()
         self.rig.sim.ask("foreign on")

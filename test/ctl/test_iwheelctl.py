@@ -351,9 +351,10 @@ class Showing(WithGateway):
         self.assertNotIn("iwheelctl release", self.show(snapshot("stopping", cause="client_stop")))
 
     def test_listening_names_what_keeps_it_from_arming(self):
-        unset = {"setpoint_type": {"state": "assumed", "evidence": "none"}, "wheel_radius": {"state": "contradicted"}}
+        unset = {"setpoint_type": {"state": "assumed", "evidence": "none"}, "track": {"state": "assumed", "evidence": "none"}, "wheel_radius": {"state": "contradicted"}}
         out = self.show(snapshot(ledger=unset, present=["bus_down"]))
         self.assertIn("set setpoint_type", out)
+        self.assertIn("set track_mm under [wheels]; iwheelctl bringup measures it", " ".join(out.split()))
         self.assertNotIn("current_role", out)
         self.assertIn("bus_down: bring the bus up", out)
         self.assertIn("CONTRADICTED  wheel_radius", out)

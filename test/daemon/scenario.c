@@ -91,6 +91,7 @@ static void draw_config(iw_config_t *config, sim_random_t *random) {
     config->setpoint_type = 1;
     config->setpoint_type_set = true;
     config->current_role = IW_ROLE_LIMIT;
+    config->track_mm = 540;
     if (sim_random_below(random, 2) == 0U) {
         config->period_ms = (uint16_t)between(random, 8, 40);
         config->lease_ms = (uint16_t)between(random, 120, 300);
@@ -131,6 +132,7 @@ void scenario_kills(scenario_t *self, uint64_t seed, uint32_t lives) {
     self->config.setpoint_type = 1;
     self->config.setpoint_type_set = true;
     self->config.current_role = IW_ROLE_LIMIT;
+    self->config.track_mm = 540;
     self->restart_us = 100U * MS;
     self->watchdog = self->may_restart = self->kills = true;
     self->kill_lives = lives;

@@ -417,12 +417,13 @@ void world_run(void) {
 static const char *config_text(const iw_config_t *config) {
     static char text[1024];
     (void)snprintf(text, sizeof text,
-                   "[bus]\ninterface = " VK_INTERFACE "\n[wheels]\nsetpoint_type = %u\ncurrent_role = limit\n[drive]\n"
+                   "[bus]\ninterface = " VK_INTERFACE "\n[wheels]\nsetpoint_type = %u\ncurrent_role = limit\n"
+                   "track_mm = %u\n[drive]\n"
                    "period_ms = %u\nlease_ms = %u\naccel_mm_s2 = %u\ndecel_mm_s2 = %u\nmax_speed_mm_s = %u\n"
                    "[estop]\nline = " VK_LINE "\n[northbound]\nsocket = " VK_GATEWAY "\ngroup = none\n"
                    "watch_socket = " VK_WATCHERS "\nwatch_group = none\n[record]\nblackbox_s = 1\n",
-                   config->setpoint_type, config->period_ms, config->lease_ms, config->accel_mm_s2, config->decel_mm_s2,
-                   config->max_speed_mm_s);
+                   config->setpoint_type, config->track_mm, config->period_ms, config->lease_ms, config->accel_mm_s2,
+                   config->decel_mm_s2, config->max_speed_mm_s);
     return text;
 }
 

@@ -132,7 +132,8 @@ static void any_config(iw_config_t *out_config) {
     out_config->wheel_lag_ms = any_within(IW_CONFIG_WHEEL_LAG);
     out_config->max_yaw_mrad_s = any_within(IW_CONFIG_MAX_YAW);
     out_config->yaw_accel_mrad_s2 = any_within(IW_CONFIG_YAW_ACCEL);
-    out_config->track_mm = any_within(IW_CONFIG_TRACK);
+    // 0: not set. Nothing between it and the range is permitted, and nothing there must go wrong either.
+    out_config->track_mm = (uint16_t)Frama_C_unsigned_int_interval(0U, iw_config_range(IW_CONFIG_TRACK).max);
     out_config->radius_mm = any_within(IW_CONFIG_RADIUS);
     any_gear(out_config);
     out_config->setpoint_dlc = any_within(IW_CONFIG_SETPOINT_DLC);

@@ -38,7 +38,7 @@ def judge(work, applied, folder, image, scenario):
              "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
              f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}", f"-I{ROOT / 'lib/northbound/server/include'}",
              f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}", "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
-             '-DIWHEEL_VERSION="0.0.0"',
+             '-DIWHEEL_VERSION="0.0.0"', "-DIWHEEL_TRACK_MM_VALUE=540",
              f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}"]
     source = {"listen": "none"}.get(image, image)
     (folder / "images").mkdir()

@@ -37,6 +37,7 @@ static bool judge_setpoint(world_t *world, const iw_can_frame_t *frame) {
     fuzz_require(abs(speed) <= config->max_speed_mm_s && abs(current) <= config->max_current_mA, "within the limits");
     fuzz_require(zero || !world->cut, "nothing but zero until armed and commanded anew");
     fuzz_require(world->bus >= IW_BUS_PASSIVE, "nothing leaves while the bus is down");
+    fuzz_require(zero || config->track_mm != 0U, "no wheel moves while the track is not set");
     fuzz_require(!config->listen_only, "nothing leaves in listen-only");
     world->moved = world->moved || !zero;
     return zero;
@@ -102,6 +103,7 @@ static void begin(world_t *world, fuzz_bytes_t *bytes) {
     world->config.setpoint_type = fuzz_byte(bytes);
     world->config.current_role = (flags & 2U) ? IW_ROLE_SETPOINT : IW_ROLE_LIMIT;
     world->config.invert[IW_RIGHT] = (flags & 4U) != 0U;
+    world->config.track_mm = ((flags & 0x60U) == 0x60U) ? 0U : 540U;
     world->config.listen_only = (flags & 0x18U) == 0x18U;
     world->config.period_ms = (uint16_t)(5U + fuzz_byte(bytes) % 60U);
     world->config.rest_ms = 50;

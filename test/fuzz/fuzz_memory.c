@@ -3,8 +3,9 @@
 // written and read again. The mutator puts the checksum right, or nothing would ever come behind it.
 #include "fuzz.h"
 
-#include "disk/box_files.h"
 #include "ledger/memory.h"
+
+#include "iwheel_northbound/line.h"
 
 #include <inttypes.h>
 
@@ -22,7 +23,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
     size_t length = LLVMFuzzerMutate(data, (size_t)(newline - data), max_size - SUM_LENGTH - 2U);
     char sum[SUM_LENGTH + 1U];
     data[length++] = '\n';
-    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", gw_box_crc32(0, data, length));
+    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", iwn_line_crc(0, data, length));
     memcpy(&data[length], sum, SUM_LENGTH);
     return length + SUM_LENGTH;
 }

@@ -54,7 +54,7 @@ def by_hand():
         "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
         "request": [line.encode() for line in said] + json_vectors() + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}']
         + [b'{"cmd":"recording","name":"' + name + b'","offset":-1}' for name in (b"../x", b"a" * 64, b"stop-000001-a.log\\u0000", b"")],
-        "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n", *odd_values(),
+        "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ntrack_mm = 540\ngear_ratio = 3/2\n", *odd_values(),
                    *(b"[drive]\nlease_ms = %d\nmax_speed_mm_s = %d\ndecel_mm_s2 = %d\n" % budget for budget in ((500, 1000, 1500), (20, 5000, 100), (200, 1000, 900)))],
         "candump": [ODD_LINES.encode()],
         "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe",

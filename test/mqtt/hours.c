@@ -307,7 +307,7 @@ void tearDown(void) {
 }
 
 static void begin(unsigned spool_kB, unsigned every_ms) {
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     (void)snprintf(settings.machine.id, sizeof settings.machine.id, "w1");
     (void)snprintf(settings.spool.directory, sizeof settings.spool.directory, "%s", folder);
     settings.broker.port = far.port;

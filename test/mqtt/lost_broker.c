@@ -64,7 +64,7 @@ void setUp(void) {
     (void)snprintf(folder, sizeof folder, "%s", "/tmp/iwheel-broker-XXXXXX");
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     daemon_rig_begin();
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     (void)snprintf(settings.machine.id, sizeof settings.machine.id, "w1");
     (void)snprintf(settings.spool.directory, sizeof settings.spool.directory, "%s", folder);
     settings.drive.enabled = true;

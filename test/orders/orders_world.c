@@ -131,6 +131,7 @@ static void start_gateway(world_t *self, bool restarted) {
     config.setpoint_type = 1;
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
+    config.track_mm = 540;
     config.period_ms = PERIOD_MS;
     config.wheel_silent_ms = SILENT_MS;
     config.lease_ms = LEASE_MS;

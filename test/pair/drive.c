@@ -52,6 +52,7 @@ void machine_config(iw_config_t *out_config, uint16_t pair_mm) {
     out_config->setpoint_type = 1;
     out_config->setpoint_type_set = true;
     out_config->current_role = IW_ROLE_LIMIT;
+    out_config->track_mm = 540;
     out_config->pair_mm = (pair_mm != 0U) ? pair_mm : out_config->pair_mm;
 }
 

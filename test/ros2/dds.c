@@ -13,7 +13,7 @@ static ros_settings_t settings;
 static ros_t *ros;
 
 void setUp(void) {
-    ros_settings_default(&settings);
+    settings = ros_settings_standard;
     settings.ros.domain = 1U + (uint32_t)getpid() % 230U;
 }
 

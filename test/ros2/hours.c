@@ -317,7 +317,7 @@ static void test_ros2_bridge_in_hours_of_everything_does_not_grow(void) {
 static void begin(void) {
     ros_settings_t settings;
     daemon_rig_begin();
-    ros_settings_default(&settings);
+    settings = ros_settings_standard;
     settings.ros.loopback = true;
     settings.ros.domain = 1U + (uint32_t)getpid() % 230U;
     settings.drive.allow_reset = true;

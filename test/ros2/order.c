@@ -128,7 +128,7 @@ static void arm(void) {
 void setUp(void) {
     has_command = has_request = answered = success = false;
     daemon_rig_begin();
-    ros_settings_default(&settings);
+    settings = ros_settings_standard;
     settings.drive.enabled = true;
     TEST_ASSERT_EQUAL_INT(0, bridge_open(&bridge, &settings));
     pass(1000);

@@ -37,6 +37,7 @@ static void write_scenario(scenario_t *scenario, const babble_t *babble) {
     scenario->config.setpoint_type = 1;
     scenario->config.setpoint_type_set = true;
     scenario->config.current_role = IW_ROLE_LIMIT;
+    scenario->config.track_mm = 540;
     scenario->config.wheel_silent_ms = 200; // What is not echoed is found before what is not heard.
     scenario->event[0] =
         (event_t){.at_us = 500U * MS, .span_us = 6U * S, .a = 400, .b = 300, .kind = EV_GOOD_CLIENT, .style = 3U};

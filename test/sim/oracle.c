@@ -239,6 +239,9 @@ static void judge_form(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t
     if (!config->setpoint_type_set || frame->data[0] != config->setpoint_type || config->listen_only) {
         oracle_break(self, now_us, 802, "type %u was sent", frame->data[0]);
     }
+    if (config->track_mm == 0U && word(&frame->data[1]) != 0) {
+        oracle_break(self, now_us, 824, "%d mm/s although the track is not set", word(&frame->data[1]));
+    }
     for (unsigned i = 5; i < frame->dlc; i++) {
         if (frame->data[i] != 0U) {
             oracle_break(self, now_us, 803, "padding is not zero");

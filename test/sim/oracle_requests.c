@@ -50,6 +50,9 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
         if (self->timing_bad) {
             oracle_break(self, now_us, 323, "armed although the bus timing is contradicted");
         }
+        if (self->config->track_mm == 0U) {
+            oracle_break(self, now_us, 325, "armed although the track is not set");
+        }
         if (self->armed) {
             self->holder = client;
             self->fresh = false;

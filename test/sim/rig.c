@@ -379,6 +379,11 @@ static bool standing(const rig_t *rig) {
     return wheel[IW_LEFT].motion.speed_um_s == 0 && wheel[IW_RIGHT].motion.speed_um_s == 0;
 }
 
+/// Without a track every arm is refused, whoever asks and however often.
+static bool may_move(const rig_t *rig) {
+    return rig->scenario->config.track_mm != 0U;
+}
+
 /// True if it is driven for DRIVEN_US on end before that time. A reboot may come to light late and stop it once more.
 static bool gets_driven(rig_t *rig, iw_time_us_t limit_us) {
     iw_time_us_t since_us = rig->now_us;
@@ -408,7 +413,7 @@ static bool comes_to_rest(rig_t *rig, iw_time_us_t limit_us) {
 /// The zeros of a hold end by nothing else.
 static void release_at_rest(rig_t *rig) {
     const event_t release = {.kind = EV_ONE_RELEASE};
-    if (rig->scenario->config.hold) {
+    if (rig->scenario->config.hold && may_move(rig)) { // Else nothing ever began that could be held.
         run_until(rig, rig->now_us + HELD_US);
         if (iw_gateway_state(&rig->gateway) == IW_STATE_LISTENING) {
             oracle_fail(&rig->oracle, rig->now_us, RULE_HELD, "nobody has released it, and nothing is sent");
@@ -421,7 +426,7 @@ static void release_at_rest(rig_t *rig) {
 static void prove_usable(rig_t *rig) {
     const event_t drives = {.span_us = 60U * S, .a = 200, .b = 180, .kind = EV_GOOD_CLIENT, .style = 3U};
     clients_start(rig, &drives);
-    if (!gets_driven(rig, rig->now_us + USABLE_US)) {
+    if (!gets_driven(rig, rig->now_us + USABLE_US) && may_move(rig)) {
         oracle_fail(&rig->oracle, rig->now_us, RULE_UNUSABLE, "all faults are gone, but it cannot be driven");
     }
     clients_all_gone(rig);
@@ -437,7 +442,8 @@ static void judge_whole(rig_t *rig) {
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         stops += stats->stops[cause];
     }
-    if (stats->frames < 40U || stats->nonzero < 10U || stats->armed == 0U || stops == 0U) {
+    const bool moved = stats->frames >= 40U && stats->nonzero >= 10U && stats->armed > 0U && stops > 0U;
+    if (may_move(rig) ? !moved : stats->refused[IW_REFUSE_TRACK_NOT_SET] == 0U) {
         oracle_fail(&rig->oracle, rig->now_us, RULE_NOTHING, "nothing happened in this run");
     }
 }
@@ -537,6 +543,7 @@ const char *rig_refusal_name(unsigned refusal) {
         "second master",
         "cause present",
         "type not set",
+        "track not set",
         "stale command",
         "listen only",
         "contradicted",

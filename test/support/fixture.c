@@ -6,6 +6,7 @@ void fixture_config(iw_config_t *out_config) {
     out_config->setpoint_type = 1;
     out_config->setpoint_type_set = true;
     out_config->current_role = IW_ROLE_LIMIT;
+    out_config->track_mm = 540;
 }
 
 void fixture_random_init(fixture_random_t *self, uint32_t seed) {

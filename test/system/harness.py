@@ -26,7 +26,7 @@ PR_SET_PDEATHSIG = 1
 SERVICE_NICE = -10
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
-    "wheels": {"setpoint_type": 1, "current_role": "limit"},
+    "wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540},
     "drive": {},
     "northbound": {"mode": "0600"},
 }
@@ -282,7 +282,7 @@ class Rig:
             setpoint_type=wheels["setpoint_type"],
             role=wheels["current_role"],
             dlc=wheels.get("setpoint_dlc", 5),
-            track_mm=wheels.get("track_mm", 540),
+            track_mm=wheels.get("track_mm", 540),  # Without one nothing is judged by it: nothing moves.
             radius_mm=wheels.get("radius_mm", 192),
             invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")),
             **values,

@@ -158,6 +158,17 @@ static void test_host_change_of_the_ledger_is_told_and_every_item_is_kept(void) 
     }
 }
 
+static void test_host_without_a_track_refuses_arm_and_tells_null(void) {
+    disarm();
+    rig.gateway.config.track_mm = 0;
+    host.settings = host.staged = iw_settings_from(&rig.gateway.config);
+    assert_answer("{\"cmd\":\"config\",\"id\":1}", "{\"key\":\"wheels.track_mm\",\"value\":null}");
+    assert_answer("{\"cmd\":\"arm\",\"id\":2}", "\"error\":\"track_not_set\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "track_mm not configured"), answer);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "by the request config"), answer);
+    assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"track\",\"value\":\"540\"}", "\"error\":\"track_not_set\"");
+}
+
 static void test_host_setting_that_is_refused_says_what_it_may_be(void) {
     assert_answer("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.track_mm\",\"value\":\"0\"}",
                   "\"error\":\"bad_value\"");
@@ -187,6 +198,7 @@ int main(void) {
     RUN_TEST(test_host_channel_opened_anew_is_greeted_as_who_it_is_and_has_no_older_command);
     RUN_TEST(test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_event_is_due);
     RUN_TEST(test_host_change_of_the_ledger_is_told_and_every_item_is_kept);
+    RUN_TEST(test_host_without_a_track_refuses_arm_and_tells_null);
     RUN_TEST(test_host_setting_that_is_refused_says_what_it_may_be);
     return UNITY_END();
 }

@@ -77,7 +77,6 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL_UINT32(1000000, config.bus.bitrate);
     TEST_ASSERT_EQUAL_UINT16(625, config.bus.sample_point_permille);
     TEST_ASSERT_EQUAL(GATEWAY_MISMATCH_REFUSE, config.bus.on_mismatch);
-    TEST_ASSERT_EQUAL_UINT16(540, config.core.track_mm);
     TEST_ASSERT_EQUAL_STRING("ESTOP", config.estop.line);
     TEST_ASSERT_TRUE(config.estop.active_high);
     TEST_ASSERT_EQUAL_UINT16(5, config.estop.debounce_ms);
@@ -94,8 +93,9 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL(IW_CONFIG_OK, iw_config_check(&config.core));
 }
 
-static void test_parse_empty_file_leaves_type_and_role_unset(void) {
+static void test_parse_empty_file_leaves_type_role_and_track_unset(void) {
     accepted("");
+    TEST_ASSERT_EQUAL_UINT16(0, config.core.track_mm);
     TEST_ASSERT_FALSE(config.core.setpoint_type_set);
     TEST_ASSERT_EQUAL(IW_ROLE_UNSET, config.core.current_role);
     TEST_ASSERT_FALSE(config.core.listen_only);
@@ -242,6 +242,7 @@ static void test_parse_value_in_quotes_is_refused_for_every_key(void) {
     unsigned keys = 0;
     gateway_config_default(&whole);
     whole.core.setpoint_type_set = true;
+    whole.core.track_mm = 540;
     whole.core.current_role = IW_ROLE_LIMIT;
     char *const text = printed(&whole);
     char section[64] = "";
@@ -445,6 +446,7 @@ static void test_print_and_load_is_a_fixed_point_for_defaults_and_every_word(voi
     wanted.core.setpoint_type_set = true;
     wanted.core.setpoint_type = 255;
     wanted.core.current_role = IW_ROLE_LIMIT;
+    wanted.core.track_mm = 200;
     wanted.core.rpm_of_rotor = true;
     wanted.core.invert[IW_RIGHT] = true;
     wanted.core.force_unit[IW_LEFT] = IW_FORCE_DN;
@@ -461,6 +463,7 @@ static void test_print_shows_unset_keys_as_comments(void) {
     char *text = printed(&config);
     TEST_ASSERT_NOT_NULL(strstr(text, "\n;setpoint_type = ? "));
     TEST_ASSERT_NOT_NULL(strstr(text, "\n;current_role = ? "));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\n;track_mm = ?                      ; 200..1500 mm, no default\n"));
     TEST_ASSERT_NULL(strstr(text, "listen-only"));
     free(text);
     config.core.listen_only = true;
@@ -561,7 +564,7 @@ static void test_override_changes_one_key_by_the_same_rules(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_parse_empty_file_gives_documented_defaults);
-    RUN_TEST(test_parse_empty_file_leaves_type_and_role_unset);
+    RUN_TEST(test_parse_empty_file_leaves_type_role_and_track_unset);
     RUN_TEST(test_parse_every_key_reaches_its_field);
     RUN_TEST(test_parse_accepts_comments_indentation_crlf_and_bom);
     RUN_TEST(test_parse_range_ends_are_accepted_and_beyond_refused);

@@ -323,6 +323,10 @@ static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_i
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     daemon_rig.daemon->config.core.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
+    const uint32_t track_mm = daemon_rig.daemon->knowledge.configured.track_mm;
+    daemon_rig.daemon->knowledge.configured.track_mm = 0;
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"540\"}", "\"error\":\"track_not_set\"");
+    daemon_rig.daemon->knowledge.configured.track_mm = track_mm;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"how\":\"x\"}", "\"ok\":true");
     assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"7\"}", "\"ok\":true");

@@ -68,6 +68,13 @@ static void test_arm_without_a_setpoint_type_says_where_it_is_set(void) {
     assert_reply("{\"cmd\":\"arm\"}", "under [wheels] in the configuration");
 }
 
+static void test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it(void) {
+    daemon_rig.daemon->wheels.core.config.track_mm = 0;
+    assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"track_not_set\"");
+    assert_reply("{\"cmd\":\"arm\"}", "\"track_mm not configured, and every bound of turning rests on it; set it under "
+                                      "[wheels] in the configuration (iwheelctl bringup measures it)\"");
+}
+
 static void test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not(void) {
     daemon_rig_keep_log();
     daemon_rig.estop = 1;
@@ -232,6 +239,7 @@ int main(void) {
     RUN_TEST(test_status_has_no_more_warnings_than_places_for_them);
     RUN_TEST(test_hello_has_the_time_of_its_cycle);
     RUN_TEST(test_arm_without_a_setpoint_type_says_where_it_is_set);
+    RUN_TEST(test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it);
     RUN_TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not);
     RUN_TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later);
     RUN_TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence);

@@ -26,6 +26,7 @@ void setUp(void) {
     config.setpoint_type = 7;
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
+    config.track_mm = 540;
     restart();
 }
 

@@ -84,6 +84,15 @@ static void test_envelope_turn_passes_up_to_the_limit_of_the_real_machine(void) 
     }
 }
 
+static void test_envelope_without_a_track_no_turn_passes_and_every_zero_does(void) {
+    config.track_mm = 0;
+    begin();
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(300000, 0, 1));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(300000, 1, -1));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
+}
+
 static void test_envelope_turn_grows_no_faster_than_configured(void) {
     static const struct {
         uint16_t accel_mrad_s2, track_mm, radius_mm;
@@ -167,6 +176,7 @@ static void test_envelope_turn_is_judged_in_the_frame_of_the_machine(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine);
+    RUN_TEST(test_envelope_without_a_track_no_turn_passes_and_every_zero_does);
     RUN_TEST(test_envelope_turn_grows_no_faster_than_configured);
     RUN_TEST(test_envelope_turn_that_does_not_pass_counts_for_nothing);
     RUN_TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels);

@@ -55,15 +55,18 @@ static void start_with(iw_side_t side, int16_t raw) {
 static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
     assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
     assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+    assert_entry(IW_LEDGER_TRACK, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
     assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
     assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
     rig.config.setpoint_type_set = false;
+    rig.config.track_mm = 0;
     rig.config.current_role = IW_ROLE_UNSET;
     rig.config.force_unit[IW_LEFT] = IW_FORCE_DN;
     rig.config.force_unit[IW_RIGHT] = IW_FORCE_CN;
     gateway_rig_begin(&rig, false);
     assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
     assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
+    assert_entry(IW_LEDGER_TRACK, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
     assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
     assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
 }

@@ -135,6 +135,23 @@ static void test_gateway_restarted_sends_zeros_then_listens(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
 }
 
+static void test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms(void) {
+    rig.config.track_mm = 0;
+    gateway_rig_begin(&rig, true);
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 40;
+    gateway_rig_run(&rig, MS(1400));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_UINT32_WITHIN(4, 140, rig.bus.sent);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    rig.wheel[IW_LEFT].rpm = 0;
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_TRACK_NOT_SET, gateway_rig_request_arm(&rig, HOLDER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, gateway_rig_drive(&rig, HOLDER, 100, 100));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
+}
+
 static void test_gateway_restarted_gives_way_to_another_master(void) {
     gateway_rig_begin(&rig, true);
     gateway_rig_run(&rig, MS(10));
@@ -170,6 +187,7 @@ int main(void) {
     RUN_TEST(test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused);
     RUN_TEST(test_gateway_listen_only_never_sends);
     RUN_TEST(test_gateway_restarted_sends_zeros_then_listens);
+    RUN_TEST(test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms);
     RUN_TEST(test_gateway_restarted_gives_way_to_another_master);
     RUN_TEST(test_gateway_restarted_without_type_sends_nothing);
     return UNITY_END();

@@ -22,6 +22,7 @@ void setUp(void) {
     gw_log_close(&people);
     people.fd = dup(fileno(file));
     gateway_config_default(&config);
+    config.core.track_mm = 540;
 }
 
 void tearDown(void) {
@@ -62,6 +63,7 @@ static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
                 "10.6\n");
     assert_line(
         "angle budget, unbounded: a wheel running on 106.1 degrees a second; up to 12.5 a second are not noticed\n");
+    TEST_ASSERT_NULL(strstr(written(), "track_mm"));
     assert_line("iwheel-gateway: warning: setpoint_type or current_role is not configured: arm will be refused; set "
                 "both under [wheels]\n");
 }
@@ -78,6 +80,15 @@ static void test_log_at_start_reckons_angles_with_track_and_speed(void) {
     config.core.decel_mm_s2 = 600;
     gw_report_start(&config, false, false, &people);
     assert_line("ramp: a wheel coasting 0.0 degrees");
+}
+
+/// Nothing is reckoned with a track that nobody told.
+static void test_log_at_start_without_a_track_warns_and_has_no_angle(void) {
+    config.core.track_mm = 0;
+    gw_report_start(&config, false, false, &people);
+    assert_line("iwheel-gateway: warning: track_mm is not configured: arm will be refused; set it under [wheels] "
+                "(iwheelctl bringup measures it)\n");
+    TEST_ASSERT_NULL(strstr(written(), "angle"));
 }
 
 static void test_log_at_start_is_silent_of_what_is_not(void) {
@@ -118,6 +129,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget);
     RUN_TEST(test_log_at_start_reckons_angles_with_track_and_speed);
+    RUN_TEST(test_log_at_start_without_a_track_warns_and_has_no_angle);
     RUN_TEST(test_log_at_start_is_silent_of_what_is_not);
     RUN_TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped);
     RUN_TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain);

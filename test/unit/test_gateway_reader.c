@@ -3,6 +3,8 @@
 #include "box/box.h"
 #include "disk/box_files.h"
 
+#include "iwheel_northbound/line.h"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -104,9 +106,9 @@ static size_t decode(uint8_t out[GW_BOX_PIECE]) {
 }
 
 static void test_crc_is_that_of_zlib(void) {
-    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, gw_box_crc32(0, (const uint8_t *)"123456789", 9));
-    const uint32_t first = gw_box_crc32(0, (const uint8_t *)"1234", 4);
-    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, gw_box_crc32(first, (const uint8_t *)"56789", 5));
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(0, "123456789", 9));
+    const uint32_t first = iwn_line_crc(0, "1234", 4);
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(first, "56789", 5));
 }
 
 static void test_only_names_of_the_writer_are_known(void) {
@@ -202,8 +204,8 @@ static void test_pieces_make_the_file_whatever_its_length(void) {
             for (size_t k = 0; k < length; k++) {
                 TEST_ASSERT_EQUAL(byte_at(got + k), piece[k]);
             }
-            TEST_ASSERT_EQUAL(gw_box_crc32(0, piece, length), (uint32_t)number("\"crc32\":"));
-            crc = gw_box_crc32(crc, piece, length);
+            TEST_ASSERT_EQUAL(iwn_line_crc(0, piece, length), (uint32_t)number("\"crc32\":"));
+            crc = iwn_line_crc(crc, piece, length);
             got += length;
             if (got < sizes[i]) {
                 assert_says("\"file_crc32\":null");

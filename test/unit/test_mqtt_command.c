@@ -316,7 +316,7 @@ static void test_info_without_a_gateway_invents_nothing(void) {
     char text[2048];
     mqtt_settings_t settings;
     const uint64_t counts[MQTT_VERDICTS] = {1, 2};
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     mqtt_stop_t stop = {.number = 0};
     const mqtt_info_t info = {.boot = BOOT, .settings = &settings, .counts = counts, .dropped = 3, .stop = &stop};
     size_t length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
@@ -339,7 +339,7 @@ static unsigned errors_of(const char *text) {
     mqtt_settings_t settings;
     FILE *err = fopen("/dev/null", "w");
     settings_report_t report = {.name = "test", .err = err};
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     const int code = settings_parse(&mqtt_settings_form, &report, text, strlen(text), &settings);
     (void)fclose(err);
     TEST_ASSERT_EQUAL(code != 0, report.errors != 0U);
@@ -369,7 +369,7 @@ static void test_settings_shipped_are_the_defaults(void) {
     TEST_ASSERT_NOT_NULL(file);
     shipped[fread(shipped, 1, sizeof shipped - 1U, file)] = '\0';
     (void)fclose(file);
-    mqtt_settings_default(&settings);
+    settings = mqtt_settings_standard;
     FILE *out = open_memstream(&printed, &length);
     settings_print(&mqtt_settings_form, &settings, &settings, NULL, out);
     (void)fclose(out);

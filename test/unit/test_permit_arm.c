@@ -109,6 +109,17 @@ static void test_permit_arm_without_type_or_role_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
+static void test_permit_arm_without_a_track_is_refused(void) {
+    rig.config.track_mm = 0;
+    assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
+    rig.config.setpoint_type_set = false; // What nobody can measure comes first.
+    assert_arm_refused(IW_REFUSE_TYPE_NOT_SET);
+    setUp();
+    rig.config.track_mm = 0;
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST); // What may pass by itself comes later.
+    assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
+}
+
 static void test_permit_arm_with_listen_only_is_refused(void) {
     rig.config.listen_only = true;
     assert_arm_refused(IW_REFUSE_LISTEN_ONLY);
@@ -338,6 +349,7 @@ int main(void) {
     RUN_TEST(test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not);
     RUN_TEST(test_permit_arm_again_after_a_failure_clears_the_old_reason);
     RUN_TEST(test_permit_arm_without_type_or_role_is_refused);
+    RUN_TEST(test_permit_arm_without_a_track_is_refused);
     RUN_TEST(test_permit_arm_with_listen_only_is_refused);
     RUN_TEST(test_permit_arm_is_judged_by_the_view_of_the_last_step);
     RUN_TEST(test_permit_arm_needs_no_settled_wheels);

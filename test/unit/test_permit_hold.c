@@ -375,6 +375,23 @@ static void test_permit_restarted_without_leave_to_send_stays_silent(void) {
     assert_restarted_silent();
 }
 
+/// No stop depends on it: an update may bring the need of a track to a machine in motion.
+static void test_permit_restarted_without_a_track_sends_zeros_all_the_same(void) {
+    for (int hold = 0; hold < 2; hold++) {
+        setUp();
+        rig.config.track_mm = 0;
+        rig.config.hold = hold != 0;
+        iw_permit_init(&rig.permit, &rig.config, rig.now_us, true);
+        permit_rig_step(&rig);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+        permit_rig_wait(&rig, MS(1600));
+        TEST_ASSERT_EQUAL_INT((hold != 0) ? IW_STATE_STOPPING : IW_STATE_LISTENING, iw_permit_state(&rig.permit));
+        TEST_ASSERT_EQUAL(hold != 0, iw_permit_demand(&rig.permit) != IW_DEMAND_SILENCE);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_TRACK_NOT_SET, permit_rig_arm(&rig, HOLDER));
+    }
+}
+
 /// What can be seen from outside.
 static uint32_t outside(const iw_permit_t *permit) {
     return (uint32_t)iw_permit_state(permit) | (uint32_t)iw_permit_demand(permit) << 4 |
@@ -471,6 +488,7 @@ int main(void) {
     RUN_TEST(test_permit_restarted_latches_on_estop);
     RUN_TEST(test_permit_restarted_cannot_be_armed_before_the_hold_is_over);
     RUN_TEST(test_permit_restarted_without_leave_to_send_stays_silent);
+    RUN_TEST(test_permit_restarted_without_a_track_sends_zeros_all_the_same);
     RUN_TEST(test_permit_next_us_is_right_in_twenty_thousand_random_situations);
     return UNITY_END();
 }

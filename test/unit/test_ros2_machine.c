@@ -173,6 +173,16 @@ static void test_ledger_gives_measures_and_what_is_contradicted(void) {
     TEST_ASSERT_TRUE(facts.machine.setpoint_current);
 }
 
+/// An invented one would turn the machine on every map.
+static void test_track_that_is_not_configured_is_none(void) {
+    static const char unset[] =
+        "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"value\":\"192\"},\"track\":{\"value\":null}}}";
+    const iwc_message_t seen = {.text = unset, .length = sizeof unset - 1U, .is_event = true};
+    ros_facts_read_ledger(&seen, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(192, facts.machine.radius_mm);
+    TEST_ASSERT_EQUAL_INT64(0, facts.machine.track_mm);
+}
+
 static void test_configuration_stands_for_the_values_that_a_board_has_not(void) {
     static const char board[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"state\":\"assumed\",\"value\":null},"
@@ -325,6 +335,7 @@ int main(void) {
     RUN_TEST(test_doubt_on_a_straight_way_ignores_tick_jitter);
     RUN_TEST(test_snapshot_is_read_and_unknown_stays_unknown);
     RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
+    RUN_TEST(test_track_that_is_not_configured_is_none);
     RUN_TEST(test_configuration_stands_for_the_values_that_a_board_has_not);
     RUN_TEST(test_diagnosis_all_in_order_is_ok);
     RUN_TEST(test_diagnosis_button_never_seen_to_work_is_a_warning);

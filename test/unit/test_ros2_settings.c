@@ -12,7 +12,7 @@ static char *told;
 static size_t told_size;
 
 void setUp(void) {
-    ros_settings_default(&settings);
+    settings = ros_settings_standard;
 }
 
 void tearDown(void) {
@@ -82,10 +82,8 @@ static void test_settings_what_is_printed_reads_back_the_same(void) {
     size_t size = 0;
     TEST_ASSERT_EQUAL_INT(0, read_text("[ros]\nnamespace = w1\n[drive]\nauto_arm = yes\n"));
     const ros_settings_t before = settings;
-    ros_settings_t standard;
-    ros_settings_default(&standard);
     FILE *out = open_memstream(&printed, &size);
-    settings_print(&ros_settings_form, &settings, &standard, NULL, out);
+    settings_print(&ros_settings_form, &settings, &ros_settings_standard, NULL, out);
     (void)fclose(out);
     tearDown();
     setUp();
@@ -95,10 +93,8 @@ static void test_settings_what_is_printed_reads_back_the_same(void) {
 }
 
 static void test_settings_shipped_file_is_the_defaults(void) {
-    ros_settings_t standard;
-    ros_settings_default(&standard);
     TEST_ASSERT_EQUAL_INT(0, settings_load(&ros_settings_form, IWHEEL_SHARE_DIR "/ros2.conf", &settings, stderr));
-    TEST_ASSERT_EQUAL_MEMORY(&standard, &settings, sizeof standard);
+    TEST_ASSERT_EQUAL_MEMORY(&ros_settings_standard, &settings, sizeof settings);
 }
 
 int main(void) {

@@ -174,7 +174,7 @@ void setUp(void) {
     port_is_full = false;
     client_fd = -1;
     step = 0;
-    serial_settings_default(&settings);
+    settings = serial_settings_standard;
     settings.northbound.group[0] = '\0';
     settings.northbound.mode = 0600;
     (void)snprintf(settings.northbound.socket, sizeof settings.northbound.socket, "%s/drive", folder);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The simulator's commands: what is understood, what is refused, and that a refusal changes nothing.
 #include "panel.h"
+#include "sim_command.h"
+
+#include "sim_texts.h"
 
 #include "unity.h"
 
@@ -351,6 +354,44 @@ static void test_panel_help_lists_commands_and_ends_in_a_dot(void) {
     TEST_ASSERT_EQUAL_STRING("\n.\n", &panel.answer[strlen(panel.answer) - 3U]);
 }
 
+/// So many lines of the list begin with the name.
+static unsigned lines_of(const char *list, const char *name) {
+    unsigned lines = 0;
+    for (const char *line = list; *line != '\0'; line += strcspn(line, "\n") + 1U) {
+        lines += (strncmp(line, name, strlen(name)) == 0 && line[strlen(name)] == ' ') ? 1U : 0U;
+    }
+    return lines;
+}
+
+static unsigned expect_listed(const sim_command_t *table, const char *list) {
+    unsigned commands = 0;
+    for (; table[commands].name != NULL; commands++) {
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1U, lines_of(list, table[commands].name), table[commands].name);
+    }
+    return commands;
+}
+
+static unsigned all_lines(const char *list) {
+    unsigned lines = 0;
+    for (; *list != '\0'; list += strcspn(list, "\n") + 1U) {
+        lines++;
+    }
+    return lines;
+}
+
+/// The help of each is there once, and there is none of a command that is not.
+static void test_panel_lists_are_those_of_the_tables(void) {
+    TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_wheel), expect_listed(sim_wheel_commands, sim_commands_wheel));
+    TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_bus), expect_listed(sim_bus_commands, sim_commands_bus) + 1U);
+    TEST_ASSERT_EQUAL_UINT(1U, lines_of(sim_commands_bus, "help"));
+}
+
+static void test_panel_usage_longer_than_its_column_is_told_whole(void) {
+    expect_refused("contact 1");
+    TEST_ASSERT_EQUAL_STRING("error that is not right; usage: contact 1|2 press|release|pulse MS|unplug|plug\n",
+                             panel.answer);
+}
+
 static void test_panel_status_is_one_line_that_tells_the_truth(void) {
     expect_done("load left 50");
     expect_done("power off");
@@ -453,6 +494,8 @@ int main(void) {
     RUN_TEST(test_panel_refusal_tells_the_usage);
     RUN_TEST(test_panel_reboot_without_power_is_refused_with_the_cure);
     RUN_TEST(test_panel_help_lists_commands_and_ends_in_a_dot);
+    RUN_TEST(test_panel_lists_are_those_of_the_tables);
+    RUN_TEST(test_panel_usage_longer_than_its_column_is_told_whole);
     RUN_TEST(test_panel_status_is_one_line_that_tells_the_truth);
     RUN_TEST(test_panel_status_tells_the_last_setpoint_and_its_age);
     RUN_TEST(test_panel_status_that_does_not_fit_is_cut_and_ended);

@@ -148,7 +148,7 @@ static int read_settings(const char *text, web_settings_t *settings) {
     memset(complaint, 0, sizeof complaint);
     FILE *err = fmemopen(complaint, sizeof complaint - 1U, "w");
     settings_report_t report = {.name = "f", .err = err};
-    web_settings_default(settings);
+    *settings = web_settings_standard;
     const int result = settings_parse(&web_settings_form, &report, text, strlen(text), settings);
     (void)fclose(err);
     return result;

@@ -20,17 +20,6 @@ typedef struct {
     bool print;
 } wanted_t;
 
-static void help(const bridge_program_t *self) {
-    (void)printf("%s\n"
-                 "usage: %s [options]\n"
-                 "  -c, --config FILE   configuration (%s, if it exists)\n"
-                 "%s"
-                 "      --print-config  print the configuration in force\n"
-                 "      --version, --help\n"
-                 "\n%s",
-                 self->about, self->form->program, self->path, self->options, self->exit_codes);
-}
-
 static int misuse(const bridge_program_t *self, const char *word, const char *what) {
     (void)fprintf(stderr, "%s: %.100s %s; see %s --help\n", self->form->program, word, what, self->form->program);
     return EX_USAGE;
@@ -62,7 +51,7 @@ static int parse(const bridge_program_t *self, int count, char **arguments, want
     opterr = 0;
     while ((option = getopt_long(count, arguments, ":c:hV", options, NULL)) != -1) {
         if (option == 'h') {
-            help(self);
+            (void)fputs(self->help, stdout);
             return 0;
         }
         if (option == 'V') {

@@ -24,10 +24,8 @@ typedef struct {
 
 typedef struct {
     const settings_form_t *form; ///< Has the program's name.
-    const char *path;       ///< Of the configuration that is read where `-c` names none; its absence is no error then.
-    const char *about;      ///< Lines of `--help` before the options.
-    const char *options;    ///< Lines of `--help` for the options of its own, each with its end.
-    const char *exit_codes; ///< Lines of `--help` for them.
+    const char *path; ///< Of the configuration that is read where `-c` names none; its absence is no error then.
+    const char *help; ///< What `--help` prints.
     bridge_option_t own[BRIDGE_OPTIONS_MAX]; ///< Up to a null name.
     void *settings;                          ///< Holds the defaults; the file and options go over it.
     const void *standard;                    ///< The defaults, for printing.

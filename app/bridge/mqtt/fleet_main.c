@@ -4,6 +4,8 @@
 
 #include "begin/begin.h"
 
+#include "mqtt_texts.h"
+
 #include <getopt.h>
 #include <stdarg.h>
 #include <string.h>
@@ -11,9 +13,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#define SETTINGS_PATH "/etc/iwheel/fleet.conf"
-#define DAY_US        86400000000LL
-#define WAIT_S        60U
+#define DAY_US 86400000000LL
+#define WAIT_S 60U
 
 typedef enum { TABLE, HISTORY, RECORDINGS, RECORDING, VERBS } verb_t;
 
@@ -35,37 +36,6 @@ static volatile sig_atomic_t end_asked;
 static void ask_end(int number) {
     (void)number;
     end_asked = 1;
-}
-
-static void help(void) {
-    (void)fputs("iwheel-fleet: who of a fleet is there, who stopped last and why, batteries,\n"
-                "zeros, versions, and what several machines contradict; the history of stops; the\n"
-                "recording of one. Reads an MQTT broker and the stream behind it. It moves,\n"
-                "stops and changes nothing.\n"
-                "\n"
-                "usage: iwheel-fleet [options]                  a row per machine\n"
-                "       iwheel-fleet history [ID] [options]     stops of a time, of one or all\n"
-                "       iwheel-fleet recordings ID              which recordings it has\n"
-                "       iwheel-fleet recording ID [NAME]        fetch one; else the newest\n"
-                "  -c, --config FILE   whose [broker] to use (" SETTINGS_PATH ", if there)\n"
-                "      --json          objects, one a line; of the table with --for\n"
-                "      --version, --help\n"
-                "table:\n"
-                "      --for SECONDS   listen so long, then show it once\n"
-                "  -o, --output FILE   as JSON into FILE, every second, for iwheel-web's page\n"
-                "history:\n"
-                "      --last SPAN     90min, 12h or 7d; 24h if nothing is told\n"
-                "      --since WHEN    2026-11-21T22:00, local time; with Z behind it UTC\n"
-                "      --until WHEN    now if not told\n"
-                "      --all           faults, e-stop, bus, lease, ledger and zeros, too\n"
-                "recordings:\n"
-                "      --wait SECONDS  for a machine that does not answer (60)\n"
-                "  -o, --output FILE   where the frames go; the rest beside it (ID-NAME.log)\n"
-                "\n"
-                "exit codes: 0 ok, 1 the machine says no, 64 usage, 65 damaged, 69 no broker,\n"
-                "no stream or no such machine, 71 no memory, 73 file, 75 no answer,\n"
-                "77 permission, 78 configuration\n",
-                stdout);
 }
 
 __attribute__((format(printf, 1, 2))) static int misuse(const char *format, ...) {
@@ -151,7 +121,7 @@ static int take_option(words_t *self, int option) {
         (void)printf("iwheel-fleet " IWHEEL_VERSION "\n");
         return 0;
     case 'h':
-        help();
+        (void)fputs(mqtt_fleet_help, stdout);
         return 0;
     case ':':
         return misuse("an option needs a value");
@@ -242,9 +212,10 @@ int main(int count, char **arguments) {
     if (code >= 0) {
         return code;
     }
-    mqtt_settings_default(&settings);
-    if (words.path != NULL || access(SETTINGS_PATH, F_OK) == 0) {
-        code = settings_load(&mqtt_settings_form, (words.path != NULL) ? words.path : SETTINGS_PATH, &settings, stderr);
+    settings = mqtt_settings_standard;
+    if (words.path != NULL || access(FLEET_SETTINGS_PATH, F_OK) == 0) {
+        code = settings_load(&mqtt_settings_form, (words.path != NULL) ? words.path : FLEET_SETTINGS_PATH, &settings,
+                             stderr);
     }
     if (code > 0) {
         return code;

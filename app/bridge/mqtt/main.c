@@ -5,6 +5,8 @@
 #include "common/reach.h"
 #include "common/service.h"
 
+#include "mqtt_texts.h"
+
 #include <sysexits.h>
 #include <unistd.h>
 
@@ -56,21 +58,15 @@ static int run(const mqtt_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static mqtt_settings_t settings;
-    static mqtt_settings_t standard;
     const bridge_program_t program = {
         .form = &mqtt_settings_form,
         .path = MQTT_SETTINGS_PATH,
-        .about = "iwheel-mqtt: tells an MQTT broker what the wheels do, loses no stop or fault, and\n"
-                 "passes on stop and estop. It drives only if configured to. No safety function.\n",
-        .options = "      --check         check configuration and files; connect to nothing\n",
-        .exit_codes = "exit codes: 0 ok, 64 usage, 69 reachable, 71 no memory, 73 no directory for events,\n"
-                      "77 permission, 78 configuration\n",
+        .help = mqtt_help,
         .settings = &settings,
-        .standard = &standard,
+        .standard = &mqtt_settings_standard,
     };
     int action = BRIDGE_RUN;
-    mqtt_settings_default(&settings);
-    mqtt_settings_default(&standard);
+    settings = mqtt_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     if (code != BRIDGE_GO) {
         return code;

@@ -9,10 +9,9 @@
 
 #define FIELD(member)             SETTINGS_FIELD(mqtt_settings_t, member)
 #define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), FIELD(member)
-#define SWITCH(member)            .kind = SETTINGS_WORD, .words = no_yes, FIELD(member)
+#define SWITCH(member)            .kind = SETTINGS_WORD, .words = settings_no_yes, FIELD(member)
 #define TEXT(member)              .kind = SETTINGS_TEXT, FIELD(member)
 
-static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t protocols[] = {{"3.1.1", MQTT_PROTOCOL_3}, {"5", MQTT_PROTOCOL_5}, {NULL, 0}};
 
 bool mqtt_settings_is_name(const char *text) {
@@ -83,26 +82,23 @@ static const settings_key_t keys[] = {
     {"drive", "ttl_ms", " ms", "Older commands that drive are dropped.", NUMBER(drive.ttl_ms, 50, MQTT_TTL_MAX_MS)},
 };
 
-void mqtt_settings_default(mqtt_settings_t *out_settings) {
-    static const mqtt_settings_t standard = {
-        .gateway = {"/run/iwheel/watch/gateway.sock"},
-        .machine = {"none"},
-        .broker = {.host = "127.0.0.1",
-                   .port = 1883,
-                   .protocol = MQTT_PROTOCOL_3,
-                   .keepalive_s = 10,
-                   .process_user = "mosquitto",
-                   .credentials = "none",
-                   .ca = "none",
-                   .certificate = "none",
-                   .key = "none"},
-        .state = {5000},
-        .spool = {"/var/lib/iwheel-mqtt", 1024},
-        .home_assistant = {.prefix = "homeassistant"},
-        .drive = {.ttl_ms = 300},
-    };
-    *out_settings = standard;
-}
+const mqtt_settings_t mqtt_settings_standard = {
+    .gateway = {"/run/iwheel/watch/gateway.sock"},
+    .machine = {"none"},
+    .broker = {.host = "127.0.0.1",
+               .port = 1883,
+               .protocol = MQTT_PROTOCOL_3,
+               .keepalive_s = 10,
+               .process_user = "mosquitto",
+               .credentials = "none",
+               .ca = "none",
+               .certificate = "none",
+               .key = "none"},
+    .state = {5000},
+    .spool = {"/var/lib/iwheel-mqtt", 1024},
+    .home_assistant = {.prefix = "homeassistant"},
+    .drive = {.ttl_ms = 300},
+};
 
 bool mqtt_settings_given(const char *text) {
     return strcmp(text, "none") != 0;

@@ -6,7 +6,8 @@
 #include "config/settings.h"
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
-#define MQTT_SETTINGS_PATH "/etc/iwheel/mqtt.conf"
+#define MQTT_SETTINGS_PATH  "/etc/iwheel/mqtt.conf"
+#define FLEET_SETTINGS_PATH "/etc/iwheel/fleet.conf"
 /// Bytes of a machine's id with its terminator.
 #define MQTT_ID_SIZE   33U
 #define MQTT_HOST_SIZE 256U
@@ -52,7 +53,8 @@ typedef struct {
     } drive;
 } mqtt_settings_t;
 
-void mqtt_settings_default(mqtt_settings_t *out_settings);
+/// The defaults.
+extern const mqtt_settings_t mqtt_settings_standard;
 
 extern const settings_form_t mqtt_settings_form;
 

@@ -4,6 +4,8 @@
 #include "folder.h"
 #include "mqtt_settings.h"
 
+#include "iwheel_northbound/line.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -28,17 +30,6 @@ static const char fresh[] = MQTT_SPOOL_FILE ".new";
 #define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
 /// No event has a number above: one more must always be possible.
 #define NUMBER_MAX ((uint64_t)INT64_MAX)
-
-static uint32_t crc32_of(const uint8_t *bytes, size_t length) {
-    uint32_t crc = UINT32_MAX;
-    for (size_t i = 0; i < length; i++) {
-        crc ^= bytes[i];
-        for (unsigned bit = 0; bit < 8U; bit++) {
-            crc = (crc >> 1U) ^ (((crc & 1U) != 0U) ? 0xEDB88320U : 0U);
-        }
-    }
-    return ~crc;
-}
 
 static void put(uint8_t *at, uint64_t number, size_t bytes) {
     for (size_t i = 0; i < bytes; i++) {
@@ -76,7 +67,7 @@ static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint
     put(record + HEAD_SIZE + 1U, number, 8);
     put(record + HEAD_SIZE + 9U, self->mark, 8);
     put(record, BODY_SIZE + rest, 4);
-    put(record + 4, crc32_of(record + HEAD_SIZE, BODY_SIZE + rest), 4);
+    put(record + 4, iwn_line_crc(0, record + HEAD_SIZE, BODY_SIZE + rest), 4);
 }
 
 // ---- in memory ----------------------------------------------------------------------------------------------------
@@ -129,7 +120,7 @@ static void forget_one(mqtt_spool_t *self, uint64_t number) {
 /// A new letter for a record in memory, with its CRC.
 static void set_letter(uint8_t *record, uint8_t letter) {
     record[HEAD_SIZE] = letter;
-    put(record + 4, crc32_of(record + HEAD_SIZE, length_of(record) - HEAD_SIZE), 4);
+    put(record + 4, iwn_line_crc(0, record + HEAD_SIZE, length_of(record) - HEAD_SIZE), 4);
 }
 
 bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_event_t *out_event) {
@@ -251,7 +242,7 @@ static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left
     }
     const size_t length = length_of(record);
     const uint64_t number = number_of(record);
-    if (number > NUMBER_MAX || get(record + 4, 4) != crc32_of(record + HEAD_SIZE, length - HEAD_SIZE)) {
+    if (number > NUMBER_MAX || get(record + 4, 4) != iwn_line_crc(0, record + HEAD_SIZE, length - HEAD_SIZE)) {
         return 0;
     }
     if ((record[HEAD_SIZE] == CONFIRMED || record[HEAD_SIZE] == ACCEPTED) && length == DONE_SIZE) {

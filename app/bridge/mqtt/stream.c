@@ -198,10 +198,10 @@ static bool may_pass(natsStatus status, jsErrCode trouble) {
     return status != NATS_OK && status != NATS_NOT_PERMITTED && trouble != JSStreamNotFoundErr;
 }
 
-int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, stream_take_t take, void *context,
-                char out_host[MQTT_HOST_SIZE], char out_why[STREAM_WHY_SIZE]) {
+int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, char out_host[MQTT_HOST_SIZE],
+                char out_why[STREAM_WHY_SIZE]) {
     reader_t reader = {.options = NULL};
-    counted_t counted = {take, context, 0};
+    counted_t counted = {wish->take, wish->context, 0};
     jsErrCode trouble = 0;
     natsStatus status = NATS_ERR;
     if (settings->broker.stream_port == 0U) {

@@ -12,20 +12,22 @@
 #define STREAM_NAME     "iwheel"
 #define STREAM_WHY_SIZE 512U
 
-/// What is wanted of it.
+/// One event: where and what was published, and the servers' wall clock when they stored it. False: that is enough.
+typedef bool (*stream_take_t)(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
+
+/// What is wanted of it, and who takes it.
 typedef struct {
     const char *machine; ///< NULL: of all.
     const char *event;   ///< NULL: all.
     bool last;           ///< Of each machine and event only the last one.
     int64_t since_us;    ///< Unless `last`: wall clock of the servers, from which on they have stored it.
+    stream_take_t take;
+    void *context; ///< For `take`.
 } stream_wish_t;
-
-/// One event: where and what was published, and the servers' wall clock when they stored it. False: that is enough.
-typedef bool (*stream_take_t)(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
 
 /// Reads what is there now, in the order in which it was stored. 0 with the host that served in `out_host`; else an exit code of sysexits,
 /// with cause and cure in `out_why`.
-int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, stream_take_t take, void *context,
-                char out_host[MQTT_HOST_SIZE], char out_why[STREAM_WHY_SIZE]);
+int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, char out_host[MQTT_HOST_SIZE],
+                char out_why[STREAM_WHY_SIZE]);
 
 #endif

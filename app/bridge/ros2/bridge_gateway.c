@@ -82,7 +82,7 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
         self->ledger_due = false;
         ros_facts_read_ledger(message, machine);
     }
-    if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known) {
+    if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known && machine->track_mm > 0) {
         const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
                                  machine->now.right.distance_mm.value};
         ros_odometry_step(&self->odometry, &ways, &machine->measures);

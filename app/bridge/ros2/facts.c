@@ -132,7 +132,7 @@ void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine)
     text_of(&ledger, ROLE, machine, text);
     machine->setpoint_current = strcmp(text, "setpoint") == 0;
     machine->radius_mm = value_of(&ledger, RADIUS, machine, 192);
-    machine->track_mm = value_of(&ledger, TRACK, machine, 540);
+    machine->track_mm = value_of(&ledger, TRACK, machine, 0);
     text_of(&ledger, GEAR, machine, text);
     const double turns = strtod(text, &slash);
     const double per = (*slash == '/') ? strtod(slash + 1, NULL) : 1.0;

@@ -49,7 +49,7 @@ typedef struct {
     /// What a gateway without a file has in its configuration, by ros_facts_read_config: a board's ledger has no values.
     char configured[ROS_CONFIGURED][24];
     int64_t radius_mm;
-    int64_t track_mm;
+    int64_t track_mm; ///< 0: not configured, so no turn is known.
     ros_measures_t measures;
     bool setpoint_current;                ///< A twist has no current, but the configuration wants one.
     char contradicted[ROS_SENTENCE_SIZE]; ///< Of the assumption ledger, with the cure; empty: nothing.

@@ -5,6 +5,8 @@
 #include "common/reach.h"
 #include "common/service.h"
 
+#include "ros_texts.h"
+
 #include <stdlib.h>
 #include <sysexits.h>
 
@@ -119,21 +121,15 @@ static int check(const ros_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static ros_settings_t settings;
-    static ros_settings_t standard;
     const bridge_program_t program = {
         .form = &ros_settings_form,
         .path = ROS_SETTINGS_PATH,
-        .about = "iwheel-ros2: the iWheel gateway as a node of ROS 2. It moves nothing until\n"
-                 "somebody calls its service iwheel/arm and sends cmd_vel.\n",
-        .options = "      --check         check configuration, gateway and DDS; move nothing\n",
-        .exit_codes = "exit codes: 0 ok, 1 a check failed, 64 usage, 69 DDS unavailable,\n"
-                      "77 the gateway's socket may not be used, 78 configuration\n",
+        .help = ros_help,
         .settings = &settings,
-        .standard = &standard,
+        .standard = &ros_settings_standard,
     };
     int action = BRIDGE_RUN;
-    ros_settings_default(&settings);
-    ros_settings_default(&standard);
+    settings = ros_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     if (code != BRIDGE_GO) {
         return code;

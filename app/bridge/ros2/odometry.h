@@ -24,7 +24,7 @@ typedef struct {
     bool radius_confirmed;
     bool track_confirmed;
     double tick_m;  ///< Way of one odometry tick, above 0.
-    double track_m; ///< Above 0.
+    double track_m; ///< Above 0 for every call; 0: not configured, and there is no odometry.
 } ros_measures_t;
 
 typedef struct {

@@ -104,10 +104,7 @@ static void publish_joints(ros_t *self, const ros_machine_t *machine) {
 void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odometry_t *odometry) {
     const iwc_wheel_t *left = &machine->now.left;
     const iwc_wheel_t *right = &machine->now.right;
-    if (!odometry->begun || machine->measures.track_m <= 0.0) {
-        return;
-    }
-    if (is_moving_known(left) && is_moving_known(right)) {
+    if (odometry->begun && machine->track_mm > 0 && is_moving_known(left) && is_moving_known(right)) {
         publish_odometry(self, machine, odometry);
     }
     if (machine->radius_mm > 0 && (is_moving_known(left) || is_moving_known(right))) {

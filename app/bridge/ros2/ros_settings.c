@@ -9,7 +9,6 @@
 #define WORD(member, list)  .kind = SETTINGS_WORD, SETTINGS_FIELD(ros_settings_t, member), .words = (list)
 #define TEXT(member, judge) .kind = SETTINGS_TEXT, SETTINGS_FIELD(ros_settings_t, member), .wrong = (judge)
 
-static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t networks[] = {{"default", 0}, {"loopback", 1}, {NULL, 0}};
 static const settings_word_t clocks[] = {{"unknown", 0}, {"synchronised", 1}, {NULL, 0}};
 static const settings_word_t releases[] = {{"jazzy", 0}, {"humble", 1}, {NULL, 0}};
@@ -46,31 +45,28 @@ static const settings_key_t keys[] = {
      TEXT(ros.ns, wrong_name)},
     {"ros", "node", "", "Name in `ros2 node list`.", TEXT(ros.node, wrong_name)},
     {"drive", "enabled", "", "no: watch only. WHO REACHES THE DDS DOMAIN MAY DRIVE AND ARM.",
-     WORD(drive.enabled, no_yes)},
+     WORD(drive.enabled, settings_no_yes)},
     {"drive", "command", "", "What cmd_vel is.", WORD(drive.stamped, twists)},
     {"drive", "timeout_ms", " ms", "Silence of cmd_vel after which the bridge says stop. The lease may end earlier.",
      NUMBER(drive.timeout_ms, 50, 500)},
     {"drive", "auto_arm", "",
      "yes: a command after 500 ms of zeros or silence arms; not after a stop that had another reason than its\n"
      "own source's silence, and after a person's stop only once the source was silent for a second.",
-     WORD(drive.auto_arm, no_yes)},
+     WORD(drive.auto_arm, settings_no_yes)},
     {"drive", "allow_reset", "", "yes: the service iwheel/reset resets a latched stop.",
-     WORD(drive.allow_reset, no_yes)},
+     WORD(drive.allow_reset, settings_no_yes)},
     {"odometry", "rate_hz", " Hz", "Of odom, joint_states, wrench.", NUMBER(odometry.rate_hz, 1, 100)},
     {"odometry", "odom_frame", "", "Frame of odom.", TEXT(odometry.odom_frame, wrong_name)},
     {"odometry", "base_frame", "", "Frame of the machine.", TEXT(odometry.base_frame, wrong_name)},
     {"odometry", "tf", "", "yes: publish the transform too; no, if robot_localization does.",
-     WORD(odometry.tf, no_yes)},
+     WORD(odometry.tf, settings_no_yes)},
 };
-void ros_settings_default(ros_settings_t *out_settings) {
-    static const ros_settings_t standard = {
-        .gateway = {"/run/iwheel/gateway.sock"},
-        .ros = {.loopback = true, .ns = "none", .node = "iwheel"},
-        .drive = {.enabled = true, .timeout_ms = 500},
-        .odometry = {.rate_hz = 50, .odom_frame = "odom", .base_frame = "base_link"},
-    };
-    *out_settings = standard;
-}
+const ros_settings_t ros_settings_standard = {
+    .gateway = {"/run/iwheel/gateway.sock"},
+    .ros = {.loopback = true, .ns = "none", .node = "iwheel"},
+    .drive = {.enabled = true, .timeout_ms = 500},
+    .odometry = {.rate_hz = 50, .odom_frame = "odom", .base_frame = "base_link"},
+};
 
 const char *ros_settings_space(const ros_settings_t *settings) {
     return (strcmp(settings->ros.ns, "none") == 0) ? "" : settings->ros.ns;

@@ -35,7 +35,8 @@ typedef struct {
     } odometry;
 } ros_settings_t;
 
-void ros_settings_default(ros_settings_t *out_settings);
+/// The defaults.
+extern const ros_settings_t ros_settings_standard;
 
 extern const settings_form_t ros_settings_form;
 

@@ -3,6 +3,8 @@
 
 #include "common/program.h"
 
+#include "serial_texts.h"
+
 #include <stdlib.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -56,30 +58,19 @@ static int act(int action, const serial_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static serial_settings_t settings;
-    static serial_settings_t standard;
     const bridge_program_t program = {
         .form = &serial_settings_form,
         .path = SERIAL_SETTINGS_PATH,
-        .about = "iwheel-serial: joins a board that is a gateway of its own, on a serial port,\n"
-                 "to the sockets that iwheelctl, the clients and the bridges know.\n"
-                 "It moves nothing itself.\n",
-        .options = "      --port PATH     serial port of the board\n"
-                   "      --baud RATE     its speed, as the image was built\n"
-                   "      --socket PATH   where clients connect\n"
-                   "      --watch-socket PATH  where clients connect that may not drive, or none\n"
-                   "      --check         check configuration and board; move nothing\n",
-        .exit_codes = "exit codes: 0 ok, 1 a check failed, 64 usage, 69 port or socket in use,\n"
-                      "77 permission, 78 configuration\n",
+        .help = serial_help,
         .own = {{"port", "board.port"},
                 {"baud", "board.baud"},
                 {"socket", "northbound.socket"},
                 {"watch-socket", "northbound.watch_socket"}},
         .settings = &settings,
-        .standard = &standard,
+        .standard = &serial_settings_standard,
     };
     int action = BRIDGE_RUN;
-    serial_settings_default(&settings);
-    serial_settings_default(&standard);
+    settings = serial_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     return (code == BRIDGE_GO) ? act(action, &settings) : code;
 }

@@ -43,20 +43,17 @@ static const settings_key_t keys[] = {
      NUMBER(northbound.max_watchers, 1, 7)},
 };
 
-void serial_settings_default(serial_settings_t *out_settings) {
-    static const serial_settings_t standard = {
-        .board = {"/dev/iwheel-board", 1000000},
-        .northbound = {.socket = "/run/iwheel/gateway.sock",
-                       .mode = 0660,
-                       .group = "iwheel",
-                       .max_clients = 5,
-                       .watch_socket = "none",
-                       .watch_mode = 0660,
-                       .watch_group = "iwheel-watch",
-                       .max_watchers = 3},
-    };
-    *out_settings = standard;
-}
+const serial_settings_t serial_settings_standard = {
+    .board = {"/dev/iwheel-board", 1000000},
+    .northbound = {.socket = "/run/iwheel/gateway.sock",
+                   .mode = 0660,
+                   .group = "iwheel",
+                   .max_clients = 5,
+                   .watch_socket = "none",
+                   .watch_mode = 0660,
+                   .watch_group = "iwheel-watch",
+                   .max_watchers = 3},
+};
 
 static unsigned line_of(const char *key, const unsigned *lines) {
     return lines[settings_find(&serial_settings_form, NULL, key) - keys];

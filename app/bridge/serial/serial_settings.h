@@ -25,7 +25,8 @@ typedef struct {
     } northbound;
 } serial_settings_t;
 
-void serial_settings_default(serial_settings_t *out_settings);
+/// The defaults.
+extern const serial_settings_t serial_settings_standard;
 
 extern const settings_form_t serial_settings_form;
 

@@ -314,6 +314,7 @@ void *web_call_new(void *context, const char *target, struct MHD_Connection *con
     return self;
 }
 
+// NOLINTNEXTLINE(readability-function-size): the library says what it takes.
 enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,
                                 const char *version, const char *upload, size_t *upload_size, void **place) {
     web_call_t *self = *place;

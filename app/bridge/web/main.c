@@ -3,6 +3,8 @@
 #include "common/service.h"
 #include "server.h"
 
+#include "web_texts.h"
+
 #ifdef IWHEEL_WEB_QR
 #include <qrencode.h>
 #endif
@@ -127,25 +129,16 @@ static int run(const web_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static web_settings_t settings;
-    static web_settings_t standard;
     const bridge_program_t program = {
         .form = &web_settings_form,
         .path = WEB_SETTINGS_PATH,
-        .about = "iwheel-web: a page that shows what the wheels do, and stops them. It drives only if\n"
-                 "configured to. No safety function.\n",
-        .options = "      --check         check configuration and files; open nothing\n"
-                   "      --url           print the page's address with its token; on a\n"
-                   "                      terminal as a QR code too\n"
-                   "      --read-secret   print what programs that only read send as Bearer\n",
-        .exit_codes = "exit codes: 0 ok, 64 usage, 69 cannot listen, 71 no memory, 77 permission,\n"
-                      "78 configuration\n",
+        .help = web_help,
         .own = {{"url", NULL}, {"read-secret", NULL}},
         .settings = &settings,
-        .standard = &standard,
+        .standard = &web_settings_standard,
     };
     int action = BRIDGE_RUN;
-    web_settings_default(&settings);
-    web_settings_default(&standard);
+    settings = web_settings_standard;
     const int code = bridge_program_begin(&program, count, arguments, &action);
     if (code != BRIDGE_GO) {
         return code;

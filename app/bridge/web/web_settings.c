@@ -10,10 +10,8 @@
 
 #define FIELD(member)             SETTINGS_FIELD(web_settings_t, member)
 #define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), FIELD(member)
-#define SWITCH(member)            .kind = SETTINGS_WORD, .words = no_yes, FIELD(member)
+#define SWITCH(member)            .kind = SETTINGS_WORD, .words = settings_no_yes, FIELD(member)
 #define TEXT(member)              .kind = SETTINGS_TEXT, FIELD(member)
-
-static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 
 static const char *wrong_listen(const char *text) {
     struct in6_addr address;
@@ -60,22 +58,19 @@ static const settings_key_t keys[] = {
      NUMBER(drive.ttl_ms, 50, 1000)},
 };
 
-void web_settings_default(web_settings_t *out_settings) {
-    static const web_settings_t standard = {
-        .gateway = {"/run/iwheel/watch/gateway.sock", 20},
-        .web = {.listen = "127.0.0.1",
-                .port = 8470,
-                .hosts = "none",
-                .token_file = "/var/lib/iwheel-web/token",
-                .max_connections = 128,
-                .page = IWHEEL_WEB_PAGE_DIR,
-                .certificate = "none",
-                .key = "none"},
-        .fleet = {"none"},
-        .drive = {.max_speed_mm_s = 300, .ttl_ms = 300},
-    };
-    *out_settings = standard;
-}
+const web_settings_t web_settings_standard = {
+    .gateway = {"/run/iwheel/watch/gateway.sock", 20},
+    .web = {.listen = "127.0.0.1",
+            .port = 8470,
+            .hosts = "none",
+            .token_file = "/var/lib/iwheel-web/token",
+            .max_connections = 128,
+            .page = IWHEEL_WEB_PAGE_DIR,
+            .certificate = "none",
+            .key = "none"},
+    .fleet = {"none"},
+    .drive = {.max_speed_mm_s = 300, .ttl_ms = 300},
+};
 
 bool web_settings_is_unix(const web_settings_t *settings) {
     return strncmp(settings->web.listen, "unix:", 5) == 0;

@@ -36,7 +36,8 @@ typedef struct {
     } drive;
 } web_settings_t;
 
-void web_settings_default(web_settings_t *out_settings);
+/// The defaults.
+extern const web_settings_t web_settings_standard;
 
 extern const settings_form_t web_settings_form;
 

@@ -59,6 +59,17 @@ static void keep_track(bringup_t *self, const hand_t *hand, int turns, double tr
                  hand->ticks[IW_RIGHT], rolled_distance ? "" : "; the radius is assumed");
 }
 
+/// Nothing confirms what was counted.
+static void tell_off(const bringup_t *self) {
+    char configured[40] = "None was configured";
+    if (self->config.core.track_mm != 0U) {
+        (void)snprintf(configured, sizeof configured, "Configured were %u mm", self->config.core.track_mm);
+    }
+    talk_say("  %s. A tape from the middle of one tyre to the middle of the other tells whether the turns were counted "
+             "rightly.",
+             configured);
+}
+
 /// True: it is done.
 static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     const double left = rolled(self, hand, IW_LEFT);
@@ -79,10 +90,7 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     talk_say("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3, turns,
              track_mm, (self->mm_per_tick > 0.0) ? "" : ", if the radius is as configured: no distance was measured");
     if (!near) {
-        talk_say(
-            "  Configured were %.0f mm. A tape from the middle of one tyre to the middle of the other tells whether "
-            "the turns were counted rightly.",
-            before_mm);
+        tell_off(self);
     }
     const bool taken = talk_yes(self, "Take that?", near);
     if (taken) {
@@ -103,6 +111,13 @@ static int ask_turns(bringup_t *self) {
     return 0;
 }
 
+static void tell_left_out(const bringup_t *self) {
+    if (self->config.core.track_mm == 0U) {
+        talk_say("Without a track no machine is armed: set track_mm under [wheels], from the middle of one tyre to the "
+                 "middle of the other, in mm.");
+    }
+}
+
 void bringup_track(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     char prompt[128];
@@ -117,6 +132,7 @@ void bringup_track(bringup_t *self) {
     do {
         turns = ask_turns(self);
         if (turns == 0) {
+            tell_left_out(self);
             return;
         }
         (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",

@@ -119,6 +119,8 @@ static void slow_down(const bringup_t *self, const gateway_config_t *config, boo
     out_trial->core.blocked_ms = 2000; // A wheel that does not turn is a result here, and no burst lasts that long.
     out_trial->core.pair_mm = 150;     // Nor does a pair in the air turn a machine: as wide as it can be.
     out_trial->core.pair_leak_ms = 500;
+    out_trial->core.track_mm =
+        (with_records || config->core.track_mm != 0U) ? config->core.track_mm : iw_config_range(IW_CONFIG_TRACK).max;
     out_trial->core.max_yaw_mrad_s = 10000;
     out_trial->core.yaw_accel_mrad_s2 = 10000;
     out_trial->core.wheel_silent_ms = 150; // Nobody leans on wheels in the air: rather patient than cut short.

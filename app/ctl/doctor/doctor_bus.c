@@ -52,6 +52,21 @@ static void list_contradicted(doctor_t *self, json_t *ledger) {
     }
 }
 
+/// What arm needs and nobody has configured, in the words of the gateway's own --check.
+static void list_unset(doctor_t *self) {
+    static const struct {
+        const char *item;
+        const char *key;
+    } needed[] = {{"setpoint_type", "setpoint_type"}, {"current_role", "current_role"}, {"track", "track_mm"}};
+    for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
+        if (advice_is_unset(self->gateway.status, needed[i].item)) {
+            inspect_say(&self->findings, "config", INSPECT_WARN, "%s not configured: arm is refused", needed[i].key);
+            inspect_cure(&self->findings,
+                         "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
+        }
+    }
+}
+
 /// A setpoint that nobody acknowledges keeps arm refused, and may leave late.
 static void judge_sending(doctor_t *self) {
     char cure[ADVICE_SIZE];
@@ -79,6 +94,9 @@ static void look_at_status(doctor_t *self) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
                     "the gateway hears setpoints that are not its own, id 266 (0x10A) or 298 (0x12A)");
         inspect_cure(findings, "switch off the other program or device that sends them");
+    }
+    if (!json_is_true(json_object_get(status, "listen_only"))) {
+        list_unset(self);
     }
     list_contradicted(self, json_object_get(status, "ledger"));
 }

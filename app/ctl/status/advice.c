@@ -79,9 +79,10 @@ __attribute__((format(printf, 2, 3))) static void add(advice_t *self, const char
     }
 }
 
-static bool is_unset(const json_t *status, const char *item) {
+bool advice_is_unset(const json_t *status, const char *item) {
     const json_t *entry = json_object_get(json_object_get(status, "ledger"), item);
-    return strcmp(text_word(entry, "evidence"), "none") == 0;
+    // A gateway before 0.3 called a track that was configured without evidence too.
+    return strcmp(text_word(entry, "evidence"), "none") == 0 && !json_is_string(json_object_get(entry, "value"));
 }
 
 /// Contradictions that refuse arm: the gateway says so by how it tells the cost.
@@ -115,11 +116,14 @@ static void advise_listening(const json_t *status, advice_t *self) {
         add(self, "this gateway only listens; to drive, start it without --listen-only");
         return;
     }
-    if (is_unset(status, "setpoint_type")) {
+    if (advice_is_unset(status, "setpoint_type")) {
         add(self, "cannot arm: set setpoint_type under [wheels] in the configuration");
     }
-    if (is_unset(status, "current_role")) {
+    if (advice_is_unset(status, "current_role")) {
         add(self, "cannot arm: set current_role (limit or setpoint) under [wheels]");
+    }
+    if (advice_is_unset(status, "track")) {
+        add(self, "cannot arm: set track_mm under [wheels]; iwheelctl bringup measures it");
     }
     add_contradictions(status, self);
     if (self->lines == 0) {

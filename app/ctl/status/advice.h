@@ -24,4 +24,7 @@ bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_S
 /// True if the gateway has seen the cause within the last second, or sees it still.
 bool advice_is_present(const json_t *status, const char *cause);
 
+/// True if that item of the ledger, which arm needs, has no value: nobody has configured it.
+bool advice_is_unset(const json_t *status, const char *item);
+
 #endif

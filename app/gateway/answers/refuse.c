@@ -74,7 +74,9 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->stalled_cure = texts->stalled_cure;
     context->timing = texts->timing;
     context->contradiction = texts->contradiction;
-    context->configure = "under [wheels] in the configuration";
+    context->configure = (refusal == IW_REFUSE_TRACK_NOT_SET)
+                             ? "under [wheels] in the configuration (iwheelctl bringup measures it)"
+                             : "under [wheels] in the configuration";
     context->listen_only = "the gateway runs with --listen-only and never sends; start it without";
     context->shutting_down = wheels->shutting_down;
 }

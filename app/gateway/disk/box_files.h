@@ -118,7 +118,4 @@ void gw_box_reader_answer(const char *directory, const gw_box_question_t *questi
 /// Runs until the gateway is gone. `fd` is the socket to it.
 void gw_box_reader_run(int fd, const char *directory);
 
-/// CRC-32 as of zlib and Ethernet, of bytes behind those whose CRC is `before` (0: none).
-uint32_t gw_box_crc32(uint32_t before, const uint8_t *bytes, size_t length);
-
 #endif

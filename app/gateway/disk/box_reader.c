@@ -4,6 +4,7 @@
 #include "sockets/owners.h"
 
 #include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/line.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -31,19 +32,6 @@ typedef struct {
     listed_t entry[GW_BOX_LISTED];
     size_t count;
 } list_t;
-
-uint32_t gw_box_crc32(uint32_t before, const uint8_t *bytes, size_t length) {
-    static const uint32_t table[16] = {0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U,
-                                       0x4DB26158U, 0x5005713CU, 0xEDB88320U, 0xF00F9344U, 0xD6D6A3E8U, 0xCB61B38CU,
-                                       0x9B64C2B0U, 0x86D3D2D4U, 0xA00AE278U, 0xBDBDF21CU};
-    uint32_t crc = ~before;
-    for (size_t i = 0; i < length; i++) {
-        crc ^= bytes[i];
-        crc = (crc >> 4U) ^ table[crc & 15U];
-        crc = (crc >> 4U) ^ table[crc & 15U];
-    }
-    return ~crc;
-}
 
 __attribute__((format(printf, 3, 4))) static void refuse(gw_box_answer_t *out, iwn_error_t error, const char *format,
                                                          ...) {
@@ -173,7 +161,7 @@ static bool whole_crc(int fd, int64_t size, uint32_t *out_crc) {
         if (got != (ssize_t)most) {
             return false;
         }
-        *out_crc = gw_box_crc32(*out_crc, bytes, most);
+        *out_crc = iwn_line_crc(*out_crc, bytes, most);
         at += (int64_t)most;
     }
     return true;
@@ -217,7 +205,7 @@ static void write_piece(int fd, const gw_box_question_t *question, int64_t size,
     iwn_out_int(&json, "size", size);
     (void)base64(bytes, most, text);
     iwn_out_text(&json, "data", text);
-    iwn_out_int(&json, "crc32", gw_box_crc32(0, bytes, most));
+    iwn_out_int(&json, "crc32", iwn_line_crc(0, bytes, most));
     iwn_out_known(&json, "file_crc32", last, whole);
     finish(&json, out);
 }

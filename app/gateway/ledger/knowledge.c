@@ -248,7 +248,7 @@ void gw_knowledge_tend(gw_knowledge_t *self) {
 static void refuse(iw_ledger_item_t item, gw_found_t verdict, iwn_refusal_t *out_refusal) {
     const char *name = iwn_ledger_item_name(item);
     if (verdict == GW_FOUND_UNSET) {
-        (void)IWN_REFUSE(out_refusal, IWN_TYPE_NOT_SET, name,
+        (void)IWN_REFUSE(out_refusal, (item == IW_LEDGER_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET, name,
                          " is not configured, so there is nothing to confirm; set it under [wheels] first");
     } else {
         (void)IWN_REFUSE(out_refusal, IWN_BAD_VALUE, "value of ", name, " must be ", gw_assumption_values(item),

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "memory.h"
 
-#include "disk/box_files.h"
-
 #include "iwheel/codec.h"
 #include "iwheel/evidence.h"
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/line.h"
 #include "iwheel_northbound/words.h"
 
 #include <ctype.h>
@@ -86,8 +85,7 @@ size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text,
     if (length == 0U) {
         return 0;
     }
-    (void)snprintf(&out_text[length], SUM_LENGTH + 1U, "%08" PRIx32 "\n",
-                   gw_box_crc32(0, (const uint8_t *)out_text, length));
+    (void)snprintf(&out_text[length], SUM_LENGTH + 1U, "%08" PRIx32 "\n", iwn_line_crc(0, out_text, length));
     return length + SUM_LENGTH;
 }
 
@@ -242,7 +240,7 @@ bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t
     const size_t body = (length < SUM_LENGTH) ? 0U : length - SUM_LENGTH;
     const char *fault = "it is damaged: its checksum is wrong";
     memset(&known, 0, sizeof known);
-    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", gw_box_crc32(0, (const uint8_t *)text, body));
+    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", iwn_line_crc(0, text, body));
     if (length > SUM_LENGTH && memcmp(&text[body], sum, SUM_LENGTH) == 0) {
         fault = read_line(text, body, bus, &known);
     }

@@ -21,7 +21,7 @@ typedef struct {
     unsigned late;      ///< One wheel obeys 100 ms later than the other.
 } gw_angles_t;
 
-/// Of a configuration that has been checked.
+/// Of a configuration that has been checked and names its track.
 gw_angles_t gw_angles(const gateway_config_t *config);
 
 #endif

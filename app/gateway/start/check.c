@@ -15,19 +15,38 @@
 /// How long the bus is listened to: ten periods of the slowest frame that always comes.
 #define LISTEN_US 500000U
 
-/// What cannot be read at all has been refused before. Without type or role the gateway starts, listens, and refuses arm.
+/// The keys that arm needs and that are not set, joined; empty if all are.
+static void name_unset(const iw_config_t *core, char *out_names, size_t size) {
+    const struct {
+        const char *key;
+        bool is_set;
+    } needed[] = {{"setpoint_type", core->setpoint_type_set},
+                  {"current_role", core->current_role != IW_ROLE_UNSET},
+                  {"track_mm", core->track_mm != 0U}};
+    size_t used = 0;
+    out_names[0] = '\0';
+    for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
+        if (!needed[i].is_set) {
+            used += (size_t)snprintf(out_names + used, size - used, "%s%s", (used > 0U) ? " and " : "", needed[i].key);
+        }
+    }
+}
+
+/// What cannot be read at all has been refused before. Without one of these keys the gateway starts, listens, and refuses
+/// arm.
 static void judge_config(const gateway_config_t *config, inspect_findings_t *findings) {
+    char unset[64];
+    name_unset(&config->core, unset, sizeof unset);
     if (config->core.listen_only) {
-        inspect_say(findings, "config", INSPECT_OK, "it only listens: setpoint type and current role are not needed");
-    } else if (config->core.setpoint_type_set && config->core.current_role != IW_ROLE_UNSET) {
-        inspect_say(findings, "config", INSPECT_OK, "setpoint type %u, current role %s", config->core.setpoint_type,
-                    (config->core.current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint");
+        inspect_say(findings, "config", INSPECT_OK,
+                    "it only listens: setpoint type, current role and track are not needed");
+    } else if (unset[0] == '\0') {
+        inspect_say(findings, "config", INSPECT_OK, "setpoint type %u, current role %s, track %u mm",
+                    config->core.setpoint_type, (config->core.current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint",
+                    config->core.track_mm);
     } else {
-        inspect_say(findings, "config", INSPECT_WARN,
-                    "%s%s%s not configured: it starts and listens, arm will be refused",
-                    config->core.setpoint_type_set ? "" : "setpoint_type",
-                    (!config->core.setpoint_type_set && config->core.current_role == IW_ROLE_UNSET) ? " and " : "",
-                    (config->core.current_role == IW_ROLE_UNSET) ? "current_role" : "");
+        inspect_say(findings, "config", INSPECT_WARN, "%s not configured: it starts and listens, arm will be refused",
+                    unset);
         inspect_cure(findings, "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);

@@ -36,28 +36,6 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
-void gw_options_help(FILE *out) {
-    (void)fputs("iwheel-gateway: drives a pair of iWheels on a CAN bus for the clients of its\n"
-                "socket. It sends nothing until a client arms.\n"
-                "\n"
-                "usage: iwheel-gateway [options]\n"
-                "  -c, --config FILE   configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n"
-                "      --can BUS       CAN interface, or unix:PATH for the simulator's bus\n"
-                "      --socket PATH   where clients connect\n"
-                "      --watch-socket PATH  where clients connect that may not drive, or none\n"
-                "      --estop LINE    e-stop line, unix:PATH for the simulator's button, or none\n"
-                "      --listen-only   never send anything\n"
-                "      --check         check configuration, bus and e-stop; move nothing\n"
-                "      --print-config  print the configuration in force\n"
-                "      --log-level L   error, warning, info (default) or debug\n"
-                "      --version, --help\n"
-                "\n"
-                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 bus, socket or e-stop\n"
-                "unavailable (of --check: nothing failed, but these could not be looked at),\n"
-                "70 internal, 77 permission, 78 configuration\n",
-                out);
-}
-
 static int misuse(FILE *err, const char *what) {
     char plain[256];
     iwn_plain_copy(what, plain, sizeof plain);

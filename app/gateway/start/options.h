@@ -27,6 +27,4 @@ int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FIL
 /// after cause and cure have been printed on `err`.
 int gw_options_configure(const gw_options_t *options, gateway_config_t *out_config, FILE *err);
 
-void gw_options_help(FILE *out);
-
 #endif

@@ -10,8 +10,14 @@
 
 #define TENTHS(value) (value) / 10U, (value) % 10U
 
-/// What one wheel alone may do to the machine: every figure with what it assumes.
+/// What one wheel alone may do to the machine: every figure with what it assumes. All of them rest on the track.
 static void report_angles(const gateway_config_t *config, gw_log_t *log) {
+    if (config->core.track_mm == 0U) {
+        gw_log(log, GW_LOG_WARNING,
+               "track_mm is not configured: arm will be refused; set it under [wheels] (iwheelctl "
+               "bringup measures it)");
+        return;
+    }
     const gw_angles_t angles = gw_angles(config);
     gw_log(log, GW_LOG_INFO,
            "angle budget, zero at once: a wheel blocked %u.%u degrees, slow %u.%u, at %u mm/s2 assumed, not measured",

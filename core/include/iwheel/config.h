@@ -46,7 +46,7 @@ typedef struct {
     uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
     uint16_t max_yaw_mrad_s;  ///< So fast may a machine turn, 50..10000. Faster commands are scaled down by one factor.
     uint16_t yaw_accel_mrad_s2; ///< So fast may its turning grow under a drive command, 100..10000. No stop is slowed.
-    uint16_t track_mm;     ///< Distance of the wheels, 200..1500. It turns yaw into speeds and back, as the radius.
+    uint16_t track_mm;     ///< Distance of the wheels, 200..1500: yaw by speeds. 0: not set, the wheels do not move.
     uint16_t radius_mm;    ///< Of the wheel, 60..400; the document says "approximately 192".
     uint16_t gear_turns;   ///< Rotor turns in `gear_per` wheel turns, 1..1000.
     uint16_t gear_per;     ///< 1..1000. Together the ratio must lie within 1..100.
@@ -116,7 +116,7 @@ typedef struct {
 /// this.
 iw_config_rest_t iw_config_rest(const iw_config_t *config);
 
-/// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
+/// The documented defaults. Setpoint type, current role and track are left unset: nobody can know them.
 void iw_config_default(iw_config_t *out_config);
 
 /// IW_CONFIG_OK, or the first field that is out of range or relation that does not hold.

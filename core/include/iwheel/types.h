@@ -134,6 +134,7 @@ typedef enum {
     IW_REFUSE_SECOND_MASTER,
     IW_REFUSE_CAUSE_PRESENT, ///< `iw_snapshot_t::present` tells which.
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
+    IW_REFUSE_TRACK_NOT_SET, ///< The distance of the wheels not configured: every bound of yaw rests on it.
     IW_REFUSE_STALE_COMMAND, ///< `iw_snapshot_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
     IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_snapshot_t::doubt` tells which.

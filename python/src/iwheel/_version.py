@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: MIT
 """Written by scripts/version; the one place is CMakeLists.txt."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

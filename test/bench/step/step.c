@@ -80,6 +80,7 @@ int bench_prepare(void) {
     iw_config_default(&config);
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
+    config.track_mm = 540;
     if (iw_gateway_init(&gateway, &config, &hal, now_us, false) != IW_CONFIG_OK) {
         return 0;
     }

@@ -67,7 +67,7 @@ class Surroundings:
         self.socket = os.path.join(self.folder, "gateway.sock")
         with open("gateway.conf", "w", encoding="ascii") as file:
             file.write(
-                "[wheels]\nsetpoint_type = 1\ncurrent_role = limit\n[limits]\nwheel_silent_ms = 200\nrest_ms = 50\n"
+                "[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ntrack_mm = 540\n[limits]\nwheel_silent_ms = 200\nrest_ms = 50\n"
                 "[drive]\nzero_hold_ms = 1100\nlease_ms = 400\nmax_speed_mm_s = 500\n[estop]\nline = ESTOP\nactive = low\n"
                 f"[northbound]\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\ndirectory = {self.folder}\n"
             )

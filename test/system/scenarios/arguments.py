@@ -244,20 +244,17 @@ def row29_bad_configuration(t):
     t.figure(f"{len(BAD_CONFIGURATIONS)} files")
 
 
-@scenario("setpoint type or current role not set: listens, but does not arm", 5)
+@scenario("setpoint type, current role or track not set: listens, but does not arm", 7)
 def row29_type_not_set(t):
-    for missing in ("setpoint_type", "current_role"):
+    for missing, error in (("setpoint_type", "type_not_set"), ("current_role", "type_not_set"), ("track_mm", "track_not_set")):
         rig = t.rig()
         del rig.settings["wheels"][missing]
         rig.write_config()
         rig.start_gateway()
         client = rig.client()
         refusal = client.arm()
-        t.expect(refusal, "type_not_set")
-        t.check(
-            "setpoint_type" in refusal["message"] or "current_role" in refusal["message"],
-            f"the message names the key: {refusal['message']}",
-        )
+        t.expect(refusal, error)
+        t.check(f"{missing} not configured" in refusal["message"], f"the message names the key: {refusal['message']}")
         t.rule(not rig.bus.setpoints(), "nothing was sent")
 
 

@@ -146,7 +146,7 @@ function advise(state) {
   if (state.state !== "listening") return [next.newer];
   const lines = presentAdvice(state);
   if (state.listen_only) return [...lines, next.listen_only].slice(0, 6);
-  for (const item of ["setpoint_type", "current_role"]) if (state.ledger[item]?.evidence === "none") lines.push(next[item]);
+  for (const item of ["setpoint_type", "current_role", "track"]) if (state.ledger[item]?.evidence === "none" && !state.ledger[item].value) lines.push(next[item]);
   for (const [item, entry] of Object.entries(state.ledger)) {
     if (entry.disabled?.startsWith("arm is refused; ")) lines.push(fill(next.contradicted, { item, cost: entry.disabled.slice(16) }));
   }

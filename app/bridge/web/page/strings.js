@@ -146,6 +146,7 @@ const STRINGS = {
     listen_only: "this gateway only listens; to drive, start it without --listen-only",
     setpoint_type: "cannot arm: set setpoint_type under [wheels] in the configuration",
     current_role: "cannot arm: set current_role (limit or setpoint) under [wheels]",
+    track: "cannot arm: set track_mm under [wheels]; iwheelctl bringup measures it",
     contradicted: "cannot arm, {item} is contradicted: {cost}",
     see: "see: iwheelctl why",
     newer: "this gateway speaks of a state unknown here; use the iwheelctl of its version",

@@ -19,7 +19,7 @@
 typedef struct {
     uint32_t max_yaw_mrad_s;    ///< Of the real machine.
     uint32_t yaw_accel_mrad_s2; ///< Of the real machine.
-    uint32_t track_mm;          ///< Distance of the wheels.
+    uint32_t track_mm;          ///< Distance of the wheels; 0, not set: no turn is within its bounds.
     uint32_t radius_mm;         ///< Of the wheels.
 } iw_yaw_machine_t;
 

@@ -177,6 +177,10 @@ static void say_type(wording_t *self) {
         " not configured, and the wheels' document leaves ", it, " open; set ", it, " ", self->context->configure);
 }
 
+static void say_track(wording_t *self) {
+    SAY(self, "track_mm not configured, and every bound of turning rests on it; set it ", self->context->configure);
+}
+
 static void say_bus_down(wording_t *self) {
     SAY(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_cure);
 }
@@ -216,6 +220,7 @@ void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_
         [IW_REFUSE_SECOND_MASTER] = say_second_master, [IW_REFUSE_CAUSE_PRESENT] = say_present,
         [IW_REFUSE_TYPE_NOT_SET] = say_type,           [IW_REFUSE_STALE_COMMAND] = say_stale,
         [IW_REFUSE_LISTEN_ONLY] = say_listen_only,     [IW_REFUSE_CONTRADICTED] = say_contradicted,
+        [IW_REFUSE_TRACK_NOT_SET] = say_track,
     };
     wording_t wording = {context, context->seen, request,
                          iwn_text_begin(out_refusal->message, sizeof out_refusal->message)};

@@ -23,7 +23,7 @@ typedef struct {
     const char *stalled_cure;  ///< What more there is to do about a frame that nobody acknowledges; NULL: nothing.
     const char *timing;        ///< What is wrong with the bit timing, and the cure.
     const char *contradiction; ///< Of the assumption `seen->doubt`, with what it costs.
-    const char *configure;     ///< Where setpoint_type and current_role are set: "under [wheels] in the configuration".
+    const char *configure;     ///< Where what arm needs is set: "under [wheels] in the configuration".
     const char *listen_only;   ///< Why nothing is ever sent, and the cure.
     bool shutting_down;        ///< Nobody can arm any more.
 } iwn_refuse_context_t;

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+// The help texts are files: what is said in the code as well must be the same there.
+#include "config/gateway_config.h"
+#include "help.h"
+#include "mqtt_settings.h"
+#include "ros_settings.h"
+#include "serial_settings.h"
+#include "text/duration.h"
+
+#include "iwheel_northbound/words.h"
+
+#include "gateway_texts.h"
+#include "help_texts.h"
+#include "mqtt_texts.h"
+#include "ros_texts.h"
+#include "serial_texts.h"
+
+#ifdef WITH_WEB
+#include "web_settings.h"
+#include "web_texts.h"
+#endif
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <string.h>
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static void expect_said(const char *text, const char *what) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, what), what);
+}
+
+static void test_help_names_the_configuration_that_is_read(void) {
+    expect_said(gateway_help, "configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n");
+    expect_said(help_doctor, "else " GATEWAY_CONFIG_PATH ", if it is there\n");
+    expect_said(help_bringup, "else " GATEWAY_CONFIG_PATH ", if");
+    expect_said(mqtt_help, "configuration (" MQTT_SETTINGS_PATH ", if it exists)\n");
+    expect_said(mqtt_fleet_help, "(" FLEET_SETTINGS_PATH ", if there)\n");
+    expect_said(help_fleet, FLEET_SETTINGS_PATH);
+    expect_said(ros_help, "configuration (" ROS_SETTINGS_PATH ", if it exists)\n");
+    expect_said(serial_help, "configuration (" SERIAL_SETTINGS_PATH ", if it exists)\n");
+#ifdef WITH_WEB
+    expect_said(web_help, "configuration (" WEB_SETTINGS_PATH ", if it exists)\n");
+#endif
+}
+
+static void test_help_says_durations_as_they_are_read(void) {
+    expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
+    expect_said(help_record, "--for TIME  " DURATION_FORM ";");
+}
+
+/// Completion and the program's page take the words and the summary from their places in the page.
+static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
+    const verb_t *verb = NULL;
+    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+        char begin[64];
+        char summary[64];
+        const size_t length = (size_t)snprintf(begin, sizeof begin, "Usage: iwheelctl [--socket PATH]%s %s",
+                                               (verb->no_json == NULL) ? " [--json]" : "", verb->name);
+        (void)snprintf(summary, sizeof summary, "\n\n%s: ", verb->name);
+        TEST_ASSERT_EQUAL_STRING_LEN_MESSAGE(begin, verb->page, length, verb->name);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strchr(" \n", verb->page[length]), verb->name);
+        TEST_ASSERT_EQUAL_PTR_MESSAGE(strstr(verb->page, summary), strstr(verb->page, "\n\n"), verb->name);
+        TEST_ASSERT_EQUAL_CHAR_MESSAGE('\n', verb->page[strlen(verb->page) - 1U], verb->name);
+    }
+}
+
+static void test_help_fits_a_terminal_of_80_columns(void) {
+    const verb_t *verb = NULL;
+    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+        for (const char *line = verb->page; *line != '\0'; line += strcspn(line, "\n") + 1U) {
+            TEST_ASSERT_LESS_OR_EQUAL_size_t_MESSAGE(80U, strcspn(line, "\n"), line);
+        }
+    }
+}
+
+/// Each word of the choice, where the page lists them or in the usage.
+static void test_help_names_each_word_that_may_follow(void) {
+    const verb_t *verb = NULL;
+    unsigned choices = 0;
+    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+        for (unsigned k = 0; verb->choice != NULL && verb->choice(k) != NULL && strcmp(verb->name, "help") != 0; k++) {
+            expect_said(verb->page, verb->choice(k));
+            choices++;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN(IW_LEDGER_ITEMS + IWN_TOPICS, choices);
+}
+
+static void test_help_of_confirm_lists_the_items_and_no_other(void) {
+    char expected[512] = "\nITEM  ";
+    char found[512] = "";
+    for (unsigned i = 0; i < IW_LEDGER_ITEMS; i++) {
+        (void)snprintf(&expected[strlen(expected)], sizeof expected - strlen(expected), "%s%s", (i > 0U) ? ", " : "",
+                       iwn_ledger_item_name((iw_ledger_item_t)i));
+    }
+    // Lines that go on are indented.
+    size_t used = 0;
+    for (const char *at = strstr(help_confirm, "\nITEM  "); at != NULL && at[0] != '\0' && used + 1U < sizeof found;) {
+        if (strncmp(at, "\n      ", 7U) == 0) {
+            found[used++] = ' ';
+            at += 7;
+        } else {
+            found[used++] = *at++;
+        }
+    }
+    TEST_ASSERT_EQUAL_STRING(strcat(expected, "\n"), found);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_help_names_the_configuration_that_is_read);
+    RUN_TEST(test_help_says_durations_as_they_are_read);
+    RUN_TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places);
+    RUN_TEST(test_help_fits_a_terminal_of_80_columns);
+    RUN_TEST(test_help_names_each_word_that_may_follow);
+    RUN_TEST(test_help_of_confirm_lists_the_items_and_no_other);
+    return UNITY_END();
+}
