@@ -36,7 +36,7 @@ def depth_of(objects, indirect=()):
 
 
 def core_stack(build):
-    size, depth = depth_of(objects_of(build, "iwheel_core"))
+    _, depth = depth_of(objects_of(build, "iwheel_core"))
     return max(depth.of(name)[0] for name in size)
 
 
@@ -56,7 +56,7 @@ def image_stack(build, image):
     hal = [name for name in known if short(name) in HAL]
     serial = [name for name in SERIAL_HANDLERS if name in known]
     tabled = [name for name in known if THROUGH_TABLE in name and serial]
-    size, depth = depth_of(objects, (*hal, *tabled))
+    _, depth = depth_of(objects, (*hal, *tabled))
     handlers = (*HANDLERS, *serial)
     missing = {*HAL, *HANDLERS} - {*map(short, hal), *known}
     if missing:
