@@ -41,7 +41,13 @@ class Pages(unittest.TestCase):
 
     def expect_printed(self, name, text):
         self.assertTrue(text.strip())
-        self.assertIn(literal(text), self.page(name))
+        self.expect_block(name, literal(text))
+
+    def expect_block(self, name, block):
+        page = self.page(name)
+        if block not in page:
+            missing = [line for line in block.splitlines() if line not in page.splitlines()]
+            self.fail(f"man/{name}.scd of the build has not what is printed: " + "\n".join(missing or ["each line of it, but not in this order"]))
 
     def test_each_page_has_the_help_of_its_program(self):
         for name in built(FOLDERS):
@@ -53,7 +59,7 @@ class Pages(unittest.TestCase):
         self.assertGreater(len(verbs), 20)
         for verb in verbs:
             with self.subTest(verb):
-                self.assertIn(f"## {verb}\n" + literal(output("iwheelctl", verb, "--help")), self.page("iwheelctl.1"))
+                self.expect_block("iwheelctl.1", f"## {verb}\n" + literal(output("iwheelctl", verb, "--help")))
 
     def test_commands_of_the_simulator_are_those_that_a_running_one_lists(self):
         with tempfile.TemporaryDirectory() as folder:
