@@ -128,10 +128,15 @@ def cppcheck(folder, code, suppressions=""):
     return run("xargs", "-a", ROOT / ".cppcheck", "cppcheck", "core/src/planted.c", cwd=folder)
 
 
-def cppcheck_accepts(folder, what):
+def cppcheck_accepts(folder, what, begin="&a"):
     """Memory is copied, whose value the addon takes as discarded (17.7)."""
-    text = CLEAN.replace("    return", "    int b;\n    memcpy(&b, &a, sizeof b);\n    return")
+    text = CLEAN.replace("    return", f"    int b;\n    memcpy(&b, {begin}, sizeof b);\n    return")
     return cppcheck(folder, "#include <string.h>\n" + text, f"misra-c2012-17.7:core/*\nmissingIncludeSystem\n{what}")
+
+
+def cppcheck_behind(folder, begin):
+    """Of a line the addon tells one finding: accepted, it must not hide the next."""
+    return cppcheck_accepts(folder, "", begin)
 
 
 def deviations(folder, fault):
@@ -462,6 +467,7 @@ CASES = [
     (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
     (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
     (cppcheck_accepts, "cppcheck", "clean", "", False),
+    (cppcheck_behind, "cppcheck", "MISRA 18.4 in a line with what is accepted", "&a + 0", True),
     (cppcheck_accepts, "cppcheck", "a suppression that nothing needs", "misra-c2012-8.4:core/*\n", True),
     (deviations, "python3", "clean", ("", "", ""), False),
     (deviations, "python3", "a switch-off without a number", (".clang-tidy", "-cert-x,", "-cert-x,\n  -cert-y,"), True),
