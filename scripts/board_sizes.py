@@ -56,7 +56,7 @@ def image_stack(build, image):
     hal = [name for name in known if short(name) in HAL]
     serial = [name for name in SERIAL_HANDLERS if name in known]
     tabled = [name for name in known if THROUGH_TABLE in name and serial]
-    size, depth = depth_of(objects, (*hal, *tabled))
+    _, depth = depth_of(objects, (*hal, *tabled))
     handlers = (*HANDLERS, *serial)
     missing = {*HAL, *HANDLERS} - {*map(short, hal), *known}
     if missing:
