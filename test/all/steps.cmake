@@ -48,7 +48,7 @@ test(real bench check realtime default "" 76 test/bench/run --check)
 build(analyzer check analyzer "" 40)
 # One file only tests compile: the Linux port for libgpiod 2.
 test(idle analyzer.gpio_v2 check lint analyzer "" 5 sh -c "cmake --preset analyzer -DBUILD_TESTING=ON && (test ! -d build/analyzer/test/unit/CMakeFiles/unit_linux_gpio_v2.dir || cmake --build --preset analyzer --target unit_linux_gpio_v2)")
-set(analyze "cmake --build --preset arm-analyzer -j ${JOBS} && cmake --preset arm-analyzer -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit")
+set(analyze "cmake --build --preset arm-analyzer -j ${JOBS} && cmake --preset arm-analyzer -DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=limit -DIWHEEL_TRACK_MM=540")
 test(idle analyzer.arm check lint "" arm-none-eabi-gcc 30 sh -c "cmake --preset arm-analyzer '-UIWHEEL_[B-Z]*' && ${analyze} -DIWHEEL_DEMO=ON && ${analyze} -DIWHEEL_DEMO=OFF -DIWHEEL_GATEWAY=ON && cmake --build --preset arm-analyzer -j ${JOBS}")
 test(idle eva check formal "" "" 48 test/eva/run)
 test(idle wp check+full formal "" "" 267 test/wp/run --plant $<IF:$<BOOL:${HOURS}>,all,few>)
