@@ -11,11 +11,11 @@ set(IWHEEL_CORE_SOURCES
     src/diverge.c
     src/envelope.c
     src/estop_pair.c
-    src/evidence.c
+    src/observation.c
     src/follow.c
     src/force_offset.c
     src/gateway.c
-    src/ledger.c
+    src/assumption_store.c
     src/permit.c
     src/permit_refuse.c
     src/rolling.c

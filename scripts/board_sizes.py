@@ -14,10 +14,10 @@ from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph, short
 
 # Image, which build it is in, and how that one's name goes on.
 BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
-HAL = ("iw_bxcan_send", "iw_bxcan_receive", "iw_bxcan_bus_state", "iw_bxcan_purge", "iw_estop_pressed")
-HANDLERS = ("iw_systick_handler", "iw_exti0_handler", "iw_can_transmit_handler", "iw_can_receive_handler", "iw_can_error_handler")
+HAL = ("brd_bxcan_send", "brd_bxcan_receive", "brd_bxcan_bus_state", "brd_bxcan_purge", "brd_estop_pressed")
+HANDLERS = ("brd_systick_handler", "brd_exti0_handler", "brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler")
 # Of the image gateway alone; and how the functions are called that northbound's refusals reach through a table.
-SERIAL_HANDLERS, THROUGH_TABLE = ("iw_serial_usart_handler", "iw_serial_receive_handler", "iw_serial_transmit_handler"), ":say_"
+SERIAL_HANDLERS, THROUGH_TABLE = ("brd_serial_usart_handler", "brd_serial_receive_handler", "brd_serial_transmit_handler"), ":say_"
 SAVED_BY_CPU = 36 # Eight registers and four bytes to align them.
 
 
@@ -36,7 +36,7 @@ def depth_of(objects, indirect=()):
 
 
 def core_stack(build):
-    _, depth = depth_of(objects_of(build, "iwheel_core"))
+    size, depth = depth_of(objects_of(build, "iwheel_core"))
     return max(depth.of(name)[0] for name in size)
 
 
@@ -70,7 +70,7 @@ def image_stack(build, image):
 def stack_room(elf):
     """What the linker's script leaves for the stack."""
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
-    return next(int(line.split()[0], 16) for line in run.stdout.splitlines() if line.endswith(" iw_link_stack_size"))
+    return next(int(line.split()[0], 16) for line in run.stdout.splitlines() if line.endswith(" brd_link_stack_size"))
 
 
 def image_sizes(build, image):

@@ -23,9 +23,9 @@ PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
 OPTIONS = {"stm32f446": " -DIWHEEL_BOARD=stm32f446 -DIWHEEL_CLOCK_INPUT=ON"} # What the board named above needs.
 OPENOCD = {"stm32f103": "stm32f1x", "stm32f407": "stm32f4x", "stm32f446": "stm32f4x"}
 CHIPS = {"stm32f103": "STM32F103C8", "stm32f407": "STM32F407VGTx", "stm32f446": "STM32F446RETx"}
-PINS = {"e-stop": "IW_BOARD_ESTOP", "button": "IW_BOARD_BUTTON", "lamp": "IW_BOARD_LAMP", "CAN receive": "IW_BOARD_CAN_RX",
-        "CAN transmit": "IW_BOARD_CAN_TX", "serial, from the chip": "IW_BOARD_UART_TX", "serial, to the chip": "IW_BOARD_UART_RX"}
-NUMBERS = {"core": "IW_BOARD_CORE_HZ / 1000000U", "apb1": "IW_BOARD_APB1_HZ / 1000000U", "lit": "IW_BOARD_LAMP_LIT"}
+PINS = {"e-stop": "BRD_ESTOP", "button": "BRD_BUTTON", "lamp": "BRD_LAMP", "CAN receive": "BRD_CAN_RX",
+        "CAN transmit": "BRD_CAN_TX", "serial, from the chip": "BRD_UART_TX", "serial, to the chip": "BRD_UART_RX"}
+NUMBERS = {"core": "BRD_CORE_HZ / 1000000U", "apb1": "BRD_APB1_HZ / 1000000U", "lit": "BRD_LAMP_LIT"}
 
 
 def facts(board, *options):

@@ -9,18 +9,18 @@ ROOT = Path(__file__).resolve().parent.parent
 CPU_FLAGS = {"Cortex-M0+": "cortex-m0plus", "Cortex-M3": "cortex-m3", "Cortex-M4": "cortex-m4"}
 CODEC = "iw_codec_decode iw_codec_encode_setpoint"
 SETPOINT = "iw_setpoint_init iw_setpoint_demand iw_setpoint_command iw_setpoint_due iw_setpoint_take iw_setpoint_next_us"
-FORCE = "iw_force_init iw_force_reopen iw_force_hear iw_force_hear_offset iw_force_validity iw_force_net_mN"
+FORCE = "iw_force_init iw_force_reopen iw_force_receive iw_force_receive_offset iw_force_validity iw_force_net_mN"
 GATEWAY = ("iw_config_default iw_gateway_init iw_gateway_step iw_gateway_suspended iw_gateway_bus_facts iw_gateway_arm iw_gateway_drive "
            "iw_gateway_stop iw_gateway_estop iw_gateway_reset iw_gateway_disconnect iw_gateway_tare iw_gateway_state iw_gateway_arming")
-KNOWN = "iw_gateway_know iw_gateway_restore_offset iw_config_stop_budget"
-EVIDENCE = "iw_motion_evidence_init iw_motion_evidence_look"
+KNOWN = "iw_gateway_set_assumption iw_gateway_restore_offset iw_config_stop_budget"
+EVIDENCE = "iw_observation_init iw_observation_step"
 # What is used: its headers, its functions, and the most that it may cost on a Cortex-M4.
 USES = {
     "codec": ("codec.h", CODEC, 350),
     "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2900),
     "gateway": ("gateway.h", GATEWAY, 13000),
     "gateway, snapshot": ("gateway.h", f"{GATEWAY} iw_gateway_snapshot", None),
-    "all": ("gateway.h evidence.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {EVIDENCE}", None),
+    "all": ("gateway.h observation.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {EVIDENCE}", None),
 }
 SECTION = re.compile(r"^ \.(?:text|rodata)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) \S*libiwheel_core\.a\((\w+)\.c\S*\)$", re.MULTILINE)
 

@@ -44,15 +44,15 @@ SOURCES = {
     "sides": ("lib/northbound/protocol/src/words.c", "iwn_sides_name", set()),
     "provenance": ("lib/northbound/protocol/src/words.c", "iwn_provenance_name", set()),
     "window": ("lib/northbound/protocol/src/words.c", "iwn_window_name", set()),
-    "unit_evidence": ("lib/northbound/protocol/src/words.c", "iwn_unit_evidence_name", set()),
+    "unit_evidence": ("lib/northbound/protocol/src/words.c", "iwn_unit_observation_name", set()),
     "force_validity": ("lib/northbound/protocol/src/words.c", "iwn_force_validity_name", set()),
-    "ledger_item": ("lib/northbound/protocol/src/words.c", "iwn_ledger_item_name", set()),
-    "ledger_state": ("lib/northbound/protocol/src/words.c", "iwn_ledger_state_name", set()),
-    "evidence": ("lib/northbound/protocol/src/words.c", "iwn_evidence_name", set()),
+    "ledger_item": ("lib/northbound/protocol/src/words.c", "iwn_assumption_item_name", set()),
+    "ledger_state": ("lib/northbound/protocol/src/words.c", "iwn_assumption_state_name", set()),
+    "evidence": ("lib/northbound/protocol/src/words.c", "iwn_source_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
-    "memory_state": ("app/gateway/ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_memory", {"memory", "file", "state", "reason"}),
     "fault_alone": [("lib/northbound/server/src/observe.c", "observe_faults", set()), ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),
-                    ("app/gateway/answers/told.c", "observe_health", set())],
+                    ("app/gateway/answers/answers_events.c", "observe_health", set())],
 }
 
 

@@ -151,7 +151,7 @@ def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
     sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
-               "lib/northbound/server/src/observe.c", *(f"app/gateway/{name}.c" for name in ("answers/told", "bus/bus_facts", "ledger/knowledge_json"))]
+               "lib/northbound/server/src/observe.c", *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json"))]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
@@ -483,7 +483,7 @@ CASES = [
     (northbound, "python3", "clean", ("", "", ""), False),
     (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("lib/northbound/server/src/observe.c", '"still_moving", true', '"still_rolling", true'), True),
-    (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
+    (northbound, "python3", "a state of the memory", ("app/gateway/assumptions/assumptions_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
     (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
     (northbound, "python3", "a field that the reader does not know", ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "), True),
@@ -533,8 +533,8 @@ CASES = [
     (faults, "python3", "a file has another name and place", ("app/gateway/loop.c", "#include", "#include", "app/cycle.c"), False),
     (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
     (faults, "python3", "the code of a fault occurs twice", ("core/src/sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side]; const bool invert = config->invert[side];"), True),
-    (faults, "python3", "the code of a fault of the daemon is gone", ("app/gateway/loop.c", "events[i].data.u64 == GW_TAG_ESTOP", "events[i].data.u32 == GW_TAG_ESTOP"), True),
-    (faults, "python3", "the code of a fault of the board is gone", ("app/board/configure.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
+    (faults, "python3", "the code of a fault of the daemon is gone", ("app/gateway/loop.c", "events[i].data.u64 == SOCK_TAG_ESTOP", "events[i].data.u32 == SOCK_TAG_ESTOP"), True),
+    (faults, "python3", "the code of a fault of the board is gone", ("app/board/configure.c", "!brd_host_is_silent(self)", "!is_silent(self)"), True),
     (faults, "python3", "a test that should notice is no test", ("test/faults/gateway.faults", "unit.daemon_watchers", "unit.daemon_watching"), True),
     (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
     (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
@@ -542,12 +542,12 @@ CASES = [
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
      "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}"), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
-    (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
-    (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/keeper.h"'), True),
-    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'), True),
-    (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/keeper.h"\n#include "box/box.h"'), True),
+    (house, "gcc", "a header includes one level more", ("core/src/arithmetic.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
+    (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/file_store.h"'), True),
+    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/answers_refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'), True),
+    (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/file_store.h"\n#include "box/box.h"'), True),
     (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
-    (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "ledger/memory.h"'), True),
+    (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "assumptions/assumptions_file.h"'), True),
     (arch, "python3", "the same by its way", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'), True),
     (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
     (arch, "python3", "a port looks up to the board's application", ("port/stm32_stub/report.c", '#include "report.h"', '#include "report.h"\n#include "host.h"'), True),

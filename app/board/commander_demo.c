@@ -11,15 +11,15 @@ static const leg_t profile[] = {{2000000U, 100}, {3000000U, 0}, {5000000U, -100}
 
 #define LEGS (sizeof profile / sizeof profile[0])
 
-bool iw_commander_sends(void) {
+bool brd_commander_sends(void) {
     return true;
 }
 
-const char *iw_commander_words(void) {
+const char *brd_commander_name(void) {
     return "holds both wheels at zero; the button starts a slow profile";
 }
 
-static int32_t profile_speed_mm_s(iw_commander_t *self, iw_time_us_t now_us) {
+static int32_t profile_speed_mm_s(brd_commander_t *self, iw_time_us_t now_us) {
     for (size_t leg = 0; leg < LEGS && self->running; leg++) {
         if (now_us - self->profile_us < profile[leg].until_us) {
             return profile[leg].speed_mm_s;
@@ -30,12 +30,12 @@ static int32_t profile_speed_mm_s(iw_commander_t *self, iw_time_us_t now_us) {
 }
 
 /// One button: resets a latch; starts the profile; stops it. A press never does two of these.
-void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
-    const bool press = iw_commander_pressed(self, now_us);
-    if (!iw_commander_arm(self, gateway, now_us)) {
+void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    const bool press = brd_commander_pressed(self, now_us);
+    if (!brd_commander_arm(self, gateway, now_us)) {
         self->running = false;
         if (press) {
-            iw_commander_reset(gateway, now_us);
+            brd_commander_reset(gateway, now_us);
         }
         return;
     }
@@ -43,5 +43,5 @@ void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t
         self->running = !self->running;
         self->profile_us = now_us;
     }
-    (void)iw_commander_drive(gateway, now_us, profile_speed_mm_s(self, now_us));
+    (void)brd_commander_drive(gateway, now_us, profile_speed_mm_s(self, now_us));
 }

@@ -2,13 +2,13 @@
 // The request config: keys are staged, and written to the flash by commit.
 #include "host.h"
 
-static bool stage(iw_host_t *self, iwn_text_t *why) {
+static bool stage(brd_host_t *self, iwn_text_t *why) {
     const iwn_request_t *const request = &self->server.request;
     if (request->value[0] == '\0') {
         iwn_text_add(why, "key needs a value; without both all keys are read");
         return false;
     }
-    if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
+    if (!brd_settings_set(&self->staged, request->key, request->value, why)) {
         return false;
     }
     self->has_staged = true;
@@ -16,7 +16,7 @@ static bool stage(iw_host_t *self, iwn_text_t *why) {
 }
 
 /// True if what was asked for is done, or there was nothing to do. `*out_error` else.
-static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
+static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
     const iwn_request_t *const request = &self->server.request;
     *out_error = IWN_BAD_VALUE;
     if (request->key[0] != '\0' || request->value[0] != '\0') {
@@ -30,35 +30,35 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
         self->staged = self->settings;
         return true;
     }
-    if (!iw_settings_check(&self->staged, why)) {
+    if (!brd_settings_check(&self->staged, why)) {
         return false;
     }
     *out_error = IWN_DENIED;
-    if (!iw_host_is_silent(self)) {
+    if (!brd_host_is_silent(self)) {
         iwn_text_add(
             why,
             "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
         return false;
     }
     *out_error = IWN_INTERNAL;
-    if (!iw_host_keep(&self->staged)) {
+    if (!brd_host_keep(&self->staged)) {
         iwn_text_add(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
                           "on, and try again");
         return false;
     }
     self->has_staged = false;
-    self->restart_us = self->server.now_us + IW_HOST_RESTART_US;
+    self->restart_us = self->server.now_us + BRD_HOST_RESTART_US;
     return true;
 }
 
-void iw_host_config(iw_host_t *self, iwn_client_t *client) {
+void brd_host_config(brd_host_t *self, iwn_client_t *client) {
     iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
     if (!configure(self, &why, &self->server.refusal.error)) {
         iwn_server_refuse(&self->server, client, &self->server.request.id);
         return;
     }
     iwn_out_t json = iwn_server_begin_reply(&self->server, &self->server.request.id);
-    iw_settings_write(&self->staged, &json);
+    brd_settings_write(&self->staged, &json);
     iwn_out_bool(&json, "staged", self->has_staged);
     iwn_out_bool(&json, "restarts", self->restart_us != 0U);
     iwn_server_send_reply(&self->server, client, &json);

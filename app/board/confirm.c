@@ -13,17 +13,17 @@ static bool is_near(uint32_t found, uint32_t wanted) {
 }
 
 /// Whether what was found is what is in force. Only the item's own key differs between the two.
-static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_settings_t *wanted) {
+static bool is_same(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *wanted) {
     iw_config_t one;
     iw_config_t other;
-    iw_settings_to(found, &one);
-    iw_settings_to(wanted, &other);
+    brd_settings_to(found, &one);
+    brd_settings_to(wanted, &other);
     switch (item) {
-    case IW_LEDGER_WHEEL_RADIUS:
+    case IW_ASSUMPTION_WHEEL_RADIUS:
         return is_near(one.radius_mm, other.radius_mm);
-    case IW_LEDGER_TRACK:
+    case IW_ASSUMPTION_TRACK:
         return is_near(one.track_mm, other.track_mm);
-    case IW_LEDGER_GEAR_RATIO:
+    case IW_ASSUMPTION_GEAR_RATIO:
         return (uint32_t)one.gear_turns * other.gear_per == (uint32_t)other.gear_turns * one.gear_per;
     default:
         return memcmp(found, wanted, sizeof *found) == 0;
@@ -31,12 +31,12 @@ static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_
 }
 
 /// False, with `self->server.refusal`, if the request's value is none of the item's.
-static bool compare(iw_host_t *self, bool *out_same) {
+static bool compare(brd_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->server.request;
-    const char *const key = iw_learnt_key(request->item);
+    const char *const key = brd_assumptions_key(request->item);
     const bool is_told = request->value[0] != '\0';
-    char value[IW_SETTINGS_TEXT];
-    iw_settings_t found = self->settings;
+    char value[BRD_SETTINGS_TEXT];
+    brd_settings_t found = self->settings;
     iwn_text_t why = iwn_text_begin(self->server.refusal.message, sizeof self->server.refusal.message);
     *out_same = true;
     self->server.refusal.error = IWN_BAD_VALUE;
@@ -45,34 +45,34 @@ static bool compare(iw_host_t *self, bool *out_same) {
         return *out_same || strcmp(request->value, "no") == 0 ||
                IWN_REFUSE(&self->server.refusal, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
     }
-    if (!iw_settings_value(&self->settings, key, value)) {
+    if (!brd_settings_value(&self->settings, key, value)) {
         return IWN_REFUSE(&self->server.refusal,
-                          (request->item == IW_LEDGER_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
+                          (request->item == IW_ASSUMPTION_TRACK) ? IWN_TRACK_NOT_SET : IWN_TYPE_NOT_SET,
                           "it is not configured, so there is nothing to confirm; set it by the request config first");
     }
-    if (is_told && !iw_settings_set(&found, key, request->value, &why)) {
+    if (is_told && !brd_settings_set(&found, key, request->value, &why)) {
         return false;
     }
     *out_same = is_same(request->item, &found, &self->settings);
     return true;
 }
 
-void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
-    const iw_ledger_entry_t *const entry = &iwn_server_look(&self->server)->assumed[item];
-    const char *const key = iw_learnt_key(item);
-    char plain[IW_SETTINGS_TEXT] = "yes";
-    char whose[IW_SETTINGS_TEXT];
-    char value[2U * IW_SETTINGS_TEXT + 16U];
+void brd_host_write_item(brd_host_t *self, iw_assumption_item_t item, iwn_out_t *json) {
+    const iw_assumption_entry_t *const entry = &iwn_server_look(&self->server)->assumed[item];
+    const char *const key = brd_assumptions_key(item);
+    char plain[BRD_SETTINGS_TEXT] = "yes";
+    char whose[BRD_SETTINGS_TEXT];
+    char value[2U * BRD_SETTINGS_TEXT + 16U];
     iwn_text_t text = iwn_text_begin(value, sizeof value);
-    const bool is_set = key == NULL || iw_settings_value(&self->settings, key, plain);
+    const bool is_set = key == NULL || brd_settings_value(&self->settings, key, plain);
     iwn_text_add(&text, plain);
-    if (item == IW_LEDGER_GEAR_RATIO && iw_settings_value(&self->settings, "wheels.rpm_of", whose)) {
+    if (item == IW_ASSUMPTION_GEAR_RATIO && brd_settings_value(&self->settings, "wheels.rpm_of", whose)) {
         IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon says it.
     }
-    iwn_out_text(json, "item", iwn_ledger_item_name(item));
-    iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
-    iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
-    iwn_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
+    iwn_out_text(json, "item", iwn_assumption_item_name(item));
+    iwn_out_text(json, "state", iwn_assumption_state_name(entry->state));
+    iwn_out_text(json, "evidence", iwn_source_name(entry->source));
+    iwn_out_known(json, "figure", entry->source == IW_SOURCE_BUS, entry->figure);
     iwn_out_text(json, "value", is_set ? value : NULL);
     iwn_out_null(json, "found");
     iwn_out_null(json, "how");
@@ -81,15 +81,15 @@ void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json)
     iwn_out_null(json, "disabled");
 }
 
-void iw_host_confirm(iw_host_t *self, iwn_client_t *client) {
+void brd_host_confirm(brd_host_t *self, iwn_client_t *client) {
     bool same;
     if (!compare(self, &same)) {
         iwn_server_refuse(&self->server, client, &self->server.request.id);
         return;
     }
-    const iw_ledger_entry_t entry = {same ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(self->server.core, self->server.request.item, &entry);
+    const iw_assumption_entry_t entry = {same ? IW_CONFIRMED : IW_CONTRADICTED, IW_SOURCE_OPERATOR, 0};
+    iw_gateway_set_assumption(self->server.core, self->server.request.item, &entry);
     iwn_out_t json = iwn_server_begin_reply(&self->server, &self->server.request.id);
-    iw_host_write_item(self, self->server.request.item, &json);
+    brd_host_write_item(self, self->server.request.item, &json);
     iwn_server_send_reply(&self->server, client, &json);
 }

@@ -9,34 +9,34 @@
 
 #define CHANNEL_LINK 0U
 
-static void note_fault(iw_host_t *self, iwn_line_verdict_t fault) {
+static void note_fault(brd_host_t *self, iwn_line_verdict_t fault) {
     self->errors++;
     self->fault = fault;
 }
 
-void iw_host_observe(iw_host_t *self, const iw_snapshot_t *seen) {
+void brd_host_observe(brd_host_t *self, const iw_snapshot_t *seen) {
     iwn_server_observe(&self->server, seen);
-    iw_host_tell_learnt(self, seen);
+    brd_host_report_assumptions(self, seen);
 }
 
 /// What comes of its leaving is told while it is still known who it was.
-static void end_client(iw_host_t *self, iw_host_client_t *client) {
+static void end_client(brd_host_t *self, brd_host_client_t *client) {
     if (client->served.id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->server.core, self->server.now_us, client->served.id);
-        iw_host_observe(self, iwn_server_look(&self->server));
-        iw_pending_forget(&self->pending, client->served.id);
+        brd_host_observe(self, iwn_server_look(&self->server));
+        brd_pending_forget(&self->pending, client->served.id);
         memset(client, 0, sizeof *client);
     }
 }
 
-static void end_all(iw_host_t *self) {
+static void end_all(brd_host_t *self) {
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         end_client(self, &self->client[i]);
     }
 }
 
-static void open_client(iw_host_t *self, uint8_t channel, bool watches_only) {
-    iw_host_client_t *const client = &self->client[channel - 1U];
+static void open_client(brd_host_t *self, uint8_t channel, bool watches_only) {
+    brd_host_client_t *const client = &self->client[channel - 1U];
     end_client(self, client); // Its close was lost.
     client->opened_us = self->server.now_us;
     iwn_server_welcome(&client->served, ++self->last_id, watches_only);
@@ -55,7 +55,7 @@ static bool find_channel(iwn_json_t root, uint8_t *out_channel) {
 }
 
 /// A command of the relay's. False: it is none.
-static bool obey_link(iw_host_t *self, iwn_json_t root) {
+static bool obey_link(brd_host_t *self, iwn_json_t root) {
     uint8_t channel = 0;
     iwn_json_t cmd;
     iwn_json_t watch;
@@ -67,7 +67,7 @@ static bool obey_link(iw_host_t *self, iwn_json_t root) {
     }
     if (iwn_json_is(cmd, "link")) {
         end_all(self); // Another relay, or the same one begun anew: its clients are not those of before.
-        iw_host_tell_link(self);
+        brd_host_tell_link(self);
         return true;
     }
     if (!find_channel(root, &channel)) {
@@ -84,7 +84,7 @@ static bool obey_link(iw_host_t *self, iwn_json_t root) {
     return false;
 }
 
-static bool read_object(iw_host_t *self, const char *json, size_t length, iwn_json_t *out_root) {
+static bool read_object(brd_host_t *self, const char *json, size_t length, iwn_json_t *out_root) {
     char why[1];
     iwn_text_t fault = iwn_text_begin(why, sizeof why);
     return iwn_json_check(json, length, &self->scratch.work, out_root, &fault) &&
@@ -92,21 +92,21 @@ static bool read_object(iw_host_t *self, const char *json, size_t length, iwn_js
 }
 
 /// A reply or an event: an answer to it could be answered, and so on for ever.
-static bool is_answer(iw_host_t *self, const char *json, size_t length) {
+static bool is_answer(brd_host_t *self, const char *json, size_t length) {
     iwn_json_t root;
     iwn_json_t value;
     return read_object(self, json, length, &root) &&
            (iwn_json_find(root, "ok", &value) || iwn_json_find(root, "event", &value));
 }
 
-static bool take_link(iw_host_t *self, const iwn_line_t *line) {
+static bool take_link(brd_host_t *self, const iwn_line_t *line) {
     iwn_json_t root;
     return (read_object(self, line->json, line->length, &root) && obey_link(self, root)) ||
            is_answer(self, line->json, line->length);
 }
 
-static bool take_request(iw_host_t *self, const iwn_line_t *line) {
-    iw_host_client_t *const client = &self->client[line->channel - 1U];
+static bool take_request(brd_host_t *self, const iwn_line_t *line) {
+    brd_host_client_t *const client = &self->client[line->channel - 1U];
     if (client->served.id == IW_CLIENT_NONE) {
         return false;
     }
@@ -118,15 +118,15 @@ static bool take_request(iw_host_t *self, const iwn_line_t *line) {
         self->quote = quoted ? &quote : NULL;
         iwn_server_request(&self->server, &client->served);
         self->quote = NULL;
-        iw_host_tell_learnt(self, iwn_server_look(&self->server));
+        brd_host_report_assumptions(self, iwn_server_look(&self->server));
     } else if (!is_answer(self, json, length)) {
         iwn_server_refuse(&self->server, &client->served, &self->server.request.id);
     }
     return true;
 }
 
-static void take_line(iw_host_t *self, const iwn_line_t *line) {
-    self->heard_us = self->server.now_us;
+static void take_line(brd_host_t *self, const iwn_line_t *line) {
+    self->received_us = self->server.now_us;
     const bool good = (line->channel == CHANNEL_LINK) ? take_link(self, line) : take_request(self, line);
     if (!good) {
         note_fault(self, IWN_LINE_MISFORMED);
@@ -134,40 +134,40 @@ static void take_line(iw_host_t *self, const iwn_line_t *line) {
 }
 
 /// Before the wheels are heard: what this run measures comes on top.
-static void recall(iw_host_t *self) {
-    iw_learnt_t learnt;
-    if (iw_host_recall(&learnt)) {
-        iw_learnt_restore(&learnt, &self->settings, self->server.core, self->zero);
-        self->memory = IW_MEMORY_KEPT;
+static void recall(brd_host_t *self) {
+    brd_assumptions_t learned;
+    if (brd_host_read_assumptions(&learned)) {
+        brd_assumptions_restore(&learned, &self->settings, self->server.core, self->zero);
+        self->memory = BRD_RECORDS_STORED;
     }
 }
 
-bool iw_host_is_silent(const iw_host_t *self) {
+bool brd_host_is_silent(const brd_host_t *self) {
     return iw_gateway_state(self->server.core) == IW_STATE_LISTENING && !iw_gateway_is_sending(self->server.core) &&
            !iw_gateway_arming(self->server.core);
 }
 
 /// Looks now and then, in the silence, whether there is anything that flash has not.
-static void learn(iw_host_t *self, const iw_snapshot_t *seen) {
-    iw_learnt_t now;
-    iw_learnt_t kept;
-    if (!iw_host_is_silent(self) || self->learn_us == 0U || self->restart_us != 0U) {
-        self->learn_us = seen->at_us + IW_LEARNT_SILENT_US;
+static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
+    brd_assumptions_t now;
+    brd_assumptions_t kept;
+    if (!brd_host_is_silent(self) || self->learn_us == 0U || self->restart_us != 0U) {
+        self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
         return;
     }
     if (seen->at_us < self->learn_us) {
         return;
     }
-    self->learn_us = seen->at_us + IW_LEARNT_SILENT_US;
+    self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
     memset(&kept, 0, sizeof kept);
-    (void)iw_host_recall(&kept);
-    iw_learnt_note(&now, seen, &self->settings, self->zero);
-    if (iw_learnt_differs(&now, &kept)) {
-        self->memory = iw_host_remember(&now) ? IW_MEMORY_KEPT : IW_MEMORY_FAILED;
+    (void)brd_host_read_assumptions(&kept);
+    brd_assumptions_note(&now, seen, &self->settings, self->zero);
+    if (brd_assumptions_differs(&now, &kept)) {
+        self->memory = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
     }
 }
 
-void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us) {
+void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t now_us) {
     iwn_server_t *const server = &self->server;
     server->core = place->gateway;
     server->version = place->version;
@@ -183,33 +183,33 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->bitrate_hz = place->bitrate_hz;
     self->sample_point_permille = place->sample_point_permille;
     self->boot = place->boot;
-    self->heard_us = now_us;
+    self->received_us = now_us;
     self->linked_us = now_us;
     iw_config_t config;
-    iw_settings_to(&place->settings, &config);
+    brd_settings_to(&place->settings, &config);
     self->lease_us = config.lease_ms * IW_US_PER_MS;
     self->settings = place->settings;
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_server_begin(server);
     recall(self);
-    iw_host_tell_link(self);
+    brd_host_tell_link(self);
 }
 
-bool iw_host_wants_restart(const iw_host_t *self) {
-    return self->restart_us != 0U && (iw_serial_is_idle() || self->server.now_us >= self->restart_us);
+bool brd_host_wants_restart(const brd_host_t *self) {
+    return self->restart_us != 0U && (brd_serial_is_idle() || self->server.now_us >= self->restart_us);
 }
 
-bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {
+bool brd_host_take(brd_host_t *self, iw_time_us_t now_us) {
     char byte;
     self->server.now_us = now_us;
-    if (now_us - self->heard_us >= (iw_time_us_t)IWN_LINE_SILENT_MS * IW_US_PER_MS) {
+    if (now_us - self->received_us >= (iw_time_us_t)IWN_LINE_SILENT_MS * IW_US_PER_MS) {
         end_all(self);
     }
-    if (iw_serial_had_error()) {
+    if (brd_serial_had_error()) {
         iwn_receiver_spoil(&self->receiver);
     }
-    while (iw_serial_read(&byte, 1U) == 1U) {
+    while (brd_serial_read(&byte, 1U) == 1U) {
         iwn_line_t line;
         const iwn_line_verdict_t verdict = iwn_receiver_put(&self->receiver, byte, &line);
         if (verdict == IWN_LINE_GOOD) {
@@ -224,10 +224,10 @@ bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {
 }
 
 /// One snapshot at a time, replies first, each client in its turn.
-static void pay(iw_host_t *self, const iw_snapshot_t *seen) {
-    for (unsigned turn = 0; turn < 2U * IWN_LINE_CHANNELS && !iw_serial_lends(); turn++) {
+static void pay(brd_host_t *self, const iw_snapshot_t *seen) {
+    for (unsigned turn = 0; turn < 2U * IWN_LINE_CHANNELS && !brd_serial_lends(); turn++) {
         const bool reply = turn < IWN_LINE_CHANNELS;
-        iw_host_client_t *const client = &self->client[(self->next_owed + turn) % IWN_LINE_CHANNELS];
+        brd_host_client_t *const client = &self->client[(self->next_owed + turn) % IWN_LINE_CHANNELS];
         bool *const owed = reply ? &client->owed_status : &client->owed_state;
         if ((client->served.topics & (1U << IWN_TOPIC_STATE)) == 0U) {
             client->owed_state = false; // It watches no more.
@@ -235,35 +235,35 @@ static void pay(iw_host_t *self, const iw_snapshot_t *seen) {
         if (client->served.id != IW_CLIENT_NONE && *owed) {
             *owed = false;
             const iwn_id_t *const id =
-                reply ? iw_pending_take(&self->pending, client->served.id, IWN_CMD_STATUS) : NULL;
-            iw_host_send_status(self, client, seen, id);
+                reply ? brd_pending_take(&self->pending, client->served.id, IWN_CMD_STATUS) : NULL;
+            brd_host_send_status(self, client, seen, id);
             self->next_owed = (uint8_t)(client - self->client + 1);
             return;
         }
     }
 }
 
-iw_time_us_t iw_host_tell(iw_host_t *self, const iw_snapshot_t *seen, bool estop_high) {
+iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high) {
     iwn_server_t *const server = &self->server;
     server->now_us = seen->at_us;
     server->estop.answer = estop_high ? 1 : 0;
-    iw_host_observe(self, seen);
+    brd_host_observe(self, seen);
     iwn_server_arming(server, seen);
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         if (self->client[i].lost > 0U) {
-            iw_host_tell_lost(self, &self->client[i]);
+            brd_host_tell_lost(self, &self->client[i]);
         }
     }
     iwn_server_periodic(server);
     pay(self, seen);
-    iw_host_tell_fault(self);
+    brd_host_tell_fault(self);
     learn(self, seen);
     const bool armed = seen->state == IW_STATE_ARMED;
-    if (server->now_us - self->linked_us >= IW_HOST_LINK_US ||
-        (armed && server->now_us - self->stamped_us >= IW_HOST_LINK_ARMED_US)) {
-        iw_host_tell_link(self);
+    if (server->now_us - self->linked_us >= BRD_HOST_LINK_US ||
+        (armed && server->now_us - self->stamped_us >= BRD_HOST_LINK_ARMED_US)) {
+        brd_host_tell_link(self);
     }
     const iw_time_us_t next_us = iwn_server_next_us(server);
-    const iw_time_us_t link_us = self->linked_us + IW_HOST_LINK_US;
+    const iw_time_us_t link_us = self->linked_us + BRD_HOST_LINK_US;
     return (next_us < link_us) ? next_us : link_us;
 }

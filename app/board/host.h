@@ -12,11 +12,11 @@
 /// Out: replies before events; what does not fit is dropped and counted. A snapshot is too long for the ring of small
 /// lines and is lent to the DMA from a buffer of its own, one at a time: who asks for it meanwhile is owed it.
 ///
-/// No heap; one instance, all zero before `iw_host_init`; everything from the main loop.
-#ifndef IW_STM32_HOST_H
-#define IW_STM32_HOST_H
+/// No heap; one instance, all zero before `brd_host_init`; everything from the main loop.
+#ifndef BRD_HOST_H
+#define BRD_HOST_H
 
-#include "learnt.h"
+#include "board_assumptions.h"
 #include "pending.h"
 
 #include "iwheel/gateway.h"
@@ -24,19 +24,19 @@
 #include "iwheel_server/server.h"
 
 /// The longest line to the host, with its newline: told by the event link.
-#define IW_HOST_LINE_BYTES 4480U
+#define BRD_HOST_LINE_BYTES 4480U
 /// The longest line but a snapshot's.
-#define IW_HOST_SMALL_BYTES 1664U
+#define BRD_HOST_SMALL_BYTES 1664U
 /// What events leave free of the line, for replies.
-#define IW_HOST_REPLY_ROOM 768U
+#define BRD_HOST_REPLY_ROOM 768U
 /// The event `link` comes this often, and with an armed client whenever nothing else has been stamped for so long:
 /// a command cannot quote a younger stamp than it has heard.
-#define IW_HOST_LINK_US       1000000U
-#define IW_HOST_LINK_ARMED_US 25000U
+#define BRD_HOST_LINK_US       1000000U
+#define BRD_HOST_LINK_ARMED_US 25000U
 /// At most one line_error in this time.
-#define IW_HOST_ERROR_US 200000U
+#define BRD_HOST_ERROR_US 200000U
 /// The answer to a commit has left by then, or nobody takes it.
-#define IW_HOST_RESTART_US 500000U
+#define BRD_HOST_RESTART_US 500000U
 
 /// A client of the relay's.
 typedef struct {
@@ -47,14 +47,14 @@ typedef struct {
     uint32_t lost;       ///< Lines dropped and not told yet.
     uint64_t seq;        ///< Of its newest command.
     iw_time_us_t opened_us;
-} iw_host_client_t;
+} brd_host_client_t;
 
 /// Whether what is learnt of the wheels is kept, as the daemon tells it.
 typedef enum {
-    IW_MEMORY_NEW = 0, ///< Nothing has been, yet.
-    IW_MEMORY_KEPT,
-    IW_MEMORY_FAILED,
-} iw_memory_t;
+    BRD_RECORDS_NEW = 0, ///< Nothing has been, yet.
+    BRD_RECORDS_STORED,
+    BRD_RECORDS_FAILED,
+} brd_records_state_t;
 
 /// What watchers were told last of what is learnt of the wheels.
 typedef struct {
@@ -62,8 +62,8 @@ typedef struct {
     int32_t offset_mN[IW_SIDES];
     uint8_t provenance[IW_SIDES]; ///< iw_offset_provenance_t.
     uint32_t assumed_changes;
-    uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
-} iw_host_told_t;
+    uint8_t assumed[IW_ASSUMPTION_ITEMS]; ///< iw_assumption_state_t.
+} brd_host_reported_t;
 
 /// Where the image runs.
 typedef struct {
@@ -73,16 +73,16 @@ typedef struct {
     const char *estop;   ///< Name of the e-stop's pin.
     uint32_t bitrate_hz; ///< Of the bus.
     uint32_t sample_point_permille;
-    iw_settings_t settings; ///< In force.
-    uint32_t rate_max_hz;   ///< Of snapshots that the serial line carries beside replies.
-    uint64_t boot;          ///< Another one at every start.
-} iw_host_place_t;
+    brd_settings_t settings; ///< In force.
+    uint32_t rate_max_hz;    ///< Of snapshots that the serial line carries beside replies.
+    uint64_t boot;           ///< Another one at every start.
+} brd_host_place_t;
 
 /// Small members first, as in the server.
 typedef struct {
     const iwn_quote_t *quote; ///< Of the request that is being carried out; NULL: it has none.
     uint64_t boot;            ///< Of this start.
-    iw_time_us_t heard_us;    ///< When the last good line came.
+    iw_time_us_t received_us; ///< When the last good line came.
     iw_time_us_t linked_us;   ///< When the last `link` was written.
     iw_time_us_t stamped_us;  ///< When any line was.
     iw_time_us_t error_us;    ///< When the last line_error was written.
@@ -97,76 +97,76 @@ typedef struct {
     iwn_line_verdict_t fault; ///< Of the last bad line.
     uint8_t next_owed;        ///< Whose turn it is to have the long line, so that nobody keeps it.
     bool has_staged;          ///< `staged` is something.
-    iw_memory_t memory;
-    iw_learnt_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
-    iw_host_told_t told;
+    brd_records_state_t memory;
+    brd_assumptions_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
+    brd_host_reported_t told;
     iwn_server_t server;
-    iw_settings_t settings;                     ///< In force.
-    iw_settings_t staged;                       ///< By `config`; in force after a commit and the start that follows it.
-    iw_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
+    brd_settings_t settings; ///< In force.
+    brd_settings_t staged;   ///< By `config`; in force after a commit and the start that follows it.
+    brd_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
     iwn_receiver_t receiver;
-    iw_pending_t pending; ///< Answers of clients that wait.
+    brd_pending_t pending; ///< Answers of clients that wait.
     char in[IWN_LINE_BOARD_MAX];
     union {
         iwn_work_t work;                   ///< While a request is read, ...
         char texts[4][IWN_NAME_MAX + 32U]; ///< then names for a sentence, ...
-        char small[IW_HOST_SMALL_BYTES];   ///< and at last the line with the reply or event.
+        char small[BRD_HOST_SMALL_BYTES];  ///< and at last the line with the reply or event.
     } scratch;
-    char big[IW_HOST_LINE_BYTES]; ///< Lent to the serial line.
-} iw_host_t;
+    char big[BRD_HOST_LINE_BYTES]; ///< Lent to the serial line.
+} brd_host_t;
 
 /// Nobody is there yet.
-void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us);
+void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t now_us);
 
 /// Call it right before a step of the gateway. It ends what must end, and carries out one line: a request can take
 /// milliseconds, and the loop must read the e-stop between two of them. Returns true if more lines may wait: call it
 /// again immediately, after the step.
-bool iw_host_take(iw_host_t *self, iw_time_us_t now_us);
+bool brd_host_take(brd_host_t *self, iw_time_us_t now_us);
 
 /// Right after the step: answers the arms that it decided, tells what changed, and what is due. Returns when to come
 /// again at the latest.
-iw_time_us_t iw_host_tell(iw_host_t *self, const iw_snapshot_t *seen, bool estop_high);
+iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool estop_high);
 
 // For the files of this part.
 
 /// How many lines it has missed, if there is room to say so.
-void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client);
+void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client);
 /// Who speaks here, on the link, whatever client there is.
-void iw_host_tell_link(iw_host_t *self);
+void brd_host_tell_link(brd_host_t *self);
 /// Bad lines since the last time, if that is not too short ago.
-void iw_host_tell_fault(iw_host_t *self);
+void brd_host_tell_fault(brd_host_t *self);
 
 /// Writes a snapshot into the line that is lent, if it is free: as reply with `id`, or as event `state` (NULL).
-void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
+void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
 
 /// The host whose server this is.
-static inline iw_host_t *iw_host_of(iwn_server_t *server) {
-    return (iw_host_t *)(void *)((char *)server - offsetof(iw_host_t, server));
+static inline brd_host_t *brd_host_of(iwn_server_t *server) {
+    return (brd_host_t *)(void *)((char *)server - offsetof(brd_host_t, server));
 }
 
 /// By the image: keeps a configuration for the next start. False: it could not, and the one of before stays.
-bool iw_host_keep(const iw_settings_t *settings);
+bool brd_host_keep(const brd_settings_t *settings);
 /// By the image: what was learnt of the wheels before. False: nothing.
-bool iw_host_recall(iw_learnt_t *out_learnt);
+bool brd_host_read_assumptions(brd_assumptions_t *out_learned);
 /// By the image: keeps what was learnt. False: it could not.
-bool iw_host_remember(const iw_learnt_t *learnt);
+bool brd_host_write_assumptions(const brd_assumptions_t *learned);
 
 /// Nothing is sent, and nothing has been for the whole hold: what the flash costs in time, no wheel waits for.
-bool iw_host_is_silent(const iw_host_t *self);
+bool brd_host_is_silent(const brd_host_t *self);
 
 /// True once the board is to begin anew.
-bool iw_host_wants_restart(const iw_host_t *self);
+bool brd_host_wants_restart(const brd_host_t *self);
 
 /// Carries out `config`.
-void iw_host_config(iw_host_t *self, iwn_client_t *client);
+void brd_host_config(brd_host_t *self, iwn_client_t *client);
 /// Carries out `confirm`: the operator's word on an assumption, for this run.
-void iw_host_confirm(iw_host_t *self, iwn_client_t *client);
+void brd_host_confirm(brd_host_t *self, iwn_client_t *client);
 /// Of the ledger, into an object that is open.
-void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);
+void brd_host_write_item(brd_host_t *self, iw_assumption_item_t item, iwn_out_t *json);
 
 /// Tells watchers what has changed since the last call.
-void iw_host_observe(iw_host_t *self, const iw_snapshot_t *seen);
+void brd_host_observe(brd_host_t *self, const iw_snapshot_t *seen);
 /// Of that, what is learnt of the wheels since the last call.
-void iw_host_tell_learnt(iw_host_t *self, const iw_snapshot_t *seen);
+void brd_host_report_assumptions(brd_host_t *self, const iw_snapshot_t *seen);
 
 #endif

@@ -18,13 +18,13 @@ static const char *boot_text(uint64_t boot, char out_text[IWN_LINE_BOOT + 1U]) {
     return out_text;
 }
 
-static uint8_t channel_of(const iw_host_t *self, const iw_host_client_t *client) {
+static uint8_t channel_of(const brd_host_t *self, const brd_host_client_t *client) {
     return (uint8_t)(client - self->client + 1);
 }
 
 /// Puts channel and stamp right before the JSON at `json`, and the CRC behind it. Where the line begins; its length, 0
 /// if it does not fit.
-static const char *frame(iw_host_t *self, uint8_t channel, char *json, size_t length, size_t *out_length) {
+static const char *frame(brd_host_t *self, uint8_t channel, char *json, size_t length, size_t *out_length) {
     const iwn_line_t line = {.t_us = self->server.now_us, .channel = channel, .stamped = true};
     char prefix[IWN_LINE_PREFIX];
     const size_t before = iwn_line_begin(&line, prefix, sizeof prefix);
@@ -35,17 +35,17 @@ static const char *frame(iw_host_t *self, uint8_t channel, char *json, size_t le
 }
 
 /// Puts a line of `self->scratch.small` into the ring, leaving `reserve` bytes free.
-static bool put(iw_host_t *self, uint8_t channel, size_t length, size_t reserve) {
+static bool put(brd_host_t *self, uint8_t channel, size_t length, size_t reserve) {
     size_t whole;
-    if (length + reserve > iw_serial_room()) {
+    if (length + reserve > brd_serial_room()) {
         return false; // Without its CRC: that costs time, before the next look at the e-stop.
     }
     const char *const line = frame(self, channel, &self->scratch.small[IWN_LINE_PREFIX], length, &whole);
-    if (whole == 0U || whole + reserve > iw_serial_room()) {
+    if (whole == 0U || whole + reserve > brd_serial_room()) {
         return false;
     }
     self->stamped_us = self->server.now_us;
-    return iw_serial_write(line, whole);
+    return brd_serial_write(line, whole);
 }
 
 /// Closes the object. Its length without the newline; 0 if it does not fit.
@@ -56,69 +56,69 @@ static size_t finish(iwn_out_t *json) {
 }
 
 char *iwn_target_line(iwn_server_t *server, size_t *out_size) {
-    *out_size = IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
-    return &iw_host_of(server)->scratch.small[IWN_LINE_PREFIX];
+    *out_size = BRD_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
+    return &brd_host_of(server)->scratch.small[IWN_LINE_PREFIX];
 }
 
 void iwn_target_reply(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
-    iw_host_client_t *const whose = (iw_host_client_t *)client;
+    brd_host_client_t *const whose = (brd_host_client_t *)client;
     (void)line;
-    if (length == 0U || !put(iw_host_of(server), channel_of(iw_host_of(server), whose), length - 1U, 0U)) {
+    if (length == 0U || !put(brd_host_of(server), channel_of(brd_host_of(server), whose), length - 1U, 0U)) {
         whose->lost++;
     }
 }
 
 /// With the number of those that were dropped before it, once there is room again.
 void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
-    iw_host_t *const self = iw_host_of(server);
-    iw_host_client_t *const whose = (iw_host_client_t *)client;
+    brd_host_t *const self = brd_host_of(server);
+    brd_host_client_t *const whose = (brd_host_client_t *)client;
     (void)line;
-    if (length == 0U || whose->lost > 0U || !put(self, channel_of(self, whose), length - 1U, IW_HOST_REPLY_ROOM)) {
+    if (length == 0U || whose->lost > 0U || !put(self, channel_of(self, whose), length - 1U, BRD_HOST_REPLY_ROOM)) {
         whose->lost++;
     }
 }
 
 /// Before anything else is told to it: how much it has missed.
-void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client) {
+void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client) {
     iwn_out_t json = iwn_server_begin_event(&self->server, "lost");
     iwn_out_int(&json, "count", client->lost);
     const size_t length = finish(&json);
-    if (put(self, channel_of(self, client), length, IW_HOST_REPLY_ROOM)) {
+    if (put(self, channel_of(self, client), length, BRD_HOST_REPLY_ROOM)) {
         client->lost = 0;
     }
 }
 
-static void write_memory(const iw_host_t *self, iwn_out_t *json) {
+static void write_memory(const brd_host_t *self, iwn_out_t *json) {
     static const char *const states[] = {
-        [IW_MEMORY_NEW] = "new", [IW_MEMORY_KEPT] = "kept", [IW_MEMORY_FAILED] = "failed"};
+        [BRD_RECORDS_NEW] = "new", [BRD_RECORDS_STORED] = "kept", [BRD_RECORDS_FAILED] = "failed"};
     iwn_out_open(json, "memory", '{');
     iwn_out_text(json, "file", "flash");
     iwn_out_text(json, "state", states[self->memory]);
     iwn_out_text(json, "reason",
-                 (self->memory == IW_MEMORY_FAILED) ? "it has no room left, or fails; switch the board off and on"
-                                                    : NULL);
+                 (self->memory == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
+                                                      : NULL);
     iwn_out_close(json, '}');
 }
 
-static void write_ledger(const iw_snapshot_t *seen, iwn_out_t *json) {
+static void write_assumptions(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_open(json, "ledger", '{');
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        iwn_out_open(json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        iwn_out_open(json, iwn_assumption_item_name((iw_assumption_item_t)item), '{');
         // No more of it: while a snapshot is written, the e-stop waits.
-        iwn_out_text(json, "state", iwn_ledger_state_name(seen->assumed[item].state));
-        iwn_out_text(json, "evidence", iwn_evidence_name(seen->assumed[item].evidence));
+        iwn_out_text(json, "state", iwn_assumption_state_name(seen->assumed[item].state));
+        iwn_out_text(json, "evidence", iwn_source_name(seen->assumed[item].source));
         iwn_out_close(json, '}');
     }
     iwn_out_close(json, '}');
 }
 
-void iwn_target_write_learnt(iwn_server_t *server, const iw_snapshot_t *seen, iwn_out_t *json) {
-    write_ledger(seen, json);
-    write_memory(iw_host_of(server), json);
+void iwn_target_write_assumptions(iwn_server_t *server, const iw_snapshot_t *seen, iwn_out_t *json) {
+    write_assumptions(seen, json);
+    write_memory(brd_host_of(server), json);
     iwn_out_null(json, "gaps");
 }
 
-void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
+void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
     char *const data = &self->big[IWN_LINE_PREFIX];
     const size_t size = sizeof self->big - IWN_LINE_PREFIX - IWN_LINE_SUFFIX;
     iwn_out_t json = (id != NULL) ? iwn_tell_reply(data, size, id, true) : iwn_tell_event(data, size, "state");
@@ -126,7 +126,7 @@ void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_sna
     size_t whole = 0;
     const size_t length = finish(&json);
     const char *const line = (length > 0U) ? frame(self, channel_of(self, client), data, length, &whole) : NULL;
-    if (whole > 0U && iw_serial_lend(line, whole)) {
+    if (whole > 0U && brd_serial_lend(line, whole)) {
         self->stamped_us = self->server.now_us;
     } else {
         client->lost++;
@@ -134,27 +134,27 @@ void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_sna
 }
 
 /// Who speaks here: on the link, whatever client there is.
-void iw_host_tell_link(iw_host_t *self) {
+void brd_host_tell_link(brd_host_t *self) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_out_t json = iwn_server_begin_event(&self->server, "link");
     iwn_out_text(&json, "boot", boot_text(self->boot, boot));
     iwn_out_text(&json, "version", self->server.version);
-    IWN_OUT_NUMBERS(&json, "line_bytes\0channels\0silent_ms\0", IW_HOST_LINE_BYTES, IWN_LINE_CHANNELS,
+    IWN_OUT_NUMBERS(&json, "line_bytes\0channels\0silent_ms\0", BRD_HOST_LINE_BYTES, IWN_LINE_CHANNELS,
                     IWN_LINE_SILENT_MS);
     if (put(self, CHANNEL_LINK, finish(&json), 0U)) {
         self->linked_us = self->server.now_us;
     }
 }
 
-void iw_host_tell_fault(iw_host_t *self) {
-    if (self->errors == self->errors_told || self->server.now_us - self->error_us < IW_HOST_ERROR_US) {
+void brd_host_tell_fault(brd_host_t *self) {
+    if (self->errors == self->errors_told || self->server.now_us - self->error_us < BRD_HOST_ERROR_US) {
         return;
     }
     self->error_us = self->server.now_us;
     iwn_out_t json = iwn_server_begin_event(&self->server, "line_error");
     iwn_out_text(&json, "reason", iwn_line_verdict_name(self->fault));
     iwn_out_int(&json, "count", self->errors - self->errors_told);
-    if (put(self, CHANNEL_LINK, finish(&json), IW_HOST_REPLY_ROOM)) {
+    if (put(self, CHANNEL_LINK, finish(&json), BRD_HOST_REPLY_ROOM)) {
         self->errors_told = self->errors;
     }
 }

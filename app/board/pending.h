@@ -3,38 +3,38 @@
 /// clients, since an id takes 88 bytes and hardly ever more than one arm waits.
 ///
 /// Pure, no heap. All zero: nobody waits.
-#ifndef IW_STM32_PENDING_H
-#define IW_STM32_PENDING_H
+#ifndef BRD_PENDING_H
+#define BRD_PENDING_H
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
 #include "iwheel_northbound/request.h"
 
 /// A status of every channel, and as many arms: one that waits, and one that takes the lease over.
-#define IW_PENDING_ARMS 2U
-#define IW_PENDING_MAX  (IWN_LINE_CHANNELS + IW_PENDING_ARMS)
+#define BRD_PENDING_ARMS 2U
+#define BRD_PENDING_MAX  (IWN_LINE_CHANNELS + BRD_PENDING_ARMS)
 
 typedef struct {
     iw_client_t client; ///< IW_CLIENT_NONE: the place is free.
     iwn_cmd_t cmd;      ///< IWN_CMD_ARM or IWN_CMD_STATUS.
     iwn_id_t id;
-} iw_pending_place_t;
+} brd_pending_place_t;
 
 typedef struct {
-    iw_pending_place_t place[IW_PENDING_MAX];
-} iw_pending_t;
+    brd_pending_place_t place[BRD_PENDING_MAX];
+} brd_pending_t;
 
 /// True if an answer to this client's `cmd` can wait: one of it waits already, or there is a place.
-bool iw_pending_has_room(const iw_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
+bool brd_pending_has_room(const brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
 
 /// The answer waits, in the place of an earlier one to the same client's `cmd`. Only where there is room.
-void iw_pending_put(iw_pending_t *self, iw_client_t client, iwn_cmd_t cmd, const iwn_id_t *id);
+void brd_pending_put(brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd, const iwn_id_t *id);
 
-/// The answer is given now: its place is free, and the id good until the next `iw_pending_put`. An id of no kind if
+/// The answer is given now: its place is free, and the id good until the next `brd_pending_put`. An id of no kind if
 /// none waits.
-const iwn_id_t *iw_pending_take(iw_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
+const iwn_id_t *brd_pending_take(brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
 
 /// The client is gone: nothing waits for it any more.
-void iw_pending_forget(iw_pending_t *self, iw_client_t client);
+void brd_pending_forget(brd_pending_t *self, iw_client_t client);
 
 #endif

@@ -31,7 +31,7 @@ static const char *fleet_choice(unsigned number) {
 }
 
 static const char *item_choice(unsigned number) {
-    return (number < (unsigned)IW_LEDGER_ITEMS) ? iwn_ledger_item_name((iw_ledger_item_t)number) : NULL;
+    return (number < (unsigned)IW_ASSUMPTION_ITEMS) ? iwn_assumption_item_name((iw_assumption_item_t)number) : NULL;
 }
 
 static const char *verb_choice(unsigned number);
@@ -87,9 +87,9 @@ int help_unknown(const char *name) {
     char known[256];
     iwn_text_t list = iwn_text_begin(known, sizeof known);
     const char *best = NULL;
-    size_t best_distance = GW_WORD_STRANGE;
+    size_t best_distance = SETTINGS_WORD_STRANGE;
     for (size_t i = 0; i < VERBS; i++) {
-        const size_t far = gw_word_distance(name, verbs[i].name);
+        const size_t far = settings_word_distance(name, verbs[i].name);
         if (far < best_distance) {
             best = verbs[i].name;
             best_distance = far;

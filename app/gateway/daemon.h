@@ -16,14 +16,14 @@
 #define GATEWAY_DAEMON_H
 
 #include "answers/answers.h"
+#include "assumptions/assumptions.h"
 #include "box/box.h"
 #include "bus/bus_facts.h"
 #include "config/gateway_config.h"
-#include "ledger/knowledge.h"
 #include "lock/runtime.h"
 #include "process/notify.h"
-#include "sockets/clients.h"
 #include "sockets/log.h"
+#include "sockets/sock_clients.h"
 #include "sockets/wakeup.h"
 #include "wheels/wheels.h"
 
@@ -57,15 +57,15 @@ typedef struct {
 
 typedef struct gw_daemon {
     gateway_config_t config;
-    gw_log_t log;
+    sock_log_t log;
     gw_notify_t notify;
     gw_runtime_t runtime;
-    gw_wakeup_t wakeup;
+    sock_wakeup_t wakeup;
     gw_box_t box;
     gw_wheels_t wheels;
     gw_bus_facts_t facts;
-    gw_knowledge_t knowledge;
-    gw_clients_t clients;
+    gw_assumptions_t assumptions;
+    sock_clients_t clients;
     gw_answers_t answers;
     gw_loop_t loop;
 } gw_daemon_t;

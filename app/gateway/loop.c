@@ -3,7 +3,7 @@
 #include "answers/answers.h"
 #include "box/box.h"
 #include "daemon.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 7)
+#define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 7)
 
 /// While setpoints leave, bus and e-stop are looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
 /// While one of them waits for its echo, more often.
@@ -50,23 +50,23 @@ static int open_signals(void) {
 }
 
 int gw_loop_open(gw_daemon_t *daemon) {
-    int error = gw_wakeup_open(&daemon->wakeup);
+    int error = sock_wakeup_open(&daemon->wakeup);
     daemon->clients.epoll_fd = daemon->wakeup.fd;
     daemon->loop.signal_fd = (error == 0) ? open_signals() : -1;
     if (error == 0 && daemon->loop.signal_fd < 0) {
         error = errno;
     }
     const int fds[] = {daemon->loop.signal_fd,
-                       daemon->clients.listener[GW_DRIVE].fd,
-                       daemon->clients.listener[GW_WATCH].fd,
-                       iw_linux_hal_bus_fd(&daemon->wheels.hal),
-                       iw_linux_hal_estop_fd(&daemon->wheels.hal),
-                       iw_linux_hal_estop2_fd(&daemon->wheels.hal),
+                       daemon->clients.listener[SOCK_DRIVE].fd,
+                       daemon->clients.listener[SOCK_WATCH].fd,
+                       iwl_hal_bus_fd(&daemon->wheels.hal),
+                       iwl_hal_estop_fd(&daemon->wheels.hal),
+                       iwl_hal_estop2_fd(&daemon->wheels.hal),
                        daemon->box.writer.fd,
                        daemon->box.reader.fd};
-    const uint64_t tags[] = {GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
-                             GW_TAG_BUS,    GW_TAG_ESTOP,    GW_TAG_ESTOP,
-                             GW_TAG_BOX,    GW_TAG_BOX};
+    const uint64_t tags[] = {SOCK_TAG_SIGNAL, SOCK_TAG_LISTENER, SOCK_TAG_WATCH_LISTENER,
+                             SOCK_TAG_BUS,    SOCK_TAG_ESTOP,    SOCK_TAG_ESTOP,
+                             SOCK_TAG_BOX,    SOCK_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -75,16 +75,16 @@ int gw_loop_open(gw_daemon_t *daemon) {
 
 void gw_loop_close(gw_daemon_t *daemon) {
     (void)close(daemon->loop.signal_fd);
-    gw_wakeup_close(&daemon->wakeup);
+    sock_wakeup_close(&daemon->wakeup);
 }
 
 /// Leaves SERVES.
 static void shut_down(gw_daemon_t *daemon, gw_loop_phase_t phase) {
     // Whatever is sent now would have become a hold: a ramp, and the zeros for a process that died.
     if (daemon->config.core.hold && gw_wheels_are_sent_to(&daemon->wheels)) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
-               "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
-               "parking brake");
+        sock_log(&daemon->log, SOCK_LOG_WARNING,
+                 "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
+                 "parking brake");
     }
     daemon->loop.phase = phase;
     daemon->wheels.shutting_down = true;
@@ -96,7 +96,7 @@ static void take_signal(gw_daemon_t *daemon) {
     struct signalfd_siginfo info;
     if (read(daemon->loop.signal_fd, &info, sizeof info) == (ssize_t)sizeof info &&
         daemon->loop.phase == GW_LOOP_SERVES) {
-        gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
+        sock_log(&daemon->log, SOCK_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
         shut_down(daemon, GW_LOOP_ENDS);
     }
 }
@@ -104,11 +104,11 @@ static void take_signal(gw_daemon_t *daemon) {
 /// Root's and the service's gateways do not wait for one of another user's.
 static void give_way(gw_daemon_t *daemon) {
     const gw_holder_t *holder = &daemon->runtime.lock.holder;
-    if (daemon->loop.phase == GW_LOOP_SERVES && gw_bus_lock_tend(&daemon->runtime.lock, daemon->wheels.now_us)) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
-               "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
-               "ending",
-               (unsigned)holder->uid, (long)holder->pid, daemon->config.bus.interface);
+    if (daemon->loop.phase == GW_LOOP_SERVES && gw_bus_lock_poll(&daemon->runtime.lock, daemon->wheels.now_us)) {
+        sock_log(&daemon->log, SOCK_LOG_WARNING,
+                 "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
+                 "ending",
+                 (unsigned)holder->uid, (long)holder->pid, daemon->config.bus.interface);
         shut_down(daemon, GW_LOOP_GIVES_WAY);
     }
 }
@@ -134,10 +134,11 @@ static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
         return;
     }
     if (daemon->loop.mark_us == 0U) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
-               "cannot change the crash marker %s: %s; until that works the wheels would keep their last command for a "
-               "second after a crash",
-               daemon->runtime.marker_path, strerror(errno));
+        sock_log(
+            &daemon->log, SOCK_LOG_WARNING,
+            "cannot change the crash marker %s: %s; until that works the wheels would keep their last command for a "
+            "second after a crash",
+            daemon->runtime.marker_path, strerror(errno));
     }
     daemon->loop.mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
 }
@@ -146,8 +147,8 @@ static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
 static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     if (suspended_us > daemon->loop.suspended_us + IW_GATEWAY_LATE_US) {
         gw_wheels_slept(&daemon->wheels, suspended_us - daemon->loop.suspended_us);
-        gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
-               (unsigned long long)((suspended_us - daemon->loop.suspended_us) / IW_US_PER_MS));
+        sock_log(&daemon->log, SOCK_LOG_WARNING, "the machine was suspended for %llu ms",
+                 (unsigned long long)((suspended_us - daemon->loop.suspended_us) / IW_US_PER_MS));
     }
     if (suspended_us > daemon->loop.suspended_us) {
         daemon->loop.suspended_us = suspended_us;
@@ -181,13 +182,13 @@ static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
 
 /// By one clock, in which a suspend shows as lateness: what is late is looked at by both, and all is now and then.
 static void read_clock(gw_daemon_t *daemon) {
-    const iw_time_us_t now_us = iw_clock_awake_us(daemon->loop.suspended_us);
+    const iw_time_us_t now_us = iwl_clock_awake_us(daemon->loop.suspended_us);
     if (now_us < daemon->loop.awaited_us + ASLEEP_US && now_us < daemon->loop.clocks_us) {
         gw_wheels_time(&daemon->wheels, now_us);
         return;
     }
     iw_time_us_t suspended_us;
-    gw_wheels_time(&daemon->wheels, iw_clock_read(&suspended_us));
+    gw_wheels_time(&daemon->wheels, iwl_clock_read(&suspended_us));
     daemon->loop.clocks_us = daemon->wheels.now_us + CLOCKS_US;
     note_suspend(daemon, suspended_us);
 }
@@ -195,11 +196,11 @@ static void read_clock(gw_daemon_t *daemon) {
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
-    iw_linux_hal_tend(&wheels->hal, wheels->now_us);
+    iwl_hal_poll(&wheels->hal, wheels->now_us);
     gw_bus_facts_follow(&daemon->facts, wheels, daemon->answers.server.told.left_behind);
     const iw_snapshot_t seen = gw_wheels_step(wheels);
     mark_if_sending(daemon, &seen);
-    iw_motion_evidence_look(&wheels->evidence, &wheels->core, &seen);
+    iw_observation_step(&wheels->observation, &wheels->core, &seen);
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_arming(&daemon->answers, &seen);
     plan_look(daemon, &seen);
@@ -217,18 +218,18 @@ static bool looks(const gw_daemon_t *daemon) {
 
 /// When there is something to do though nothing comes; 0: at once.
 static iw_time_us_t next_us(gw_daemon_t *daemon) {
-    if (daemon->wheels.requested || gw_service_is_busy(&daemon->clients)) {
+    if (daemon->wheels.requested || sock_service_is_busy(&daemon->clients)) {
         return 0;
     }
-    iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
+    iw_time_us_t next_us = earlier(daemon->wheels.step_us, iwl_hal_next_us(&daemon->wheels.hal));
     next_us = earlier(next_us, gw_answers_next_us(&daemon->answers));
     next_us = earlier(next_us, gw_answers_frames_us(&daemon->answers));
-    next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
+    next_us = earlier(next_us, sock_service_next_us(&daemon->clients));
     return looks(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
 }
 
 /// Whether the bus is to wake us. Frames that keep coming wait, unless somebody watches them.
-static void heed_bus(gw_daemon_t *daemon) {
+static void handle_bus(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     if (wheels->tape.tapped > 0U) {
         daemon->loop.frames_us = wheels->now_us;
@@ -236,9 +237,9 @@ static void heed_bus(gw_daemon_t *daemon) {
     const bool may_wait = daemon->loop.pace != GW_PACE_ALERT &&
                           wheels->now_us < daemon->loop.frames_us + FRAMES_GONE_US && wheels->tape.tapped < GW_FRAMES &&
                           gw_answers_watching_frames(&daemon->answers) == 0U;
-    struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+    struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
     if (may_wait != daemon->loop.frames_wait &&
-        epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
+        epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iwl_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
         daemon->loop.frames_wait = may_wait;
     }
 }
@@ -246,20 +247,20 @@ static void heed_bus(gw_daemon_t *daemon) {
 /// Notes what the wait has found; nothing is done about it yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     switch (event->data.u64) {
-    case GW_TAG_SIGNAL:
+    case SOCK_TAG_SIGNAL:
         take_signal(daemon);
         return false;
-    case GW_TAG_LISTENER:
-    case GW_TAG_WATCH_LISTENER:
+    case SOCK_TAG_LISTENER:
+    case SOCK_TAG_WATCH_LISTENER:
         return true;
-    case GW_TAG_BOX:
+    case SOCK_TAG_BOX:
         daemon->loop.box_look_us = 0;
         return false;
-    case GW_TAG_BUS: // Looked at in every cycle.
-    case GW_TAG_ESTOP:
+    case SOCK_TAG_BUS: // Looked at in every cycle.
+    case SOCK_TAG_ESTOP:
         return false;
     default: {
-        gw_client_t *client = &daemon->clients.client[event->data.u64 - GW_TAG_CLIENT];
+        sock_client_t *client = &daemon->clients.client[event->data.u64 - SOCK_TAG_CLIENT];
         client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
         client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
         client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
@@ -278,49 +279,50 @@ static void listen_to_writer(gw_daemon_t *daemon) {
         daemon->loop.box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
         gw_record_take(&daemon->box, &daemon->log);
         if (!gw_recordings_take(&daemon->answers)) {
-            gw_log(&daemon->log, GW_LOG_WARNING,
-                   "the process that reads recordings has ended (was it killed?); it is started again with the next "
-                   "request");
+            sock_log(&daemon->log, SOCK_LOG_WARNING,
+                     "the process that reads recordings has ended (was it killed?); it is started again with the next "
+                     "request");
         }
     }
 }
 
 /// Who drives, if it has said something while nothing else is due: its command is heard before the look at bus and e-stop, which
 /// then judges it too, so that it leaves after one look and not after two. NULL: the look comes first.
-static gw_client_t *heard_first(gw_daemon_t *daemon) {
+static sock_client_t *heard_first(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     const bool due = wheels->now_us >= wheels->step_us || wheels->requested;
-    gw_client_t *holder =
-        (daemon->loop.pace == GW_PACE_DRIVING && !due) ? gw_clients_find(&daemon->clients, daemon->loop.holder) : NULL;
+    sock_client_t *holder = (daemon->loop.pace == GW_PACE_DRIVING && !due)
+                                ? sock_clients_find(&daemon->clients, daemon->loop.holder)
+                                : NULL;
     return (holder != NULL && holder->readable && !holder->leaving) ? holder : NULL;
 }
 
 /// The core's step, in which everything is looked at before anything leaves.
-static void hear_and_step(gw_daemon_t *daemon, iw_linux_told_t told) {
-    gw_client_t *first = told.estop ? NULL : heard_first(daemon);
+static void hear_and_step(gw_daemon_t *daemon, iwl_reported_t told) {
+    sock_client_t *first = told.estop ? NULL : heard_first(daemon);
     told.estop = told.estop || first != NULL; // Edges since the wait count too.
-    iw_linux_hal_waited(&daemon->wheels.hal, told);
+    iwl_hal_waited(&daemon->wheels.hal, told);
     if (first != NULL) {
-        gw_service_first(&daemon->clients, first);
+        sock_service_first(&daemon->clients, first);
     }
     step(daemon);
 }
 
 static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
-    gw_service_clients(&daemon->clients, daemon->loop.holder);
+    sock_service_clients(&daemon->clients, daemon->loop.holder);
     if (daemon->wheels.requested) {
         read_clock(daemon);
         step(daemon); // A new command leaves at once.
     }
     if (somebody_knocks) {
-        gw_service_accept(&daemon->clients);
+        sock_service_accept(&daemon->clients);
     }
     listen_to_writer(daemon);
-    heed_bus(daemon);
+    handle_bus(daemon);
     gw_answers_frames(&daemon->answers);
     gw_answers_periodic(&daemon->answers);
-    gw_service_flush(&daemon->clients, daemon->loop.holder);
-    gw_knowledge_tend(&daemon->knowledge);
+    sock_service_flush(&daemon->clients, daemon->loop.holder);
+    gw_assumptions_poll(&daemon->assumptions);
     give_way(daemon);
     gw_notify_cycle(&daemon->notify, daemon->wheels.now_us);
 }
@@ -332,19 +334,19 @@ int gw_loop_run(gw_daemon_t *daemon) {
         daemon->loop.awaited_us = next_us(daemon);
         // What leaves has its time; all else may come later by as long as this cycle took.
         const iw_time_us_t now_us = gw_wheels_are_sent_to(&daemon->wheels) ? 0U : daemon->wheels.now_us;
-        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->loop.awaited_us);
+        const int count = sock_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->loop.awaited_us);
         if (count < 0 && errno != EINTR) {
             return errno;
         }
         bool somebody_knocks = false;
         // Interrupted, it has found nothing out.
-        iw_linux_told_t told = {.bus = count < 0, .estop = count < 0};
+        iwl_reported_t told = {.bus = count < 0, .estop = count < 0};
         read_clock(daemon);
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
-            told.bus = told.bus || events[i].data.u64 == GW_TAG_BUS;
-            told.estop = told.estop || events[i].data.u64 == GW_TAG_ESTOP;
+            told.bus = told.bus || events[i].data.u64 == SOCK_TAG_BUS;
+            told.estop = told.estop || events[i].data.u64 == SOCK_TAG_ESTOP;
         }
         hear_and_step(daemon, told);
         cycle(daemon, somebody_knocks);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "daemon.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 #include "start/options.h"
 #include "start/start_report.h"
 
@@ -19,11 +19,11 @@
 #include <unistd.h>
 
 static int open_hal(gw_daemon_t *daemon) {
-    const char *culprit;
-    const iw_estop_wish_t estop = gw_report_estop(&daemon->config);
-    const int error = iw_linux_hal_open(&daemon->wheels.hal, daemon->config.bus.interface, &estop, &culprit);
+    const char *cause;
+    const iwl_estop_config_t estop = gw_report_estop(&daemon->config);
+    const int error = iwl_hal_open(&daemon->wheels.hal, daemon->config.bus.interface, &estop, &cause);
     if (error != 0) {
-        gw_report_unopened(&daemon->config, culprit, error, stderr);
+        gw_report_unopened(&daemon->config, cause, error, stderr);
         return (error == ENOTUNIQ) ? EX_CONFIG : EX_UNAVAILABLE;
     }
     return 0;
@@ -32,48 +32,49 @@ static int open_hal(gw_daemon_t *daemon) {
 static int start_core(gw_daemon_t *daemon) {
     const iw_config_t *config = &daemon->config.core;
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !config->listen_only;
-    daemon->wheels.now_us = iw_clock_now_us();
-    daemon->loop.suspended_us = iw_clock_suspended_us();
+    daemon->wheels.now_us = iwl_clock_now_us();
+    daemon->loop.suspended_us = iwl_clock_suspended_us();
     if (gw_wheels_begin(&daemon->wheels, config, daemon->box.ring, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
     }
     gw_bus_facts_follow(&daemon->facts, &daemon->wheels, false);
     if (restarted && config->hold) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
-               "the gateway before this one died while the wheels were armed: sending zeros until: iwheelctl release");
+        sock_log(
+            &daemon->log, SOCK_LOG_WARNING,
+            "the gateway before this one died while the wheels were armed: sending zeros until: iwheelctl release");
     } else if (restarted) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
-               "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
-               config->zero_hold_ms);
+        sock_log(&daemon->log, SOCK_LOG_WARNING,
+                 "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
+                 config->zero_hold_ms);
     }
     return 0;
 }
 
 /// Who only watches must not keep anybody from driving: without its socket the gateway serves all the same.
 static void listen_to_watchers(gw_daemon_t *daemon) {
-    const gw_listener_wish_t wish = gw_report_socket(&daemon->config, GW_WATCH);
-    gw_listener_t *watch = &daemon->clients.listener[GW_WATCH];
-    *watch = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
-    if (strcmp(wish.path, "none") != 0 &&
-        (gw_listener_prepare(watch, &wish, stderr) != 0 || gw_listener_open(watch, &daemon->log, stderr) != 0)) {
-        gw_log(&daemon->log, GW_LOG_WARNING, "nobody can watch on %s (see above); who may drive is served all the same",
-               wish.path);
+    const sock_listener_config_t wanted = gw_report_socket(&daemon->config, SOCK_WATCH);
+    sock_listener_t *watch = &daemon->clients.listener[SOCK_WATCH];
+    *watch = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    if (strcmp(wanted.path, "none") != 0 &&
+        (sock_listener_prepare(watch, &wanted, stderr) != 0 || sock_listener_open(watch, &daemon->log, stderr) != 0)) {
+        sock_log(&daemon->log, SOCK_LOG_WARNING,
+                 "nobody can watch on %s (see above); who may drive is served all the same", wanted.path);
     }
 }
 
 static void tell_start(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
-    gw_report_start(&daemon->config, wheels->hal.estop_ops->simulated, daemon->clients.listener[GW_WATCH].fd >= 0,
+    gw_report_start(&daemon->config, wheels->hal.estop_ops->simulated, daemon->clients.listener[SOCK_WATCH].fd >= 0,
                     &daemon->log);
     for (uint32_t i = 0; i < wheels->warnings; i++) {
-        gw_log(&daemon->log, GW_LOG_WARNING, "%s", wheels->warning[i]);
+        sock_log(&daemon->log, SOCK_LOG_WARNING, "%s", wheels->warning[i]);
     }
 }
 
 /// Everything between the start of the core and the loop, in the reverse order at the end.
 static int serve(gw_daemon_t *daemon) {
-    int result = gw_listener_open(&daemon->clients.listener[GW_DRIVE], &daemon->log, stderr);
+    int result = sock_listener_open(&daemon->clients.listener[SOCK_DRIVE], &daemon->log, stderr);
     if (result != 0) {
         return result;
     }
@@ -89,19 +90,19 @@ static int serve(gw_daemon_t *daemon) {
         tell_start(daemon);
         const int error = gw_loop_run(daemon);
         if (error != 0) {
-            gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
+            sock_log(&daemon->log, SOCK_LOG_ERROR, "waiting for events failed: %s", strerror(error));
             result = EX_SOFTWARE;
         }
         if (daemon->loop.phase == GW_LOOP_GIVES_WAY) {
             result = EX_UNAVAILABLE;
         }
-        gw_service_close_all(&daemon->clients);
-        gw_knowledge_close(&daemon->knowledge);
+        sock_service_close_all(&daemon->clients);
+        gw_assumptions_close(&daemon->assumptions);
         gw_loop_close(daemon);
         gw_notify_close(&daemon->notify);
     }
-    gw_listener_close(&daemon->clients.listener[GW_WATCH]);
-    gw_listener_close(&daemon->clients.listener[GW_DRIVE]);
+    sock_listener_close(&daemon->clients.listener[SOCK_WATCH]);
+    sock_listener_close(&daemon->clients.listener[SOCK_DRIVE]);
     return result;
 }
 
@@ -119,13 +120,13 @@ static char *print_config(const gateway_config_t *config) {
 
 static int open_box(gw_daemon_t *daemon, const char *config_text) {
     const gateway_config_t *config = &daemon->config;
-    const gw_box_wish_t wish = {.blackbox_s = config->record.blackbox_s,
-                                .keep_stops = config->record.keep_stops,
-                                .directory = config->record.directory,
-                                .bus = config->bus.interface,
-                                .estop = config->estop.line,
-                                .config = config_text};
-    if (config_text == NULL || gw_box_open(&daemon->box, &wish) != 0) {
+    const gw_box_config_t wanted = {.blackbox_s = config->record.blackbox_s,
+                                    .keep_stops = config->record.keep_stops,
+                                    .directory = config->record.directory,
+                                    .bus = config->bus.interface,
+                                    .estop = config->estop.line,
+                                    .config = config_text};
+    if (config_text == NULL || gw_box_open(&daemon->box, &wanted) != 0) {
         (void)fputs("iwheel-gateway: not enough memory for the black box; lower [record] blackbox_s\n", stderr);
         return EX_UNAVAILABLE;
     }
@@ -134,13 +135,13 @@ static int open_box(gw_daemon_t *daemon, const char *config_text) {
 
 static int run(gw_daemon_t *daemon) {
     const gateway_config_t *config = &daemon->config;
-    const gw_listener_wish_t drive = gw_report_socket(config, GW_DRIVE);
+    const sock_listener_config_t drive = gw_report_socket(config, SOCK_DRIVE);
     gw_daemon_compose(daemon);
-    gw_knowledge_open(&daemon->knowledge, config->record.directory);
-    int result = gw_listener_prepare(&daemon->clients.listener[GW_DRIVE], &drive, stderr);
+    gw_assumptions_open(&daemon->assumptions, config->record.directory);
+    int result = sock_listener_prepare(&daemon->clients.listener[SOCK_DRIVE], &drive, stderr);
     if (result == 0) {
         result = gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
-                                 GW_RUNTIME_DIRECTORY, stderr);
+                                 SOCK_RUNTIME_DIRECTORY, stderr);
     }
     if (result != 0) {
         return result;
@@ -152,7 +153,7 @@ static int run(gw_daemon_t *daemon) {
     }
     if (result == 0) {
         result = serve(daemon);
-        iw_linux_hal_close(&daemon->wheels.hal);
+        iwl_hal_close(&daemon->wheels.hal);
     }
     gw_box_close(&daemon->box);
     free(text);
@@ -169,9 +170,9 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
         gateway_config_print(&daemon->config, stdout);
         return 0;
     }
-    gw_log_open(&daemon->log, options->log_level);
+    sock_log_open(&daemon->log, options->log_level);
     const int code = (options->action == GW_CHECK) ? gw_report_check(&daemon->config, stdout) : run(daemon);
-    gw_log_close(&daemon->log);
+    sock_log_close(&daemon->log);
     return code;
 }
 

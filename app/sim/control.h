@@ -5,7 +5,7 @@
 #ifndef SIM_CONTROL_H
 #define SIM_CONTROL_H
 
-#include "loop.h"
+#include "sim_loop.h"
 #include "sim_words.h"
 
 #define SIM_CONTROL_CLIENTS 8U

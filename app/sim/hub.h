@@ -11,7 +11,7 @@
 #define SIM_HUB_H
 
 #include "iwheel_sim/world.h"
-#include "loop.h"
+#include "sim_loop.h"
 
 typedef struct {
     sim_watch_t watch;

@@ -6,7 +6,7 @@
 #ifndef SIM_KEYS_H
 #define SIM_KEYS_H
 
-#include "loop.h"
+#include "sim_loop.h"
 
 #include <stddef.h>
 #include <termios.h>

@@ -102,50 +102,50 @@ typedef struct {
     iw_time_us_t until_us;
 } wish_t;
 
-static result_t obey(const wish_t *wish, sim_button_t *button) {
-    if (wish->pulses && button->pressed) {
+static result_t obey(const wish_t *config, sim_button_t *button) {
+    if (config->pulses && button->pressed) {
         return "the button is pressed already; first: estop release";
     }
-    if (wish->pulses) {
-        sim_button_pulse(button, wish->until_us);
+    if (config->pulses) {
+        sim_button_pulse(button, config->until_us);
     } else {
-        (wish->plug ? sim_button_unplug : sim_button_press)(button, wish->on);
+        (config->plug ? sim_button_unplug : sim_button_press)(button, config->on);
     }
     return NULL;
 }
 
 /// A button moves all its contacts.
-static result_t obey_all(const wish_t *wish, const sim_hooks_t *hooks) {
-    result_t result = (hooks->button != NULL) ? obey(wish, hooks->button) : NULL;
-    return (result == NULL && hooks->second != NULL) ? obey(wish, hooks->second) : result;
+static result_t obey_all(const wish_t *config, const sim_hooks_t *hooks) {
+    result_t result = (hooks->button != NULL) ? obey(config, hooks->button) : NULL;
+    return (result == NULL && hooks->second != NULL) ? obey(config, hooks->second) : result;
 }
 
 /// False: there is no such action. `span` is that of a pulse, or UNTOLD.
-static bool read_wish(const sim_call_t *call, const char *action, int64_t span, wish_t *out_wish) {
-    *out_wish = (wish_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
-    out_wish->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_wish->on);
-    return out_wish->pulses == (span != UNTOLD) &&
-           (out_wish->pulses || out_wish->plug ||
-            sim_words_choice(action, (sim_choice_t){"press", "release"}, &out_wish->on));
+static bool read_wish(const sim_call_t *call, const char *action, int64_t span, wish_t *out_config) {
+    *out_config = (wish_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
+    out_config->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_config->on);
+    return out_config->pulses == (span != UNTOLD) &&
+           (out_config->pulses || out_config->plug ||
+            sim_words_choice(action, (sim_choice_t){"press", "release"}, &out_config->on));
 }
 
 static result_t set_estop(const sim_call_t *call) {
-    wish_t wish;
-    return read_wish(call, call->words->word[1], call->value[1], &wish) ? obey_all(&wish, &call->panel->hooks)
-                                                                        : SIM_USAGE;
+    wish_t config;
+    return read_wish(call, call->words->word[1], call->value[1], &config) ? obey_all(&config, &call->panel->hooks)
+                                                                          : SIM_USAGE;
 }
 
 static result_t set_contact(const sim_call_t *call) {
     const sim_hooks_t *const hooks = &call->panel->hooks;
     sim_button_t *const button = (call->value[0] == 1) ? hooks->button : hooks->second;
-    wish_t wish;
-    if (!read_wish(call, call->words->word[2], call->value[2], &wish)) {
+    wish_t config;
+    if (!read_wish(call, call->words->word[2], call->value[2], &config)) {
         return SIM_USAGE;
     }
     if (hooks->button != NULL && hooks->second == NULL) {
         return "the button has one contact; give the simulator --estop2 PATH for another";
     }
-    return (button != NULL) ? obey(&wish, button) : NULL;
+    return (button != NULL) ? obey(&config, button) : NULL;
 }
 
 static result_t log_mark(const sim_call_t *call) {

@@ -27,13 +27,13 @@ static const char *truth(bool value) {
 }
 
 static void add_setpoint(text_t *text, const sim_motion_t *motion, iw_time_us_t now_us) {
-    if (motion->heard_us == IW_NEVER) {
+    if (motion->received_us == IW_NEVER) {
         add(text, "\"setpoint\":null,\"setpoint_age_ms\":null,");
         return;
     }
     add(text, "\"setpoint\":{\"type\":%u,\"speed_mm_s\":%d,\"current_mA\":%d},\"setpoint_age_ms\":%" PRIu64 ",",
         (unsigned)motion->setpoint.type, motion->setpoint.speed_mm_s, motion->setpoint.current_mA,
-        (now_us - motion->heard_us) / IW_US_PER_MS);
+        (now_us - motion->received_us) / IW_US_PER_MS);
 }
 
 static void add_wheel(text_t *text, const sim_wheel_t *wheel, iw_time_us_t now_us) {

@@ -6,7 +6,7 @@
 #ifndef SIM_BUTTON_H
 #define SIM_BUTTON_H
 
-#include "loop.h"
+#include "sim_loop.h"
 
 #define SIM_BUTTON_CLIENTS 8U
 

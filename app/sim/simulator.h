@@ -14,10 +14,10 @@
 #include "panel.h"
 #include "script.h"
 #include "sim_button.h"
+#include "sim_socketcan.h"
 #include "sim_words.h"
-#include "socketcan.h"
 
-// --- the command line (options.c) --------------------------------------------------------------------------------
+// --- the command line (sim_options.c) --------------------------------------------------------------------------------
 
 #define SIM_PATH_BYTES 512U
 

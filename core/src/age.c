@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "magnitude.h"
+#include "arithmetic.h"
 
 uint32_t iw_age_us(iw_time_us_t then_us, iw_time_us_t now_us) {
     const iw_time_us_t age_us = now_us - then_us;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cause.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 

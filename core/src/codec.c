@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/codec.h"
 
+#include "arithmetic.h"
 #include "be.h"
-#include "magnitude.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/diverge.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 #include <string.h>
 
@@ -38,7 +38,7 @@ static int32_t clamp(int32_t value, int32_t bound) {
     return (value < -bound) ? -bound : value;
 }
 
-void iw_diverge_hear(iw_diverge_t *self, size_t side, int32_t measured_mm_s) {
+void iw_diverge_receive(iw_diverge_t *self, size_t side, int32_t measured_mm_s) {
     self->measured_mm_s[side] = clamp(measured_mm_s, SPEED_MAX_MM_S);
 }
 
@@ -67,16 +67,16 @@ static IW_APART int32_t part_of(int32_t value, uint32_t share) {
 static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t percent) {
     const int32_t expected = self->expected_um_s[side];
     const int32_t measured = self->measured_mm_s[side] * 1000;
-    const int32_t progress = ((expected < 0) == (measured < 0)) ? iw_magnitude(measured) : 0;
-    return progress / percent < iw_magnitude(expected) / 100;
+    const int32_t progress = ((expected < 0) == (measured < 0)) ? iw_abs(measured) : 0;
+    return progress / percent < iw_abs(expected) / 100;
 }
 
 /// How much faster (slower: negative) a wheel is than it should be by now, beyond what is ordinary.
 static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     const int32_t expected = self->expected_um_s[side];
     const int32_t difference = self->measured_mm_s[side] * 1000 - expected;
-    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->um_s_per_rpm * 7 / 8;
-    if (iw_magnitude(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
+    const int32_t ordinary = iw_abs(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->um_s_per_rpm * 7 / 8;
+    if (iw_abs(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
         return 2 * difference;
     }
     return difference - clamp(difference, ordinary);
@@ -95,7 +95,7 @@ static void integrate(iw_diverge_t *self, uint32_t elapsed_us) {
     const int32_t leaked = part_of(self->path_um, lag_share(elapsed_us, config->pair_leak_ms));
     const int32_t moved = part_of(right - left, share_of(elapsed_us, IW_US_PER_MS * 1000U));
     self->path_um = clamp(self->path_um - leaked + moved, PATH_MAX_UM);
-    self->side = (iw_magnitude(left) > iw_magnitude(right)) ? IW_LEFT : IW_RIGHT;
+    self->side = (iw_abs(left) > iw_abs(right)) ? IW_LEFT : IW_RIGHT;
 }
 
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us) {
@@ -104,7 +104,7 @@ iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us) {
         integrate(self, (elapsed_us < ELAPSED_MAX_US) ? elapsed_us : ELAPSED_MAX_US);
         self->at_us = now_us;
     }
-    const int32_t path_um = iw_magnitude(self->path_um);
+    const int32_t path_um = iw_abs(self->path_um);
     if (path_um > self->largest_um) {
         self->largest_um = path_um;
     }

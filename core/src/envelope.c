@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/transmit.h"
 
+#include "arithmetic.h"
 #include "iwheel/codec.h"
-#include "magnitude.h"
 
 /// Both speeds are cut off to whole mm/s: so far may the difference of a pair seem to grow by that alone.
 #define TURN_ROUNDING_MM_S 2U
@@ -24,8 +24,8 @@ static uint32_t allowance(uint32_t slope_mm_s2, uint32_t elapsed_us) {
 /// A reversal must pass through a zero that was sent, even where both slopes together would allow the step.
 static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t now_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
-    const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
-    const uint32_t to = (uint32_t)iw_magnitude(speed_mm_s);
+    const uint32_t from = (uint32_t)iw_abs(last_mm_s);
+    const uint32_t to = (uint32_t)iw_abs(speed_mm_s);
     if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s < 0) != (last_mm_s < 0)) {
         return false;
     }
@@ -60,7 +60,7 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
     // A wheel with a limit near 0 has no torque; the document does not say what a limit below zero means.
     const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA;
-    return !low_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
+    return !low_limit && (uint32_t)iw_abs(current_mA) <= config->max_current_mA;
 }
 
 static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_us, iw_side_t side,
@@ -72,7 +72,7 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
     if (!current_ok(config, setpoint->current_mA)) {
         return IW_ENVELOPE_CURRENT;
     }
-    if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
+    if ((uint32_t)iw_abs(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_ENVELOPE_SPEED;
     }
     // R8: a stop is never held up by its own slope.
@@ -103,7 +103,7 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_
 static uint32_t turn_of(const iw_config_t *config, int32_t left_mm_s, int32_t right_mm_s) {
     const int32_t left = config->invert[IW_LEFT] ? -left_mm_s : left_mm_s;
     const int32_t right = config->invert[IW_RIGHT] ? -right_mm_s : right_mm_s;
-    return (uint32_t)iw_magnitude(right - left);
+    return (uint32_t)iw_abs(right - left);
 }
 
 /// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/hal.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us) {
     const iw_estop_pair_t pair = {.differ_us = IW_NEVER, .limit_us = limit_us};

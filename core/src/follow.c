@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/follow.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 /// The bit of a verdict in `running`.
 #define BIT(verdict) (1U << (uint32_t)(verdict))
@@ -37,8 +37,8 @@ static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, ui
 iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s,
                                    int32_t measured_mm_s) {
     const iw_config_t *const config = self->config;
-    const int32_t applied = iw_magnitude(applied_mm_s);
-    const int32_t measured = iw_magnitude(measured_mm_s);
+    const int32_t applied = iw_abs(applied_mm_s);
+    const int32_t measured = iw_abs(measured_mm_s);
     // Below IW_SIGN_MM_S a sign may be noise, or a wheel that rolls back on a kerb.
     const bool clear = applied > IW_SIGN_MM_S && measured > IW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);

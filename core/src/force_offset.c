@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/force_offset.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 #include <string.h>
 
@@ -40,8 +40,8 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->boot_seen = boot_seen;
     self->count = 0;
     self->wheel_offset_heard = false;
-    self->evidence = IW_UNIT_UNKNOWN;
-    self->evidence_permille = 0;
+    self->observation = IW_UNIT_UNKNOWN;
+    self->observed_permille = 0;
     memset(&self->quality, 0, sizeof self->quality);
     // The wheel will measure its offset anew; until then the old one is only a memory. A tare survives a reboot.
     if (self->provenance == IW_OFFSET_WHEEL || self->provenance == IW_OFFSET_ESTIMATED) {
@@ -76,7 +76,7 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     const uint32_t scale = (uint32_t)scale_mN(self);
     uint32_t sum = 0;
     for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
-        const int32_t spread = iw_magnitude(self->sample[i] - mean_raw);
+        const int32_t spread = iw_abs(self->sample[i] - mean_raw);
         const uint32_t capped = (uint32_t)((spread < SPREAD_MAX) ? spread : SPREAD_MAX);
         sum += capped * capped;
     }
@@ -96,7 +96,7 @@ static iw_window_t judge_quality(const iw_force_t *self, const iw_force_quality_
     if (quality->deviation_mN > IW_FORCE_QUIET_mN) {
         return IW_WINDOW_NOISY;
     }
-    return (iw_magnitude(quality->drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) ? IW_WINDOW_DRIFT : IW_WINDOW_GOOD;
+    return (iw_abs(quality->drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) ? IW_WINDOW_DRIFT : IW_WINDOW_GOOD;
 }
 
 /// The ring is full, so the oldest sample stands at `next`: the first half is the older one. A saturated sample comes
@@ -130,21 +130,21 @@ iw_force_quality_t iw_force_measure(const iw_force_t *self) {
 }
 
 static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t limit_mN) {
-    return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)limit_mN;
+    return iw_abs(mean_mN - self->offset_mN) > (int32_t)limit_mN;
 }
 
 static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) {
-    return iw_magnitude(difference) * 100 <= whole * percent;
+    return iw_abs(difference) * 100 <= whole * percent;
 }
 
 /// At rest raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
 /// since each is narrower than the gap to the next; a ratio that fits none of them is unclear.
-static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
-    const int32_t offset = iw_magnitude(offset_dN);
-    if (within(mean_raw - 10 * offset_dN, 10 * offset, IW_FORCE_EVIDENCE_PERCENT)) {
+static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
+    const int32_t offset = iw_abs(offset_dN);
+    if (within(mean_raw - 10 * offset_dN, 10 * offset, IW_FORCE_OBSERVED_PERCENT)) {
         return IW_UNIT_CN;
     }
-    if (within(mean_raw - offset_dN, offset, IW_FORCE_EVIDENCE_PERCENT)) {
+    if (within(mean_raw - offset_dN, offset, IW_FORCE_OBSERVED_PERCENT)) {
         return IW_UNIT_DN;
     }
     return within(mean_raw, offset, IW_FORCE_REMOVED_PERCENT) ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
@@ -159,11 +159,11 @@ static void judge_evidence(iw_force_t *self) {
     if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
         return;
     }
-    if (iw_magnitude(offset_dN) >= IW_FORCE_EVIDENCE_MIN_dN) {
-        self->evidence = weigh(mean_raw, offset_dN);
-        self->evidence_permille = mean_raw * 1000 / offset_dN;
-    } else if (iw_magnitude(self->quality.mean_mN - offset_dN * 100) > (int32_t)IW_FORCE_LOADED_mN) {
-        self->evidence = IW_UNIT_UNCLEAR;
+    if (iw_abs(offset_dN) >= IW_FORCE_OBSERVED_MIN_dN) {
+        self->observation = weigh(mean_raw, offset_dN);
+        self->observed_permille = mean_raw * 1000 / offset_dN;
+    } else if (iw_abs(self->quality.mean_mN - offset_dN * 100) > (int32_t)IW_FORCE_LOADED_mN) {
+        self->observation = IW_UNIT_UNCLEAR;
     }
 }
 
@@ -196,7 +196,7 @@ static uint8_t one_more(uint8_t samples) {
     return (samples < IW_FORCE_WINDOW_SAMPLES) ? (uint8_t)(samples + 1U) : samples;
 }
 
-void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still) {
+void iw_force_receive(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still) {
     if (stale(self, now_us)) {
         self->count = 0;
     }
@@ -211,7 +211,7 @@ void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool stil
     }
 }
 
-void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN) {
+void iw_force_receive_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN) {
     self->wheel_offset_dN = offset_dN;
     self->wheel_offset_heard = true;
     settle(self, now_us);
@@ -224,7 +224,7 @@ iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us) {
     iw_force_quality_t quality;
     measure(self, &quality);
     // An offset that is itself in doubt must not veto the tare that would replace it.
-    const bool doubted = self->evidence == IW_UNIT_UNCLEAR || self->evidence == IW_UNIT_OFFSET_REMOVED;
+    const bool doubted = self->observation == IW_UNIT_UNCLEAR || self->observation == IW_UNIT_OFFSET_REMOVED;
     const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
     if (quality.window == IW_WINDOW_SATURATED) {
         return IW_TARE_SATURATED;
@@ -246,13 +246,13 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
 }
 
 static bool unit_contradicted(const iw_force_t *self) {
-    const iw_unit_evidence_t other = (self->unit == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
-    return self->evidence == other;
+    const iw_unit_observation_t other = (self->unit == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
+    return self->observation == other;
 }
 
 iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us) {
     if (stale(self, now_us)) {
-        return IW_FORCE_NOT_HEARD;
+        return IW_FORCE_NO_TELEMETRY;
     }
     if (saturated(self->raw)) {
         return IW_FORCE_SATURATED;
@@ -267,10 +267,10 @@ iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_u
     if (self->provenance == IW_OFFSET_OPERATOR) {
         return IW_FORCE_VALID; // Measured on what the wheel sends, whatever it subtracts.
     }
-    if (self->evidence == IW_UNIT_OFFSET_REMOVED) {
+    if (self->observation == IW_UNIT_OFFSET_REMOVED) {
         return IW_FORCE_OFFSET_REMOVED;
     }
-    return (self->evidence == IW_UNIT_UNCLEAR) ? IW_FORCE_OFFSET_DOUBTED : IW_FORCE_VALID;
+    return (self->observation == IW_UNIT_UNCLEAR) ? IW_FORCE_OFFSET_DOUBTED : IW_FORCE_VALID;
 }
 
 int32_t iw_force_raw_mN(const iw_force_t *self) {

@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
+#include "arithmetic.h"
 #include "iwheel/private/current.h"
-#include "magnitude.h"
 
 #include <string.h>
 
 /// Where each assumption comes from before anything is measured.
 static void assume(iw_gateway_t *self) {
     const iw_config_t *const config = &self->config;
-    iw_ledger_t *const ledger = &self->ledger;
-    iw_ledger_init(ledger);
+    iw_assumption_store_t *const assumptions = &self->assumptions;
+    iw_assumption_init(assumptions);
     if (config->setpoint_type_set) {
-        iw_ledger_assume(ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_CONFIGURATION);
+        iw_assumption_assume(assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_CONFIGURATION);
     }
     if (config->current_role != IW_ROLE_UNSET) {
-        iw_ledger_assume(ledger, IW_LEDGER_CURRENT_ROLE, IW_EVIDENCE_CONFIGURATION);
+        iw_assumption_assume(assumptions, IW_ASSUMPTION_CURRENT_ROLE, IW_SOURCE_CONFIGURATION);
     }
     if (config->track_mm != 0U) {
-        iw_ledger_assume(ledger, IW_LEDGER_TRACK, IW_EVIDENCE_CONFIGURATION);
+        iw_assumption_assume(assumptions, IW_ASSUMPTION_TRACK, IW_SOURCE_CONFIGURATION);
     }
     if (config->force_unit[IW_LEFT] != IW_FORCE_CN) {
-        iw_ledger_assume(ledger, IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_CONFIGURATION);
+        iw_assumption_assume(assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_CONFIGURATION);
     }
     if (config->force_unit[IW_RIGHT] != IW_FORCE_DN) {
-        iw_ledger_assume(ledger, IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_CONFIGURATION);
+        iw_assumption_assume(assumptions, IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_SOURCE_CONFIGURATION);
     }
 }
 
@@ -68,7 +68,7 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     // The latch is reported first: it must be reset before anything else can be mended.
-    if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->ledger.doubt != IW_LEDGER_ITEMS) {
+    if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->assumptions.doubt != IW_ASSUMPTION_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
     const bool held = self->permit.holder == client;
@@ -82,8 +82,8 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
 
 /// Scales both values by one factor, so that the larger is `limit`: the curve stays the same. True if they had to be.
 static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
-    const int32_t left = iw_magnitude(values[IW_LEFT]);
-    const int32_t right = iw_magnitude(values[IW_RIGHT]);
+    const int32_t left = iw_abs(values[IW_LEFT]);
+    const int32_t right = iw_abs(values[IW_RIGHT]);
     const int32_t largest = (left > right) ? left : right;
     if (largest <= limit) {
         return false;
@@ -206,10 +206,10 @@ void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_pro
     iw_force_restore(&self->force[side], provenance, offset_mN);
 }
 
-void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
-    if (entry->state == IW_LEDGER_CONTRADICTED) {
-        iw_ledger_contradict(&self->ledger, item, entry->evidence, entry->figure);
-    } else if (entry->state == IW_LEDGER_CONFIRMED) {
-        iw_ledger_confirm(&self->ledger, item, entry->evidence, entry->figure);
+void iw_gateway_set_assumption(iw_gateway_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry) {
+    if (entry->state == IW_CONTRADICTED) {
+        iw_assumption_contradict(&self->assumptions, item, entry->source, entry->figure);
+    } else if (entry->state == IW_CONFIRMED) {
+        iw_assumption_confirm(&self->assumptions, item, entry->source, entry->figure);
     }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/permit.h"
 
+#include "arithmetic.h"
 #include "cause.h"
-#include "magnitude.h"
 #include "permit_refuse.h"
 
 #include <string.h>

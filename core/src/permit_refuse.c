@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "permit_refuse.h"
 
+#include "arithmetic.h"
 #include "cause.h"
-#include "magnitude.h"
 
 bool iw_refuse_may_send(const iw_config_t *config) {
     return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/rolling.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 void iw_rolling_init(iw_rolling_t *self) {
     self->rolling = false;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/setpoint.h"
 
+#include "arithmetic.h"
 #include "iwheel/codec.h"
 #include "iwheel/private/current.h"
-#include "magnitude.h"
 
 #include <string.h>
 
@@ -136,8 +136,8 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 static void plan(step_t *step, size_t i, int32_t value, int32_t target, const uint32_t allowed[2]) {
     const bool through_zero = value != 0 && (target < 0) != (value < 0);
     const int32_t aim = through_zero ? 0 : target;
-    const uint32_t way = (uint32_t)iw_magnitude(aim - value);
-    const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(value);
+    const uint32_t way = (uint32_t)iw_abs(aim - value);
+    const bool braking = (uint32_t)iw_abs(aim) < (uint32_t)iw_abs(value);
     const uint32_t fraction = portion_of(allowed[braking ? 1U : 0U], way);
     step->aim[i] = aim;
     step->braking[i] = braking;
@@ -178,13 +178,13 @@ static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     const int32_t braking = turn_by(step, self->speed_um_s, true);
     const int32_t faster = turn_by(step, self->speed_um_s, false);
     const int32_t braked = from + braking;
-    if (iw_magnitude(braked + faster) <= bound) {
+    if (iw_abs(braked + faster) <= bound) {
         return;
     }
-    if (iw_magnitude(braked) <= bound) {
-        cut_step(step, false, portion_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_magnitude(faster)));
+    if (iw_abs(braked) <= bound) {
+        cut_step(step, false, portion_of(iw_yaw_room(bound, braked, faster), (uint32_t)iw_abs(faster)));
     } else {
-        cut_step(step, true, portion_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_magnitude(braking)));
+        cut_step(step, true, portion_of(iw_yaw_room(bound, from, braking), (uint32_t)iw_abs(braking)));
         step->share[0] = 0;
     }
 }

@@ -31,19 +31,18 @@ static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_
 
 iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_side_t side) {
     const iw_force_t *const force = self->wheel[side].force;
-    const iw_ledger_entry_t *const unit = &self->assumed[iw_ledger_force_unit(side)];
-    const iw_ledger_entry_t *const included = &self->assumed[IW_LEDGER_OFFSET_INCLUDED];
-    const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
+    const iw_assumption_entry_t *const unit = &self->assumed[iw_assumption_force_unit(side)];
+    const iw_assumption_entry_t *const included = &self->assumed[IW_ASSUMPTION_OFFSET_INCLUDED];
+    const iw_assumption_entry_t *const asked = (force->observation == IW_UNIT_OFFSET_REMOVED) ? included : unit;
     iw_force_validity_t validity = iw_force_validity(force, self->at_us);
     // The ledger decides over the force module: it also holds what the operator said and what earlier runs found.
-    if (asked->evidence == IW_EVIDENCE_OPERATOR) {
+    if (asked->source == IW_SOURCE_OPERATOR) {
         validity = overruled(force, validity);
     }
-    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
+    if (validity == IW_FORCE_VALID && unit->state == IW_CONTRADICTED) {
         return IW_FORCE_UNIT_CONTRADICTED;
     }
-    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
-        force->provenance != IW_OFFSET_OPERATOR) {
+    if (validity == IW_FORCE_VALID && included->state == IW_CONTRADICTED && force->provenance != IW_OFFSET_OPERATOR) {
         return IW_FORCE_OFFSET_REMOVED;
     }
     return validity;
@@ -62,7 +61,7 @@ static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side
     out_wheel->speed_mm_s = wheel->speed_mm_s;
     out_wheel->um_s_per_rpm = wheel->um_s_per_rpm;
     out_wheel->reboots = wheel->reboots;
-    out_wheel->heard = iw_wheel_heard(wheel, now_us);
+    out_wheel->heard = iw_wheel_online(wheel, now_us);
     out_wheel->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
 }
 
@@ -89,9 +88,9 @@ void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snaps
     out_snapshot->at_us = now_us;
     out_snapshot->config = &self->config;
     out_snapshot->counters = &self->counters;
-    out_snapshot->assumed = self->ledger.entry;
-    out_snapshot->assumed_changes = self->ledger.changes;
-    out_snapshot->doubt = self->ledger.doubt;
+    out_snapshot->assumed = self->assumptions.entry;
+    out_snapshot->assumed_changes = self->assumptions.changes;
+    out_snapshot->doubt = self->assumptions.doubt;
     look_at_wheel(self, now_us, IW_LEFT, &out_snapshot->wheel[IW_LEFT]);
     look_at_wheel(self, now_us, IW_RIGHT, &out_snapshot->wheel[IW_RIGHT]);
     out_snapshot->sent = &self->sender.sent;

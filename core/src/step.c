@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 #include "watch_pair.h"
 
 /// Details of IW_CAUSE_ESTOP_LINE.
@@ -85,48 +85,48 @@ static void begin(iw_gateway_t *self) {
 }
 
 /// The bus has shown that an assumption holds, or that it does not.
-static IW_APART void note(iw_gateway_t *self, iw_ledger_item_t item, bool holds, int32_t figure) {
+static IW_APART void note(iw_gateway_t *self, iw_assumption_item_t item, bool holds, int32_t figure) {
     if (holds) {
-        iw_ledger_confirm(&self->ledger, item, IW_EVIDENCE_BUS, figure);
+        iw_assumption_confirm(&self->assumptions, item, IW_SOURCE_BUS, figure);
     } else {
-        iw_ledger_contradict(&self->ledger, item, IW_EVIDENCE_BUS, figure);
+        iw_assumption_contradict(&self->assumptions, item, IW_SOURCE_BUS, figure);
     }
 }
 
 /// What the force module found out about units, as entries of the ledger. IW_UNIT_UNCLEAR is no entry: it makes this
 /// force doubtful (force_offset.h), but it proves no other unit.
-static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
+static void note_force_observation(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
-    const iw_unit_evidence_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
-    const bool fits = force->evidence == configured;
-    if (force->evidence == IW_UNIT_CN || force->evidence == IW_UNIT_DN) {
-        note(self, iw_ledger_force_unit(side), fits, force->evidence_permille);
+    const iw_unit_observation_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
+    const bool fits = force->observation == configured;
+    if (force->observation == IW_UNIT_CN || force->observation == IW_UNIT_DN) {
+        note(self, iw_assumption_force_unit(side), fits, force->observed_permille);
     }
-    if (fits || force->evidence == IW_UNIT_OFFSET_REMOVED) {
-        note(self, IW_LEDGER_OFFSET_INCLUDED, fits, force->evidence_permille);
+    if (fits || force->observation == IW_UNIT_OFFSET_REMOVED) {
+        note(self, IW_ASSUMPTION_OFFSET_INCLUDED, fits, force->observed_permille);
     }
 }
 
 static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     const iw_codec_wheel_t *const told = &self->told[side];
     iw_force_t *const force = &self->force[side];
-    const iw_unit_evidence_t before = force->evidence;
+    const iw_unit_observation_t before = force->observation;
     if (kind == IW_CODEC_FORCE) {
         // By its last speed, however old: our own stall does not mean that the wheel moved.
-        const bool still = iw_magnitude(told->speed.speed_rpm) <= self->config.rest_rpm;
-        iw_force_hear(force, self->now_us, told->force.force_raw, still);
+        const bool still = iw_abs(told->speed.speed_rpm) <= self->config.rest_rpm;
+        iw_force_receive(force, self->now_us, told->force.force_raw, still);
     } else {
-        iw_force_hear_offset(force, self->now_us, told->offset.offset_dN);
+        iw_force_receive_offset(force, self->now_us, told->offset.offset_dN);
     }
-    if (force->evidence != before) {
-        note_force_evidence(self, side);
+    if (force->observation != before) {
+        note_force_observation(self, side);
     }
 }
 
 /// Only the first one: each entry is a change that is reported and stored, and frames come 500 times a second.
 static void contradict_length(iw_gateway_t *self, uint8_t length) {
-    if (self->ledger.entry[IW_LEDGER_DLC].state != IW_LEDGER_CONTRADICTED) {
-        note(self, IW_LEDGER_DLC, false, length);
+    if (self->assumptions.entry[IW_ASSUMPTION_DLC].state != IW_CONTRADICTED) {
+        note(self, IW_ASSUMPTION_DLC, false, length);
     }
 }
 
@@ -136,7 +136,7 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
     if (length != iw_codec_length(kind)) {
         contradict_length(self, length);
     } else if (kind == IW_CODEC_STATUS) {
-        note(self, IW_LEDGER_DLC, true, length);
+        note(self, IW_ASSUMPTION_DLC, true, length);
     }
 }
 
@@ -146,7 +146,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
-    iw_wheel_hear(wheel, self->now_us, kind, &self->told[side], !self->stalled);
+    iw_wheel_receive(wheel, self->now_us, kind, &self->told[side], !self->stalled);
     const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
         raise_cause(self, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
@@ -159,7 +159,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     } else if (kind == IW_CODEC_POSE) {
         self->pose_us = self->now_us;
     } else if (kind == IW_CODEC_SPEED) {
-        iw_diverge_hear(&self->diverge, side, iw_watch_own_mm_s(self, side));
+        iw_diverge_receive(&self->diverge, side, iw_watch_own_mm_s(self, side));
     }
 }
 
@@ -226,7 +226,7 @@ static IW_APART uint32_t lost_for_ms(const iw_gateway_t *self, iw_side_t side) {
     if (!iw_wheel_lost(wheel, self->now_us)) {
         return 0;
     }
-    return (wheel->heard_us == IW_NEVER) ? UINT32_MAX : iw_age_us(wheel->heard_us, self->now_us) / IW_US_PER_MS;
+    return (wheel->received_us == IW_NEVER) ? UINT32_MAX : iw_age_us(wheel->received_us, self->now_us) / IW_US_PER_MS;
 }
 
 static void watch_silence(iw_gateway_t *self) {
@@ -277,18 +277,19 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
         [IW_FOLLOW_BLOCKED] = IW_CAUSE_WHEEL_BLOCKED,
     };
     iw_follow_t *const follow = &self->follow[side];
-    const iw_ledger_item_t item = (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
+    const iw_assumption_item_t item =
+        (side == IW_LEFT) ? IW_ASSUMPTION_FEEDBACK_SIGN_LEFT : IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT;
     const int32_t measured_mm_s = self->diverge.measured_mm_s[side];
     const iw_follow_verdict_t verdict = iw_follow_step(follow, self->now_us, applied_mm_s, measured_mm_s);
     // As at a positive command.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     if (verdict != IW_FOLLOW_OK) {
-        raise_cause(self, (iw_cause_t)causes[verdict], side_bit(side), (uint32_t)iw_magnitude(measured_mm_s));
+        raise_cause(self, (iw_cause_t)causes[verdict], side_bit(side), (uint32_t)iw_abs(measured_mm_s));
     }
     if (verdict == IW_FOLLOW_SIGN) {
         note(self, item, false, along_mm_s);
     }
-    if (self->ledger.entry[item].state == IW_LEDGER_ASSUMED && iw_follow_sign_confirmed(follow, self->now_us)) {
+    if (self->assumptions.entry[item].state == IW_ASSUMED && iw_follow_sign_confirmed(follow, self->now_us)) {
         note(self, item, true, along_mm_s);
     }
 }
@@ -298,7 +299,7 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
 static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
-    if (ours && iw_wheel_heard(&self->wheel[side], self->now_us)) {
+    if (ours && iw_wheel_online(&self->wheel[side], self->now_us)) {
         watch_follow(self, side, applied_mm_s);
     } else {
         iw_follow_restart(&self->follow[side]);
@@ -307,7 +308,7 @@ static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
 
 static bool turns(const iw_gateway_t *self, iw_side_t side) {
     const iw_wheel_t *const wheel = &self->wheel[side];
-    return iw_magnitude(wheel->speed_mm_s) > IW_ROLLING_MM_S && iw_wheel_heard(wheel, self->now_us);
+    return iw_abs(wheel->speed_mm_s) > IW_ROLLING_MM_S && iw_wheel_online(wheel, self->now_us);
 }
 
 /// A machine that rolls away, or is pushed by hand. Not while setpoints are sent: a zero is a command too, and wheels
@@ -330,7 +331,7 @@ static uint32_t both_rest_us(const iw_gateway_t *self) {
 static void judge_wheels(iw_gateway_t *self) {
     iw_permit_view_t *const view = &self->permit.view;
     const bool heard =
-        iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
+        iw_wheel_online(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_online(&self->wheel[IW_RIGHT], self->now_us);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "watch_pair.h"
 
+#include "arithmetic.h"
 #include "iwheel/gateway.h"
-#include "magnitude.h"
 
 int32_t iw_watch_own_mm_s(const iw_gateway_t *self, size_t side) {
     const int32_t speed_um_s = self->told[side].speed.speed_rpm * self->diverge.um_s_per_rpm;
@@ -17,7 +17,7 @@ static void compare(iw_gateway_t *self, const iw_pair_t *applied) {
     const iw_diverge_verdict_t verdict = iw_diverge_step(diverge, self->now_us);
     if (verdict != IW_DIVERGE_NOT) {
         const iw_event_t event = {IW_CAUSE_PAIR_DIVERGES, (uint8_t)(IW_SIDES_LEFT << diverge->side),
-                                  (uint32_t)iw_magnitude(diverge->path_um) / 1000U,
+                                  (uint32_t)iw_abs(diverge->path_um) / 1000U,
                                   (verdict == IW_DIVERGE_SLOW) ? IW_REACT_ZERO : IW_REACT_RAMP};
         iw_permit_raise(&self->permit, &event, self->now_us);
     }

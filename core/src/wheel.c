@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/wheel.h"
 
-#include "magnitude.h"
+#include "arithmetic.h"
 
 #include <string.h>
 
@@ -25,7 +25,7 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->config = config;
     self->side = side;
     self->first_us = IW_NEVER;
-    self->heard_us = IW_NEVER;
+    self->received_us = IW_NEVER;
     self->speed_us = IW_NEVER;
     self->status_us = IW_NEVER;
     self->rest_since_us = IW_NEVER;
@@ -38,8 +38,8 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
 }
 
 /// `status_us` is reset because the wheel's odometry begins anew: the next status frame is a start, not a step.
-static IW_APART void rebooted(iw_wheel_t *self, iw_reboot_t evidence, iw_time_us_t now_us) {
-    self->pending_reboot = evidence;
+static IW_APART void rebooted(iw_wheel_t *self, iw_reboot_t source, iw_time_us_t now_us) {
+    self->pending_reboot = source;
     self->reboots++;
     self->offset_us = now_us;
     self->boot_seen = true;
@@ -63,17 +63,17 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
-    const bool gap = !iw_wheel_heard(self, now_us);
+    const bool gap = !iw_wheel_online(self, now_us);
     self->speed_mm_s = (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
     self->speed_us = now_us;
-    if (iw_magnitude(speed->speed_rpm) > rest_rpm) {
+    if (iw_abs(speed->speed_rpm) > rest_rpm) {
         self->rest_since_us = IW_NEVER;
     } else if (fresh && (gap || self->rest_since_us == IW_NEVER)) {
         self->rest_since_us = now_us;
     }
     if (fresh) {
-        self->heard_us = now_us;
-        self->heard_until_us = now_us + silent_us(self);
+        self->received_us = now_us;
+        self->received_until_us = now_us + silent_us(self);
     }
 }
 
@@ -106,8 +106,8 @@ static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
     self->offset_us = now_us;
 }
 
-void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
-                   bool fresh) {
+void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+                      bool fresh) {
     note_presence(self, now_us);
     if (kind == IW_CODEC_SPEED) {
         hear_speed(self, now_us, &told->speed, fresh);
@@ -120,19 +120,19 @@ void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
     // One excuse per fresh frame: late steps in a row must not keep a dead wheel alive.
-    if (self->heard_us >= self->excused_us) {
+    if (self->received_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;
     }
 }
 
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t since_us = (self->heard_us > self->excused_us) ? self->heard_us : self->excused_us;
+    const iw_time_us_t since_us = (self->received_us > self->excused_us) ? self->received_us : self->excused_us;
     return iw_age_us(since_us, now_us) >= silent_us(self);
 }
 
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us) {
-    if (self->rest_since_us == IW_NEVER || !iw_wheel_heard(self, now_us)) {
+    if (self->rest_since_us == IW_NEVER || !iw_wheel_online(self, now_us)) {
         return 0;
     }
     return iw_age_us(self->rest_since_us, now_us);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/yaw.h"
 
+#include "arithmetic.h"
 #include "iwheel/diverge.h"
-#include "magnitude.h"
 
 /// Each wheel's part is cut off to whole um/s, so both together may be beyond by less than this.
 #define ROUNDING_UM_S 2
@@ -18,7 +18,7 @@ void iw_yaw_init(iw_yaw_t *self, const iw_yaw_machine_t *machine) {
 }
 
 bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {
-    const int32_t turn_mm_s = iw_magnitude(speed_mm_s[IW_RIGHT] - speed_mm_s[IW_LEFT]);
+    const int32_t turn_mm_s = iw_abs(speed_mm_s[IW_RIGHT] - speed_mm_s[IW_LEFT]);
     if (turn_mm_s <= self->most_mm_s) {
         return false;
     }
@@ -28,7 +28,7 @@ bool iw_yaw_limit(const iw_yaw_t *self, int32_t speed_mm_s[IW_SIDES]) {
 }
 
 int32_t iw_yaw_bound(const iw_yaw_t *self, int32_t from_um_s, uint32_t growth_um_s) {
-    const int32_t now_um_s = iw_magnitude(from_um_s);
+    const int32_t now_um_s = iw_abs(from_um_s);
     const int32_t most_um_s = self->most_mm_s * 1000;
     const int32_t grown_um_s = now_um_s + (int32_t)growth_um_s;
     const int32_t bound_um_s = (grown_um_s < most_um_s) ? grown_um_s : most_um_s;

@@ -70,10 +70,11 @@ const settings_key_t *settings_find(const settings_form_t *form, const char *sec
 /// The row of this section whose key looks most like it, or a null pointer if none comes close.
 static const settings_key_t *find_similar(const settings_form_t *form, const char *section, const char *key) {
     const settings_key_t *best = NULL;
-    size_t best_distance = GW_WORD_STRANGE;
+    size_t best_distance = SETTINGS_WORD_STRANGE;
     for (size_t i = 0; i < form->count; i++) {
         const settings_key_t *row = &form->keys[i];
-        const size_t far = (strcmp(row->section, section) == 0) ? gw_word_distance(key, row->key) : GW_WORD_STRANGE;
+        const size_t far =
+            (strcmp(row->section, section) == 0) ? settings_word_distance(key, row->key) : SETTINGS_WORD_STRANGE;
         if (far < best_distance) {
             best = row;
             best_distance = far;

@@ -29,15 +29,15 @@ static size_t distance(const char *a, const char *b, size_t width) {
     return row[width];
 }
 
-size_t gw_word_distance(const char *typed, const char *known) {
+size_t settings_word_distance(const char *typed, const char *known) {
     const size_t length = strlen(typed);
     const size_t width = strlen(known);
     if (length >= BEGINNING_MIN && strncmp(known, typed, length) == 0) {
         return 0;
     }
     if (length > LETTERS_MAX || width > LETTERS_MAX) {
-        return GW_WORD_STRANGE;
+        return SETTINGS_WORD_STRANGE;
     }
     const size_t far = distance(typed, known, width);
-    return (far <= DISTANCE_MAX && 2U * far <= width) ? far : GW_WORD_STRANGE;
+    return (far <= DISTANCE_MAX && 2U * far <= width) ? far : SETTINGS_WORD_STRANGE;
 }

@@ -6,10 +6,10 @@
 #include <stddef.h>
 
 /// Not worth a question.
-#define GW_WORD_STRANGE ((size_t)-1)
+#define SETTINGS_WORD_STRANGE ((size_t)-1)
 
 /// How many letters are to be changed, put in or taken out; 0 for the beginning of the known word, from three letters on.
-/// GW_WORD_STRANGE if more than three, or more than half of the known word's letters.
-size_t gw_word_distance(const char *typed, const char *known);
+/// SETTINGS_WORD_STRANGE if more than three, or more than half of the known word's letters.
+size_t settings_word_distance(const char *typed, const char *known);
 
 #endif

@@ -27,37 +27,38 @@ static void write_gear(const iw_config_t *config, char out_value[IWN_VALUE_SIZE]
                    config->rpm_of_rotor ? "rotor" : "wheel");
 }
 
-void gw_assumption_value(const gw_configured_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]) {
+void inspect_assumption_value(const inspect_configured_t *configured, iw_assumption_item_t item,
+                              char out_value[IWN_VALUE_SIZE]) {
     const iw_config_t *config = configured->core;
     const char *word = "yes";
     out_value[0] = '\0';
     switch (item) {
-    case IW_LEDGER_SETPOINT_TYPE:
+    case IW_ASSUMPTION_SETPOINT_TYPE:
         if (config->setpoint_type_set) {
             (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", config->setpoint_type);
         }
         return;
-    case IW_LEDGER_WHEEL_RADIUS:
+    case IW_ASSUMPTION_WHEEL_RADIUS:
         (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", config->radius_mm);
         return;
-    case IW_LEDGER_TRACK:
+    case IW_ASSUMPTION_TRACK:
         if (configured->track_mm != 0U) {
             (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", configured->track_mm);
         }
         return;
-    case IW_LEDGER_GEAR_RATIO:
+    case IW_ASSUMPTION_GEAR_RATIO:
         write_gear(config, out_value);
         return;
-    case IW_LEDGER_CURRENT_ROLE:
+    case IW_ASSUMPTION_CURRENT_ROLE:
         word = role_word(config->current_role);
         break;
-    case IW_LEDGER_FORCE_UNIT_LEFT:
-    case IW_LEDGER_FORCE_UNIT_RIGHT:
-        word = unit_word(config->force_unit[(item == IW_LEDGER_FORCE_UNIT_LEFT) ? IW_LEFT : IW_RIGHT]);
+    case IW_ASSUMPTION_FORCE_UNIT_LEFT:
+    case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
+        word = unit_word(config->force_unit[(item == IW_ASSUMPTION_FORCE_UNIT_LEFT) ? IW_LEFT : IW_RIGHT]);
         break;
-    case IW_LEDGER_MOUNT_SIGN_LEFT:
-    case IW_LEDGER_MOUNT_SIGN_RIGHT:
-        word = yes_or_no(config->invert[(item == IW_LEDGER_MOUNT_SIGN_LEFT) ? IW_LEFT : IW_RIGHT]);
+    case IW_ASSUMPTION_MOUNT_SIGN_LEFT:
+    case IW_ASSUMPTION_MOUNT_SIGN_RIGHT:
+        word = yes_or_no(config->invert[(item == IW_ASSUMPTION_MOUNT_SIGN_LEFT) ? IW_LEFT : IW_RIGHT]);
         break;
     default:
         break;
@@ -65,23 +66,23 @@ void gw_assumption_value(const gw_configured_t *configured, iw_ledger_item_t ite
     (void)snprintf(out_value, IWN_VALUE_SIZE, "%s", word);
 }
 
-const char *gw_assumption_values(iw_ledger_item_t item) {
+const char *inspect_assumption_values(iw_assumption_item_t item) {
     switch (item) {
-    case IW_LEDGER_SETPOINT_TYPE:
+    case IW_ASSUMPTION_SETPOINT_TYPE:
         return "0 to 255";
-    case IW_LEDGER_CURRENT_ROLE:
+    case IW_ASSUMPTION_CURRENT_ROLE:
         return "limit or setpoint";
-    case IW_LEDGER_FORCE_UNIT_LEFT:
-    case IW_LEDGER_FORCE_UNIT_RIGHT:
+    case IW_ASSUMPTION_FORCE_UNIT_LEFT:
+    case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
         return "cN or dN";
-    case IW_LEDGER_MOUNT_SIGN_LEFT:
-    case IW_LEDGER_MOUNT_SIGN_RIGHT:
+    case IW_ASSUMPTION_MOUNT_SIGN_LEFT:
+    case IW_ASSUMPTION_MOUNT_SIGN_RIGHT:
         return "yes or no, as invert in the configuration";
-    case IW_LEDGER_WHEEL_RADIUS:
+    case IW_ASSUMPTION_WHEEL_RADIUS:
         return "20 to 500 (mm)";
-    case IW_LEDGER_TRACK:
+    case IW_ASSUMPTION_TRACK:
         return "50 to 5000 (mm)";
-    case IW_LEDGER_GEAR_RATIO:
+    case IW_ASSUMPTION_GEAR_RATIO:
         return "N or N/M, as gear_ratio in the configuration";
     default:
         return "yes or no";
@@ -100,17 +101,18 @@ static bool read_number(const char *text, unsigned *out_number, const char **out
     return digits > 0U;
 }
 
-static gw_found_t compare_number(const char *found, unsigned wanted, unsigned low, unsigned high, unsigned percent) {
+static inspect_found_t compare_number(const char *found, unsigned wanted, unsigned low, unsigned high,
+                                      unsigned percent) {
     unsigned number;
     const char *rest;
     if (!read_number(found, &number, &rest) || *rest != '\0' || number < low || number > high) {
-        return GW_FOUND_IMPOSSIBLE;
+        return INSPECT_FOUND_IMPOSSIBLE;
     }
     const unsigned off = (number > wanted) ? number - wanted : wanted - number;
-    return (off * 100U <= wanted * percent) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    return (off * 100U <= wanted * percent) ? INSPECT_FOUND_SAME : INSPECT_FOUND_DIFFERENT;
 }
 
-static gw_found_t compare_gear(const char *found, const iw_config_t *config) {
+static inspect_found_t compare_gear(const char *found, const iw_config_t *config) {
     unsigned turns;
     unsigned per = 1;
     const char *rest;
@@ -119,42 +121,43 @@ static gw_found_t compare_gear(const char *found, const iw_config_t *config) {
         good = read_number(rest + 1, &per, &rest);
     }
     if (!good || *rest != '\0' || turns < 1U || turns > 1000U || per < 1U || per > 1000U) {
-        return GW_FOUND_IMPOSSIBLE;
+        return INSPECT_FOUND_IMPOSSIBLE;
     }
-    return (turns * config->gear_per == per * config->gear_turns) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    return (turns * config->gear_per == per * config->gear_turns) ? INSPECT_FOUND_SAME : INSPECT_FOUND_DIFFERENT;
 }
 
 /// One of two words.
-static gw_found_t compare_word(const char *found, const char *wanted, const char *one, const char *other) {
+static inspect_found_t compare_word(const char *found, const char *wanted, const char *one, const char *other) {
     if (strcmp(found, one) != 0 && strcmp(found, other) != 0) {
-        return GW_FOUND_IMPOSSIBLE;
+        return INSPECT_FOUND_IMPOSSIBLE;
     }
-    return (strcmp(found, wanted) == 0) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    return (strcmp(found, wanted) == 0) ? INSPECT_FOUND_SAME : INSPECT_FOUND_DIFFERENT;
 }
 
-gw_found_t gw_assumption_compare(const gw_configured_t *configured, iw_ledger_item_t item, const char *found) {
+inspect_found_t inspect_assumption_compare(const inspect_configured_t *configured, iw_assumption_item_t item,
+                                           const char *found) {
     const iw_config_t *config = configured->core;
     char wanted[IWN_VALUE_SIZE];
-    gw_assumption_value(configured, item, wanted);
+    inspect_assumption_value(configured, item, wanted);
     if (wanted[0] == '\0') {
-        return GW_FOUND_UNSET;
+        return INSPECT_FOUND_UNSET;
     }
     if (found[0] == '\0') {
-        return GW_FOUND_SAME;
+        return INSPECT_FOUND_SAME;
     }
     switch (item) {
-    case IW_LEDGER_SETPOINT_TYPE:
+    case IW_ASSUMPTION_SETPOINT_TYPE:
         return compare_number(found, config->setpoint_type, 0U, UINT8_MAX, 0U);
-    case IW_LEDGER_WHEEL_RADIUS:
-        return compare_number(found, config->radius_mm, 20U, 500U, GW_RADIUS_PERCENT);
-    case IW_LEDGER_TRACK:
-        return compare_number(found, configured->track_mm, 200U, 1500U, GW_TRACK_PERCENT);
-    case IW_LEDGER_GEAR_RATIO:
+    case IW_ASSUMPTION_WHEEL_RADIUS:
+        return compare_number(found, config->radius_mm, 20U, 500U, INSPECT_RADIUS_PERCENT);
+    case IW_ASSUMPTION_TRACK:
+        return compare_number(found, configured->track_mm, 200U, 1500U, INSPECT_TRACK_PERCENT);
+    case IW_ASSUMPTION_GEAR_RATIO:
         return compare_gear(found, config);
-    case IW_LEDGER_CURRENT_ROLE:
+    case IW_ASSUMPTION_CURRENT_ROLE:
         return compare_word(found, wanted, "limit", "setpoint");
-    case IW_LEDGER_FORCE_UNIT_LEFT:
-    case IW_LEDGER_FORCE_UNIT_RIGHT:
+    case IW_ASSUMPTION_FORCE_UNIT_LEFT:
+    case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
         return compare_word(found, wanted, "cN", "dN");
     default:
         return compare_word(found, wanted, "yes", "no");
@@ -162,130 +165,133 @@ gw_found_t gw_assumption_compare(const gw_configured_t *configured, iw_ledger_it
 }
 
 /// What was measured.
-static void write_figure(iw_ledger_item_t item, const iw_ledger_entry_t *entry, char out_text[GW_EVIDENCE_SIZE]) {
+static void write_figure(iw_assumption_item_t item, const iw_assumption_entry_t *entry,
+                         char out_text[INSPECT_SOURCE_SIZE]) {
     const int figure = (int)entry->figure;
     const char *sign = (figure < 0) ? "-" : "";
     const int whole = abs(figure / 1000);
     const int part = abs(figure % 1000);
     switch (item) {
-    case IW_LEDGER_FORCE_UNIT_LEFT:
-    case IW_LEDGER_FORCE_UNIT_RIGHT:
-    case IW_LEDGER_OFFSET_INCLUDED:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE,
+    case IW_ASSUMPTION_FORCE_UNIT_LEFT:
+    case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
+    case IW_ASSUMPTION_OFFSET_INCLUDED:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE,
                        "at rest, raw / offset is %s%d.%03d (about 10 is cN, 1 is dN, 0 is a raw force without offset)",
                        sign, whole, part);
         break;
-    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
-    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "measured %d mm/s while told to go forward", figure);
+    case IW_ASSUMPTION_FEEDBACK_SIGN_LEFT:
+    case IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "measured %d mm/s while told to go forward", figure);
         break;
-    case IW_LEDGER_SETPOINT_TYPE:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the wheels ran at %s%d.%03d of the speed they were told", sign,
+    case IW_ASSUMPTION_SETPOINT_TYPE:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the wheels ran at %s%d.%03d of the speed they were told", sign,
                        whole, part);
         break;
-    case IW_LEDGER_GEAR_RATIO:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the ticks moved %s%d.%03d times as far as the rpm say", sign, whole,
-                       part);
+    case IW_ASSUMPTION_GEAR_RATIO:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the ticks moved %s%d.%03d times as far as the rpm say", sign,
+                       whole, part);
         break;
-    case IW_LEDGER_POSE_BYTE_ORDER:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "read the other way round, the pose moves %s%d.%03d times as far",
+    case IW_ASSUMPTION_POSE_BYTE_ORDER:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "read the other way round, the pose moves %s%d.%03d times as far",
                        sign, whole, part);
         break;
-    case IW_LEDGER_DLC:
+    case IW_ASSUMPTION_DLC:
     default:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "a frame of %d bytes was heard%s", figure,
-                       (entry->state == IW_LEDGER_CONTRADICTED) ? "; the table has another length"
-                                                                : ", as in the table");
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "a frame of %d bytes was heard%s", figure,
+                       (entry->state == IW_CONTRADICTED) ? "; the table has another length" : ", as in the table");
         break;
     }
 }
 
 /// "the operator found 181 by a tape", "found by bringup: 5.00 m pushed ..."; without `how` only the operator's word.
-static void write_word(bool denied, const gw_word_t *word, char out_text[GW_EVIDENCE_SIZE]) {
+static void write_word(bool denied, const inspect_word_t *word, char out_text[INSPECT_SOURCE_SIZE]) {
     const char *found = (word->found[0] != '\0') ? word->found : "something else";
     const char *by = (word->how[0] != '\0') ? " by " : "";
     if (denied) {
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator found %s%s%s", found, by, word->how);
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the operator found %s%s%s", found, by, word->how);
     } else if (word->how[0] != '\0') {
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "found by %s", word->how);
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "found by %s", word->how);
     } else {
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator says so");
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the operator says so");
     }
 }
 
-void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const gw_word_t *word,
-                            char out_text[GW_EVIDENCE_SIZE]) {
-    switch (entry->evidence) {
-    case IW_EVIDENCE_BUS:
+void inspect_assumption_source(iw_assumption_item_t item, const iw_assumption_entry_t *entry,
+                               const inspect_word_t *word, char out_text[INSPECT_SOURCE_SIZE]) {
+    switch (entry->source) {
+    case IW_SOURCE_BUS:
         write_figure(item, entry, out_text);
         break;
-    case IW_EVIDENCE_OPERATOR:
-        write_word(entry->state == IW_LEDGER_CONTRADICTED, word, out_text);
+    case IW_SOURCE_OPERATOR:
+        write_word(entry->state == IW_CONTRADICTED, word, out_text);
         break;
-    case IW_EVIDENCE_CONFIGURATION:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "configured, not verified");
+    case IW_SOURCE_CONFIGURATION:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "configured, not verified");
         break;
-    case IW_EVIDENCE_DOCUMENT:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "as documented, not verified");
+    case IW_SOURCE_DOCUMENT:
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "as documented, not verified");
         break;
-    case IW_EVIDENCE_NONE:
+    case IW_SOURCE_NONE:
     default:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "not documented, not verified");
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "not documented, not verified");
         break;
     }
 }
 
-const char *gw_assumption_cost(iw_ledger_item_t item) {
-    static const char *const costs[IW_LEDGER_ITEMS] = {
-        [IW_LEDGER_SETPOINT_TYPE] = "arm is refused; correct setpoint_type under [wheels]",
-        [IW_LEDGER_CURRENT_ROLE] = "arm is refused; correct current_role under [wheels]",
-        [IW_LEDGER_FORCE_UNIT_LEFT] = "no net force of the left wheel; correct force_unit under [left]",
-        [IW_LEDGER_FORCE_UNIT_RIGHT] = "no net force of the right wheel; correct force_unit under [right]",
-        [IW_LEDGER_OFFSET_INCLUDED] = "no net force until both wheels are unloaded and tared: iwheelctl tare",
-        [IW_LEDGER_FEEDBACK_SIGN_LEFT] =
+const char *inspect_assumption_cost(iw_assumption_item_t item) {
+    static const char *const costs[IW_ASSUMPTION_ITEMS] = {
+        [IW_ASSUMPTION_SETPOINT_TYPE] = "arm is refused; correct setpoint_type under [wheels]",
+        [IW_ASSUMPTION_CURRENT_ROLE] = "arm is refused; correct current_role under [wheels]",
+        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = "no net force of the left wheel; correct force_unit under [left]",
+        [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = "no net force of the right wheel; correct force_unit under [right]",
+        [IW_ASSUMPTION_OFFSET_INCLUDED] = "no net force until both wheels are unloaded and tared: iwheelctl tare",
+        [IW_ASSUMPTION_FEEDBACK_SIGN_LEFT] =
             "arm is refused; see why the left wheel turned against its command, then: iwheelctl confirm "
             "feedback_sign_left",
-        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] =
+        [IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT] =
             "arm is refused; see why the right wheel turned against its command, then: iwheelctl confirm "
             "feedback_sign_right",
-        [IW_LEDGER_MOUNT_SIGN_LEFT] = "arm is refused; correct invert under [left]",
-        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "arm is refused; correct invert under [right]",
-        [IW_LEDGER_WHEEL_RADIUS] = "no speed in mm/s and no distance; correct radius_mm under [wheels]",
-        [IW_LEDGER_TRACK] = "no twist but straight ahead; correct track_mm under [wheels], or send drive",
-        [IW_LEDGER_GEAR_RATIO] = "no distance, and no speed in mm/s if the rpm are the rotor's; correct gear_ratio or "
-                                 "rpm_of under [wheels]",
-        [IW_LEDGER_POSE_BYTE_ORDER] = "no pose; this version reads it most significant byte first only",
-        [IW_LEDGER_DLC] = "nothing: longer frames are read, shorter ones are ignored and counted as bad_length",
+        [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "arm is refused; correct invert under [left]",
+        [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "arm is refused; correct invert under [right]",
+        [IW_ASSUMPTION_WHEEL_RADIUS] = "no speed in mm/s and no distance; correct radius_mm under [wheels]",
+        [IW_ASSUMPTION_TRACK] = "no twist but straight ahead; correct track_mm under [wheels], or send drive",
+        [IW_ASSUMPTION_GEAR_RATIO] =
+            "no distance, and no speed in mm/s if the rpm are the rotor's; correct gear_ratio or "
+            "rpm_of under [wheels]",
+        [IW_ASSUMPTION_POSE_BYTE_ORDER] = "no pose; this version reads it most significant byte first only",
+        [IW_ASSUMPTION_DLC] = "nothing: longer frames are read, shorter ones are ignored and counted as bad_length",
     };
-    return ((unsigned)item < IW_LEDGER_ITEMS) ? costs[item] : "unknown";
+    return ((unsigned)item < IW_ASSUMPTION_ITEMS) ? costs[item] : "unknown";
 }
 
-const char *gw_assumption_cure(iw_ledger_item_t item) {
-    static const char *const cures[IW_LEDGER_ITEMS] = {
-        [IW_LEDGER_SETPOINT_TYPE] =
+const char *inspect_assumption_cure(iw_assumption_item_t item) {
+    static const char *const cures[IW_ASSUMPTION_ITEMS] = {
+        [IW_ASSUMPTION_SETPOINT_TYPE] =
             "correct setpoint_type under [wheels] (iwheelctl bringup finds it), then: systemctl "
             "restart iwheel-gateway",
-        [IW_LEDGER_CURRENT_ROLE] = "correct current_role under [wheels], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_FORCE_UNIT_LEFT] = "correct force_unit under [left], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_FORCE_UNIT_RIGHT] = "correct force_unit under [right], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_OFFSET_INCLUDED] = "unload both wheels, then: iwheelctl tare",
-        [IW_LEDGER_FEEDBACK_SIGN_LEFT] =
+        [IW_ASSUMPTION_CURRENT_ROLE] = "correct current_role under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = "correct force_unit under [left], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = "correct force_unit under [right], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_OFFSET_INCLUDED] = "unload both wheels, then: iwheelctl tare",
+        [IW_ASSUMPTION_FEEDBACK_SIGN_LEFT] =
             "see why the left wheel turned against its command, then: iwheelctl confirm feedback_sign_left",
-        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] =
+        [IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT] =
             "see why the right wheel turned against its command, then: iwheelctl confirm feedback_sign_right",
-        [IW_LEDGER_MOUNT_SIGN_LEFT] = "correct invert under [left], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "correct invert under [right], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_WHEEL_RADIUS] = "correct radius_mm under [wheels], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_TRACK] = "correct track_mm under [wheels] (iwheelctl bringup measures it), then: systemctl restart "
-                            "iwheel-gateway",
-        [IW_LEDGER_GEAR_RATIO] = "correct gear_ratio or rpm_of under [wheels], then: systemctl restart iwheel-gateway",
-        [IW_LEDGER_POSE_BYTE_ORDER] =
+        [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "correct invert under [left], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "correct invert under [right], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_WHEEL_RADIUS] = "correct radius_mm under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_TRACK] =
+            "correct track_mm under [wheels] (iwheelctl bringup measures it), then: systemctl restart "
+            "iwheel-gateway",
+        [IW_ASSUMPTION_GEAR_RATIO] =
+            "correct gear_ratio or rpm_of under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_ASSUMPTION_POSE_BYTE_ORDER] =
             "the pose is lost, all else works; send us a recording (iwheelctl record), and if "
             "it came from another device: iwheelctl confirm pose_byte_order",
-        [IW_LEDGER_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
-                          "it is gone: iwheelctl confirm dlc",
+        [IW_ASSUMPTION_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
+                              "it is gone: iwheelctl confirm dlc",
     };
-    const char *cure = ((unsigned)item < IW_LEDGER_ITEMS) ? cures[item] : NULL;
+    const char *cure = ((unsigned)item < IW_ASSUMPTION_ITEMS) ? cures[item] : NULL;
     return (cure != NULL) ? cure
                           : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
 }

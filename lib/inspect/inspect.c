@@ -83,7 +83,7 @@ static void note_stranger(inspect_heard_t *self, uint32_t id) {
 
 void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
     iw_codec_wheel_t told[IW_SIDES];
-    self->bits += iw_bus_frame_bits(frame);
+    self->bits += iwl_bus_frame_bits(frame);
     if (frame->kind == (uint8_t)IW_CAN_ECHO) {
         return;
     }
@@ -103,33 +103,33 @@ void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
     }
 }
 
-static void look(iw_linux_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_heard_t *heard) {
+static void look(iwl_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_heard_t *heard) {
     iw_can_frame_t frame;
-    iw_linux_hal_tend(hal, now_us);
-    const iw_bus_state_t state = iw_bus_state(&hal->bus);
+    iwl_hal_poll(hal, now_us);
+    const iw_bus_state_t state = iwl_bus_state(&hal->bus);
     heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
     if (state < heard->worst) {
         heard->worst = state;
     }
     heard->last = state;
-    heard->estop = iw_linux_hal_pressed(hal);
-    while (iw_bus_receive(&hal->bus, &frame) > 0) {
+    heard->estop = iwl_hal_pressed(hal);
+    while (iwl_bus_receive(&hal->bus, &frame) > 0) {
         if (counting) {
             inspect_heard_take(heard, &frame);
         }
     }
 }
 
-void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard) {
+void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard) {
     inspect_heard_begin(out_heard);
-    struct pollfd wait = {.fd = iw_linux_hal_bus_fd(hal), .events = POLLIN};
-    look(hal, iw_clock_now_us(), false, out_heard); // What waited since the bus was opened has no time.
-    const iw_time_us_t begin_us = iw_clock_now_us();
-    for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iw_clock_now_us()) {
+    struct pollfd wait = {.fd = iwl_hal_bus_fd(hal), .events = POLLIN};
+    look(hal, iwl_clock_now_us(), false, out_heard); // What waited since the bus was opened has no time.
+    const iw_time_us_t begin_us = iwl_clock_now_us();
+    for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iwl_clock_now_us()) {
         look(hal, now_us, true, out_heard);
         (void)poll(&wait, 1, LOOK_MS);
     }
-    out_heard->span_us = iw_clock_now_us() - begin_us;
+    out_heard->span_us = iwl_clock_now_us() - begin_us;
 }
 
 uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message) {

@@ -88,7 +88,7 @@ void inspect_heard_begin(inspect_heard_t *self);
 void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame);
 
 /// Listens for so long; blocks. The HAL must be open.
-void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard);
+void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard);
 
 /// Frames per 1000 s of the message with that index.
 uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message);
@@ -108,16 +108,16 @@ typedef struct {
     uint16_t sample_point_permille;
     bool refuses;         ///< A wrong timing is a failure, not only a warning.
     bool others_may_send; ///< A gateway runs on this bus: setpoints on it may be its own, and it judges the others.
-} inspect_wish_t;
+} inspect_config_t;
 
 /// Presence, mode, bit timing, queue, restart-ms, echo. Nothing for the local bus.
-void inspect_link(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings);
+void inspect_link(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings);
 
 /// Room for frames that wait to be taken. Nothing where it is not known.
-void inspect_room(const iw_bus_link_t *link, inspect_findings_t *findings);
+void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings);
 
 /// Whether the bus lives, both wheels and the rate of each id, load, unknown ids, damaged frames, other masters.
-void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
+void inspect_bus(const iwl_bus_link_t *link, const inspect_heard_t *heard, const inspect_config_t *config,
                  inspect_findings_t *findings);
 
 /// What is known of the e-stop.
@@ -133,19 +133,19 @@ typedef struct {
 } inspect_estop_t;
 
 /// The same from an open HAL, as last asked.
-inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line);
+inspect_estop_t inspect_estop_of(const iwl_hal_t *hal, const char *line);
 
 /// Of two contacts the one that does not say released: "neither", "line", "line2" or "both".
-const char *inspect_pressed_at(const iw_linux_hal_t *hal);
+const char *inspect_pressed_at(const iwl_hal_t *hal);
 
 /// The e-stop's level.
 void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings);
 
 /// Why the e-stop cannot be read, and what to do about it; empty while it can.
-const char *inspect_estop_trouble(const iw_linux_hal_t *hal);
+const char *inspect_estop_trouble(const iwl_hal_t *hal);
 
-/// A bus or an e-stop that cannot be opened at all: `error` of iw_linux_hal_open.
-void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findings_t *findings);
+/// A bus or an e-stop that cannot be opened at all: `error` of iwl_hal_open.
+void inspect_unopened(const char *cause, bool is_bus, int error, inspect_findings_t *findings);
 
 /// What could be opened.
 typedef struct {
@@ -155,7 +155,7 @@ typedef struct {
 } inspect_opened_t;
 
 /// Opens bus and e-stop to look at them. What cannot be opened is told as a finding, and the other one is opened all the same.
-inspect_opened_t inspect_open(iw_linux_hal_t *hal, const char *bus, const iw_estop_wish_t *line,
+inspect_opened_t inspect_open(iwl_hal_t *hal, const char *bus, const iwl_estop_config_t *line,
                               inspect_findings_t *findings);
 
 #endif

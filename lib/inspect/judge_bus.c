@@ -92,17 +92,18 @@ static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_fi
     }
 }
 
-static void judge_others(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
+static void judge_others(const inspect_heard_t *heard, const inspect_config_t *config, inspect_findings_t *findings) {
     const uint32_t setpoints =
         heard->count[inspect_message_of(IW_ID_LEFT_SETPOINT)] + heard->count[inspect_message_of(IW_ID_RIGHT_SETPOINT)];
-    if (setpoints > 0U && !wish->others_may_send) {
+    if (setpoints > 0U && !config->others_may_send) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
                     "somebody sends setpoints: %" PRIu32 " frames with id 266 (0x10A) or 298 (0x12A)", setpoints);
         inspect_cure(findings, "switch it off, or stop the gateway that does");
     }
 }
 
-static void judge_strangers(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
+static void judge_strangers(const inspect_heard_t *heard, const inspect_config_t *config,
+                            inspect_findings_t *findings) {
     char list[160] = "";
     if (heard->strange == 0U) {
         return;
@@ -118,7 +119,7 @@ static void judge_strangers(const inspect_heard_t *heard, const inspect_wish_t *
     inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames are none of the wheels': %s%s",
                 heard->strange, list, (heard->strange_ids == INSPECT_STRANGERS) ? " ..." : "");
     inspect_cure(findings, "find out who sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
-                 wish->name);
+                 config->name);
 }
 
 static void judge_damage(const inspect_heard_t *heard, inspect_findings_t *findings) {
@@ -136,8 +137,8 @@ static void judge_damage(const inspect_heard_t *heard, inspect_findings_t *findi
     }
 }
 
-static void judge_load(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    const uint32_t load = inspect_load_permille(heard, wish->bitrate_hz);
+static void judge_load(const inspect_heard_t *heard, const inspect_config_t *config, inspect_findings_t *findings) {
+    const uint32_t load = inspect_load_permille(heard, config->bitrate_hz);
     const bool high = load > LOAD_HIGH_PERMILLE;
     inspect_say(findings, "load", high ? INSPECT_WARN : INSPECT_OK,
                 "bus load: %" PRIu32 ".%" PRIu32 " %% without stuff bits; both wheels alone make about 6 %%",
@@ -148,10 +149,10 @@ static void judge_load(const inspect_heard_t *heard, const inspect_wish_t *wish,
 }
 
 /// The controller has left the bus: what it does not hear says nothing about wheels and cables.
-static void say_bus_off(const iw_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
+static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
     inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off: too many errors, it takes no part any more",
                 bus);
-    if (link->presence == IW_LINK_LOCAL) {
+    if (link->presence == IWL_LINK_LOCAL) {
         inspect_cure(findings, "end it in the simulator: iwheel-sim busoff off");
     } else {
         inspect_cure(findings, "check cable, termination and bit rate, then: ip link set %s down; ip link set %s up",
@@ -160,13 +161,13 @@ static void say_bus_off(const iw_bus_link_t *link, const char *bus, inspect_find
 }
 
 /// False if nothing more can be said of the bus.
-static bool judge_life(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
+static bool judge_life(const iwl_bus_link_t *link, const inspect_heard_t *heard, const inspect_config_t *config,
                        inspect_findings_t *findings) {
-    const char *bus = wish->name;
-    const bool off = heard->last == IW_BUS_OFF || (!heard->was_up && link->presence == IW_LINK_UP);
-    if (link->presence == IW_LINK_LOCAL && (heard->was_up || off)) {
+    const char *bus = config->name;
+    const bool off = heard->last == IW_BUS_OFF || (!heard->was_up && link->presence == IWL_LINK_UP);
+    if (link->presence == IWL_LINK_LOCAL && (heard->was_up || off)) {
         inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
-    } else if (link->presence == IW_LINK_LOCAL) {
+    } else if (link->presence == IWL_LINK_LOCAL) {
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: nobody there", bus);
         inspect_cure(findings, "start the simulator: iwheel-sim --can %s", bus);
     }
@@ -182,15 +183,15 @@ static bool judge_life(const iw_bus_link_t *link, const inspect_heard_t *heard, 
     return heard->was_up && !off;
 }
 
-void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
+void inspect_bus(const iwl_bus_link_t *link, const inspect_heard_t *heard, const inspect_config_t *config,
                  inspect_findings_t *findings) {
-    if (!judge_life(link, heard, wish, findings)) {
+    if (!judge_life(link, heard, config, findings)) {
         return;
     }
     judge_wheel(heard, IW_LEFT, findings);
     judge_wheel(heard, IW_RIGHT, findings);
-    judge_load(heard, wish, findings);
-    judge_others(heard, wish, findings);
-    judge_strangers(heard, wish, findings);
+    judge_load(heard, config, findings);
+    judge_others(heard, config, findings);
+    judge_strangers(heard, config, findings);
     judge_damage(heard, findings);
 }

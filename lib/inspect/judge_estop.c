@@ -15,9 +15,9 @@ static bool has_gpio(void) {
     return any;
 }
 
-const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
-    const int first = iw_linux_hal_estop_trouble(hal, 0);
-    const int trouble = (first != 0) ? first : iw_linux_hal_estop_trouble(hal, 1);
+const char *inspect_estop_trouble(const iwl_hal_t *hal) {
+    const int first = iwl_hal_estop_trouble(hal, 0);
+    const int trouble = (first != 0) ? first : iwl_hal_estop_trouble(hal, 1);
     if (trouble == 0) {
         return "";
     }
@@ -47,13 +47,13 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
     }
 }
 
-const char *inspect_pressed_at(const iw_linux_hal_t *hal) {
+const char *inspect_pressed_at(const iwl_hal_t *hal) {
     static const char *const names[] = {"neither", "line", "line2", "both"};
     const unsigned first = (hal->contact_last[0] != 0) ? 1U : 0U;
     return names[first + ((hal->contact_last[1] != 0) ? 2U : 0U)];
 }
 
-inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line) {
+inspect_estop_t inspect_estop_of(const iwl_hal_t *hal, const char *line) {
     return (inspect_estop_t){
         .line = line,
         .pressed_at = hal->two_contacts ? inspect_pressed_at(hal) : NULL,
@@ -89,40 +89,40 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
     }
 }
 
-void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findings_t *findings) {
+void inspect_unopened(const char *cause, bool is_bus, int error, inspect_findings_t *findings) {
     const char *check = is_bus ? "interface" : "estop";
     const char *what = is_bus ? "bus" : "e-stop";
     if (error == ENOTSUP) {
         inspect_say(findings, check, findings->absent,
-                    "%s %s: %s was missing when this was built, so it %s only (unix:PATH)", what, culprit,
+                    "%s %s: %s was missing when this was built, so it %s only (unix:PATH)", what, cause,
                     is_bus ? "libmnl" : "libgpiod",
                     is_bus ? "serves the simulator's bus" : "reads the simulator's button");
         inspect_cure(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
     } else if (error == ENOTUNIQ && !is_bus) {
         inspect_say(findings, check, INSPECT_FAIL,
                     "e-stop %s: [estop] line and line2 are the same line, which shows nothing of a second contact",
-                    culprit);
+                    cause);
         inspect_cure(findings, "write the line of the other contact as line2 (gpioinfo lists them), or line2 = none");
     } else if (error == EAFNOSUPPORT && is_bus) {
-        inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", culprit);
+        inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", cause);
         inspect_cure(findings, "modprobe can_raw, or use the simulator's bus: --can unix:PATH");
     } else {
-        inspect_say(findings, check, INSPECT_FAIL, "%s %s: %s", what, culprit, strerror(error));
+        inspect_say(findings, check, INSPECT_FAIL, "%s %s: %s", what, cause, strerror(error));
         inspect_cure(findings, "correct %s", is_bus ? "[bus] interface or --can" : "[estop] line or --estop");
     }
 }
 
-inspect_opened_t inspect_open(iw_linux_hal_t *hal, const char *bus, const iw_estop_wish_t *line,
+inspect_opened_t inspect_open(iwl_hal_t *hal, const char *bus, const iwl_estop_config_t *line,
                               inspect_findings_t *findings) {
-    const iw_estop_wish_t none = {.name = "none"};
+    const iwl_estop_config_t none = {.name = "none"};
     inspect_opened_t opened = {.bus = true, .estop = true};
-    const char *culprit = NULL;
-    int error = iw_linux_hal_open(hal, bus, line, &culprit);
+    const char *cause = NULL;
+    int error = iwl_hal_open(hal, bus, line, &cause);
     for (unsigned i = 0; i < 2U && error != 0; i++) {
-        opened.bus = opened.bus && culprit != bus;
-        opened.estop = opened.estop && culprit == bus;
-        inspect_unopened(culprit, culprit == bus, error, findings);
-        error = iw_linux_hal_open(hal, opened.bus ? bus : NO_BUS, opened.estop ? line : &none, &culprit);
+        opened.bus = opened.bus && cause != bus;
+        opened.estop = opened.estop && cause == bus;
+        inspect_unopened(cause, cause == bus, error, findings);
+        error = iwl_hal_open(hal, opened.bus ? bus : NO_BUS, opened.estop ? line : &none, &cause);
     }
     opened.hal = error == 0;
     return opened;

@@ -8,32 +8,32 @@
 #define BYTES_PER_MS 16384U
 
 /// The commands that set an interface as the wheels need it.
-static void cure_timing(const inspect_wish_t *wish, inspect_findings_t *findings) {
-    const char *bus = wish->name;
+static void cure_timing(const inspect_config_t *config, inspect_findings_t *findings) {
+    const char *bus = config->name;
     inspect_cure(findings,
                  "set it: ip link set %s down; ip link set %s type can bitrate %" PRIu32
                  " sample-point 0.%03u restart-ms 100; ip link set %s txqueuelen %u; ip link set %s up",
-                 bus, bus, wish->bitrate_hz, wish->sample_point_permille, bus, IW_LINK_QUEUE_MAX, bus);
+                 bus, bus, config->bitrate_hz, config->sample_point_permille, bus, IWL_LINK_QUEUE_MAX, bus);
 }
 
-static void judge_presence(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    const char *bus = wish->name;
+static void judge_presence(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    const char *bus = config->name;
     switch (link->presence) {
-    case IW_LINK_ABSENT:
+    case IWL_LINK_ABSENT:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: there is no such interface", bus);
         inspect_cure(findings, "plug the adapter in, or name the right one in [bus] interface: ip -brief link show "
                                "type can");
         break;
-    case IW_LINK_NOT_CAN:
+    case IWL_LINK_NOT_CAN:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: not a CAN interface", bus);
         inspect_cure(findings, "name the right one in [bus] interface: ip -brief link show type can");
         break;
-    case IW_LINK_DOWN:
+    case IWL_LINK_DOWN:
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: the interface is down", bus);
         if (link->is_virtual) {
             inspect_cure(findings, "ip link set %s up", bus);
         } else {
-            cure_timing(wish, findings);
+            cure_timing(config, findings);
         }
         break;
     default:
@@ -42,8 +42,8 @@ static void judge_presence(const iw_bus_link_t *link, const inspect_wish_t *wish
     }
 }
 
-static void judge_mode(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    const char *bus = wish->name;
+static void judge_mode(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    const char *bus = config->name;
     if (link->is_mute) {
         inspect_say(findings, "mode", INSPECT_FAIL, "%s is in listen-only mode and cannot send", bus);
         inspect_cure(findings, "ip link set %s down; ip link set %s type can listen-only off; ip link set %s up", bus,
@@ -51,15 +51,15 @@ static void judge_mode(const iw_bus_link_t *link, const inspect_wish_t *wish, in
     }
 }
 
-static void judge_timing(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+static void judge_timing(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
     static const inspect_verdict_t verdicts[] = {
-        [IW_TIMING_VIRTUAL] = INSPECT_OK, [IW_TIMING_UNKNOWN] = INSPECT_WARN, [IW_TIMING_RIGHT] = INSPECT_OK,
-        [IW_TIMING_NEAR] = INSPECT_WARN,  [IW_TIMING_WRONG] = INSPECT_FAIL,
+        [IWL_TIMING_VIRTUAL] = INSPECT_OK, [IWL_TIMING_UNKNOWN] = INSPECT_WARN, [IWL_TIMING_RIGHT] = INSPECT_OK,
+        [IWL_TIMING_NEAR] = INSPECT_WARN,  [IWL_TIMING_WRONG] = INSPECT_FAIL,
     };
-    const iw_timing_t timing = iw_timing_judge(link, wish->bitrate_hz, wish->sample_point_permille);
+    const iwl_timing_t timing = iwl_timing_judge(link, config->bitrate_hz, config->sample_point_permille);
     char bitrate[24] = "--";
     char sample_point[24] = "--";
-    if (timing == IW_TIMING_VIRTUAL || link->presence < IW_LINK_DOWN) {
+    if (timing == IWL_TIMING_VIRTUAL || link->presence < IWL_LINK_DOWN) {
         return;
     }
     if (link->bitrate_hz != 0U) {
@@ -69,27 +69,28 @@ static void judge_timing(const iw_bus_link_t *link, const inspect_wish_t *wish, 
         (void)snprintf(sample_point, sizeof sample_point, "%u.%u %%", link->sample_point_permille / 10U,
                        link->sample_point_permille % 10U);
     }
-    inspect_say(findings, "bit_timing", (timing == IW_TIMING_WRONG && !wish->refuses) ? INSPECT_WARN : verdicts[timing],
+    inspect_say(findings, "bit_timing",
+                (timing == IWL_TIMING_WRONG && !config->refuses) ? INSPECT_WARN : verdicts[timing],
                 "bit timing: %s, sample point %s; wanted %" PRIu32 " bit/s, %u.%u %%", bitrate, sample_point,
-                wish->bitrate_hz, wish->sample_point_permille / 10U, wish->sample_point_permille % 10U);
-    if (timing != IW_TIMING_RIGHT) {
-        cure_timing(wish, findings);
+                config->bitrate_hz, config->sample_point_permille / 10U, config->sample_point_permille % 10U);
+    if (timing != IWL_TIMING_RIGHT) {
+        cure_timing(config, findings);
     }
 }
 
-static void judge_queue(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    if (link->presence < IW_LINK_DOWN || link->is_virtual || link->queue_length <= IW_LINK_QUEUE_MAX) {
+static void judge_queue(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    if (link->presence < IWL_LINK_DOWN || link->is_virtual || link->queue_length <= IWL_LINK_QUEUE_MAX) {
         return;
     }
     inspect_say(findings, "queue", INSPECT_WARN,
-                "queue of %s: %" PRIu32 " frames may wait in it, and be old when a dead bus revives", wish->name,
+                "queue of %s: %" PRIu32 " frames may wait in it, and be old when a dead bus revives", config->name,
                 link->queue_length);
-    inspect_cure(findings, "ip link set %s txqueuelen %u", wish->name, IW_LINK_QUEUE_MAX);
+    inspect_cure(findings, "ip link set %s txqueuelen %u", config->name, IWL_LINK_QUEUE_MAX);
 }
 
-static void judge_restart(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    const char *bus = wish->name;
-    if (link->presence < IW_LINK_DOWN || link->is_virtual || link->restart_ms != 0U) {
+static void judge_restart(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    const char *bus = config->name;
+    if (link->presence < IWL_LINK_DOWN || link->is_virtual || link->restart_ms != 0U) {
         return;
     }
     inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until somebody restarts it", bus);
@@ -97,37 +98,37 @@ static void judge_restart(const iw_bus_link_t *link, const inspect_wish_t *wish,
                  bus);
 }
 
-static void judge_echo(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    if (link->presence == IW_LINK_ABSENT || link->presence == IW_LINK_NOT_CAN || link->echo_proven) {
+static void judge_echo(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    if (link->presence == IWL_LINK_ABSENT || link->presence == IWL_LINK_NOT_CAN || link->echo_proven) {
         return;
     }
     inspect_say(findings, "echo", INSPECT_WARN,
-                "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", wish->name);
+                "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", config->name);
     inspect_cure(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
 }
 
-void inspect_room(const iw_bus_link_t *link, inspect_findings_t *findings) {
-    if (link->presence != IW_LINK_UP || link->room_bytes == 0U) {
+void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
+    if (link->presence != IWL_LINK_UP || link->room_bytes == 0U) {
         return;
     }
-    const bool granted = link->room_bytes >= 2U * IW_LINK_ROOM_BYTES;
+    const bool granted = link->room_bytes >= 2U * IWL_LINK_ROOM_BYTES;
     inspect_say(findings, "room", granted ? INSPECT_OK : INSPECT_WARN,
                 "room for frames: %" PRIu32 " of %u KiB granted, %" PRIu32 " ms of a full bus%s",
-                link->room_bytes / 2U / 1024U, IW_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
+                link->room_bytes / 2U / 1024U, IWL_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
                 granted ? "" : "; when others have the processor for longer, frames get lost");
     if (!granted) {
-        inspect_cure(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IW_LINK_ROOM_BYTES);
+        inspect_cure(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IWL_LINK_ROOM_BYTES);
     }
 }
 
-void inspect_link(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
-    if (link->presence == IW_LINK_LOCAL) {
+void inspect_link(const iwl_bus_link_t *link, const inspect_config_t *config, inspect_findings_t *findings) {
+    if (link->presence == IWL_LINK_LOCAL) {
         return;
     }
-    judge_presence(link, wish, findings);
-    judge_mode(link, wish, findings);
-    judge_timing(link, wish, findings);
-    judge_queue(link, wish, findings);
-    judge_restart(link, wish, findings);
-    judge_echo(link, wish, findings);
+    judge_presence(link, config, findings);
+    judge_mode(link, config, findings);
+    judge_timing(link, config, findings);
+    judge_queue(link, config, findings);
+    judge_restart(link, config, findings);
+    judge_echo(link, config, findings);
 }

@@ -29,8 +29,8 @@ typedef enum {
     BLACKBOX_RELEASE,   ///< b: iw_refusal_t.
     BLACKBOX_GONE,      ///< A client's connection ended. number: client.
     BLACKBOX_TARE,      ///< a: iw_side_t; b: iw_tare_t.
-    BLACKBOX_LEDGER, ///< Told of an assumption. a: item; b: iw_ledger_state_t; number: iw_evidence_t; as.value: figure.
-    BLACKBOX_STATE,  ///< Decided: a: state now; b: before. number: who holds the lease; as.drive: applied.
+    BLACKBOX_ASSUMPTION, ///< Told of an assumption. a: item; b: iw_assumption_state_t; number: iw_source_t; as.value: figure.
+    BLACKBOX_STATE,   ///< Decided: a: state now; b: before. number: who holds the lease; as.drive: applied.
     BLACKBOX_STOPPED, ///< Decided: number: of the stop; a: iw_cause_t; b: sides; as.value: detail.
     BLACKBOX_KINDS,
 } blackbox_kind_t;

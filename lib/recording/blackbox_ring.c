@@ -218,7 +218,7 @@ static const char *const names[BLACKBOX_KINDS] = {
     [BLACKBOX_RELEASE] = "release",
     [BLACKBOX_GONE] = "gone",
     [BLACKBOX_TARE] = "tare",
-    [BLACKBOX_LEDGER] = "ledger",
+    [BLACKBOX_ASSUMPTION] = "ledger",
     [BLACKBOX_STATE] = "state",
     [BLACKBOX_STOPPED] = "stopped",
 };

@@ -15,17 +15,18 @@
 
 #define BACKLOG 128
 
-static const char *option_of(const gw_listener_t *self) {
-    return (self->wish.right == GW_DRIVE) ? "--socket" : "--watch-socket";
+static const char *option_of(const sock_listener_t *self) {
+    return (self->config.right == SOCK_DRIVE) ? "--socket" : "--watch-socket";
 }
 
 /// `cure` ends where the option's name belongs.
-static int complain(const gw_listener_t *self, FILE *err, const char *what, const char *cure) {
-    (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->wish.program, self->wish.path, what, cure, option_of(self));
+static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *cure) {
+    (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, cure,
+                  option_of(self));
     return EX_UNAVAILABLE;
 }
 
-static int complain_errno(const gw_listener_t *self, FILE *err, int error) {
+static int complain_errno(const sock_listener_t *self, FILE *err, int error) {
     const bool may_not = error == EACCES || error == EPERM;
     char cure[128];
     if (may_not) {
@@ -33,31 +34,34 @@ static int complain_errno(const gw_listener_t *self, FILE *err, int error) {
     } else {
         (void)snprintf(cure, sizeof cure, "%scorrect [northbound] %s in the configuration, or",
                        (error == ENOENT) ? "make its directory, or " : "",
-                       (self->wish.right == GW_DRIVE) ? "socket" : "watch_socket");
+                       (self->config.right == SOCK_DRIVE) ? "socket" : "watch_socket");
     }
     (void)complain(self, err, strerror(error), cure);
     return may_not ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-static int complain_folder(const gw_listener_t *self, FILE *err, int error) {
+static int complain_folder(const sock_listener_t *self, FILE *err, int error) {
     char cure[128];
-    (void)snprintf(cure, sizeof cure, "%s, or choose another with", gw_folder_cure(error));
-    (void)complain(self, err, gw_folder_fault(error), cure);
-    return (error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
+    (void)snprintf(cure, sizeof cure, "%s, or choose another with", sock_folder_cure(error));
+    (void)complain(self, err, sock_folder_fault(error), cure);
+    return (error == EACCES || error == EPERM || error >= SOCK_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FILE *err) {
-    const char *path = wish->path;
+int sock_listener_prepare(sock_listener_t *self, const sock_listener_config_t *config, FILE *err) {
+    const char *path = config->path;
     const char *slash = strrchr(path, '/');
-    char folder[GW_PATH_SIZE];
-    *self = (gw_listener_t){
-        .wish = *wish, .fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
+    char folder[SOCK_PATH_SIZE];
+    *self = (sock_listener_t){.config = *config,
+                              .fd = -1,
+                              .reserve_fd = -1,
+                              .owners = sock_owners_of(SOCK_RUNTIME_DIRECTORY),
+                              .folder = {.fd = -1}};
     (void)snprintf(self->name, sizeof self->name, "%s", (slash == NULL) ? path : slash + 1);
-    gw_folder_of(path, folder, sizeof folder);
+    sock_folder_of(path, folder, sizeof folder);
     if (mkdir(folder, 0755) != 0 && errno != EEXIST) {
         return complain_errno(self, err, errno);
     }
-    const int error = gw_folder_open(&self->folder, folder, &self->owners);
+    const int error = sock_folder_open(&self->folder, folder, &self->owners);
     if (error != 0) {
         return complain_folder(self, err, error);
     }
@@ -65,7 +69,7 @@ int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FIL
         (void)fprintf(err,
                       "%s: warning: socket %s: while no gateway runs, anybody can put another socket there "
                       "and answer for it; for more than a trial choose a directory of its own with %s\n",
-                      wish->program, path, option_of(self));
+                      config->program, path, option_of(self));
     }
     return 0;
 }
@@ -74,7 +78,7 @@ int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FIL
 
 /// A socket's address has no "relative to a descriptor": the process stands in the folder meanwhile. The descriptor leads
 /// back; -1: from a place that we may not even look at.
-static bool enter(const gw_listener_t *self, int *out_back) {
+static bool enter(const sock_listener_t *self, int *out_back) {
     *out_back = open(".", O_PATH | O_DIRECTORY | O_CLOEXEC);
     return fchdir(self->folder.fd) == 0;
 }
@@ -96,7 +100,7 @@ static bool somebody_answers(const struct sockaddr_un *address) {
     return answered;
 }
 
-static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
+static int remove_name(const sock_listener_t *self, bool stranger, FILE *err) {
     if (unlinkat(self->folder.fd, self->name, 0) == 0 || errno == ENOENT) {
         return 0;
     }
@@ -109,7 +113,7 @@ static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
 }
 
 /// Reads what has the name of the socket; `st_mode` 0: nothing. A link and a file are refused.
-static int read_name(const gw_listener_t *self, struct stat *out_status, FILE *err) {
+static int read_name(const sock_listener_t *self, struct stat *out_status, FILE *err) {
     *out_status = (struct stat){.st_mode = 0};
     if (fstatat(self->folder.fd, self->name, out_status, AT_SYMLINK_NOFOLLOW) != 0) {
         return (errno == ENOENT) ? 0 : complain_errno(self, err, errno);
@@ -123,19 +127,19 @@ static int read_name(const gw_listener_t *self, struct stat *out_status, FILE *e
                                                     "remove it, or choose another path with");
 }
 
-int gw_listener_judge(const gw_listener_t *self, FILE *err) {
+int sock_listener_judge(const sock_listener_t *self, FILE *err) {
     struct stat status;
     return read_name(self, &status, err);
 }
 
 /// Makes the name free, if it is safe to.
-static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
+static int clear_name(const sock_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     struct stat status;
     const int result = read_name(self, &status, err);
     if (result != 0 || status.st_mode == 0U) {
         return result;
     }
-    const bool stranger = !gw_owners_have(&self->owners, status.st_uid);
+    const bool stranger = !sock_owners_have(&self->owners, status.st_uid);
     if (!stranger && somebody_answers(address)) {
         return complain(self, err, "another program answers on it", "stop that one, or choose another path with");
     }
@@ -143,7 +147,7 @@ static int clear_name(const gw_listener_t *self, const struct sockaddr_un *addre
 }
 
 /// Nobody but us can have put it there; if somebody has, it is not served.
-static int verify(gw_listener_t *self, FILE *err) {
+static int verify(sock_listener_t *self, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
         return complain_errno(self, err, errno);
@@ -154,26 +158,27 @@ static int verify(gw_listener_t *self, FILE *err) {
     }
     self->device = status.st_dev;
     self->inode = status.st_ino;
-    const bool right = (status.st_mode & 0777U) == self->wish.mode; // Not so where the folder has access control lists.
-    return (right || fchmodat(self->folder.fd, self->name, self->wish.mode, AT_SYMLINK_NOFOLLOW) == 0)
+    const bool right =
+        (status.st_mode & 0777U) == self->config.mode; // Not so where the folder has access control lists.
+    return (right || fchmodat(self->folder.fd, self->name, self->config.mode, AT_SYMLINK_NOFOLLOW) == 0)
                ? 0
                : complain_errno(self, err, errno);
 }
 
 /// Has its mode from the first moment; nobody is let in before it listens.
-static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
+static int bind_socket(sock_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (self->fd < 0) {
         return complain_errno(self, err, errno);
     }
-    const mode_t before = umask(~self->wish.mode & 0777U);
+    const mode_t before = umask(~self->config.mode & 0777U);
     const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
     const int error = errno;
     (void)umask(before);
     return (result == 0) ? verify(self, err) : complain_errno(self, err, error);
 }
 
-static int make_socket(gw_listener_t *self, FILE *err) {
+static int make_socket(sock_listener_t *self, FILE *err) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
     int back;
@@ -185,8 +190,8 @@ static int make_socket(gw_listener_t *self, FILE *err) {
     return result;
 }
 
-static void give_to_group(const gw_listener_t *self, gw_log_t *log) {
-    const char *name = self->wish.group;
+static void give_to_group(const sock_listener_t *self, sock_log_t *log) {
+    const char *name = self->config.group;
     if (strcmp(name, "none") == 0) {
         return;
     }
@@ -197,29 +202,29 @@ static void give_to_group(const gw_listener_t *self, gw_log_t *log) {
         return; // As a service, which may not call chown.
     }
     if (group == NULL) {
-        gw_log(log, GW_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)", name,
-               self->wish.path, name);
+        sock_log(log, SOCK_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)",
+                 name, self->config.path, name);
     } else if (fchownat(self->folder.fd, self->name, (uid_t)-1, group->gr_gid, AT_SYMLINK_NOFOLLOW) != 0) {
-        gw_log(log, GW_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group",
-               self->wish.path, name, strerror(errno));
+        sock_log(log, SOCK_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group",
+                 self->config.path, name, strerror(errno));
     }
 }
 
 /// Takes the reserved descriptor again.
-static void restore(gw_listener_t *self) {
+static void restore(sock_listener_t *self) {
     if (self->reserve_fd < 0) {
         self->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
     }
 }
 
-int gw_listener_open(gw_listener_t *self, gw_log_t *log, FILE *err) {
+int sock_listener_open(sock_listener_t *self, sock_log_t *log, FILE *err) {
     int result = make_socket(self, err);
     if (result == 0) {
         give_to_group(self, log);
         result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(self, err, errno);
     }
     if (result != 0) {
-        gw_listener_close(self);
+        sock_listener_close(self);
         return result;
     }
     restore(self);
@@ -233,35 +238,35 @@ static void close_one(int *fd) {
     }
 }
 
-void gw_listener_close(gw_listener_t *self) {
+void sock_listener_close(sock_listener_t *self) {
     struct stat status;
     if (self->inode != 0U && fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) == 0 &&
         status.st_dev == self->device && status.st_ino == self->inode) {
         (void)unlinkat(self->folder.fd, self->name, 0);
     }
     self->inode = 0;
-    gw_folder_close(&self->folder);
+    sock_folder_close(&self->folder);
     close_one(&self->fd);
     close_one(&self->reserve_fd);
 }
 
-gw_accept_t gw_listener_accept(gw_listener_t *self, int *out_fd) {
+sock_accept_t sock_listener_accept(sock_listener_t *self, int *out_fd) {
     restore(self);
     *out_fd = accept4(self->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (*out_fd >= 0) {
-        return GW_ACCEPT_ONE;
+        return SOCK_ACCEPT_ONE;
     }
     if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) {
-        return GW_ACCEPT_NONE;
+        return SOCK_ACCEPT_NONE;
     }
     if ((errno != EMFILE && errno != ENFILE) || self->reserve_fd < 0) {
-        return GW_ACCEPT_PAUSE;
+        return SOCK_ACCEPT_PAUSE;
     }
     (void)close(self->reserve_fd);
     self->reserve_fd = -1;
     *out_fd = accept4(self->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (*out_fd >= 0) {
-        return GW_ACCEPT_CROWDED;
+        return SOCK_ACCEPT_CROWDED;
     }
-    return (errno == EAGAIN) ? GW_ACCEPT_NONE : GW_ACCEPT_PAUSE;
+    return (errno == EAGAIN) ? SOCK_ACCEPT_NONE : SOCK_ACCEPT_PAUSE;
 }

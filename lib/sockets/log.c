@@ -17,12 +17,12 @@
 #define LINE_US     200000U
 #define LINE_SIZE   1024U
 
-static const char *const level_names[GW_LOG_LEVELS] = {"error", "warning", "info", "debug"};
+static const char *const level_names[SOCK_LOG_LEVELS] = {"error", "warning", "info", "debug"};
 
-void gw_log_open(gw_log_t *self, gw_log_level_t level) {
+void sock_log_open(sock_log_t *self, sock_log_level_t level) {
     struct stat status;
-    *self =
-        (gw_log_t){.program = "iwheel-gateway", .credit_us = iw_clock_now_us(), .credit = BURST_LINES, .level = level};
+    *self = (sock_log_t){
+        .program = "iwheel-gateway", .credit_us = iwl_clock_now_us(), .credit = BURST_LINES, .level = level};
     self->socket = fstat(STDERR_FILENO, &status) == 0 && S_ISSOCK(status.st_mode);
     self->fd = open("/proc/self/fd/2", O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (self->fd < 0) {
@@ -30,7 +30,7 @@ void gw_log_open(gw_log_t *self, gw_log_level_t level) {
     }
 }
 
-void gw_log_close(gw_log_t *self) {
+void sock_log_close(sock_log_t *self) {
     if (self->fd != STDERR_FILENO) {
         (void)close(self->fd);
         self->fd = STDERR_FILENO;
@@ -38,7 +38,7 @@ void gw_log_close(gw_log_t *self) {
 }
 
 /// True if the whole line went out.
-static bool put_line(const gw_log_t *self, const char *line, size_t length) {
+static bool put_line(const sock_log_t *self, const char *line, size_t length) {
     struct pollfd ready = {.fd = self->fd, .events = POLLOUT};
     if (self->socket) {
         return send(STDERR_FILENO, line, length, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length;
@@ -47,8 +47,8 @@ static bool put_line(const gw_log_t *self, const char *line, size_t length) {
            write(self->fd, line, length) == (ssize_t)length;
 }
 
-static void earn_credit(gw_log_t *self) {
-    const iw_time_us_t now_us = iw_clock_now_us();
+static void earn_credit(sock_log_t *self) {
+    const iw_time_us_t now_us = iwl_clock_now_us();
     const uint64_t earned = (now_us - self->credit_us) / LINE_US;
     if (earned > 0U) {
         self->credit = (earned + self->credit > BURST_LINES) ? BURST_LINES : self->credit + (uint32_t)earned;
@@ -56,7 +56,7 @@ static void earn_credit(gw_log_t *self) {
     }
 }
 
-void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
+void sock_log(sock_log_t *self, sock_log_level_t level, const char *format, ...) {
     char raw[LINE_SIZE];
     char line[LINE_SIZE];
     if (level > self->level) {
@@ -83,10 +83,10 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
     self->dropped = put_line(self, line, end + 1U) ? 0U : self->dropped + 1U;
 }
 
-bool gw_log_level_of(const char *word, gw_log_level_t *out_level) {
-    for (unsigned i = 0; i < GW_LOG_LEVELS; i++) {
+bool sock_log_level_of(const char *word, sock_log_level_t *out_level) {
+    for (unsigned i = 0; i < SOCK_LOG_LEVELS; i++) {
         if (strcmp(word, level_names[i]) == 0) {
-            *out_level = (gw_log_level_t)i;
+            *out_level = (sock_log_level_t)i;
             return true;
         }
     }

@@ -9,21 +9,21 @@
 
 #define OTHERS_WRITE (S_IWGRP | S_IWOTH)
 
-gw_owners_t gw_owners_of(const char *runtime_directory) {
+sock_owners_t sock_owners_of(const char *runtime_directory) {
     struct stat status;
-    gw_owners_t self = {.own = geteuid(), .service = 0};
+    sock_owners_t self = {.own = geteuid(), .service = 0};
     if (lstat(runtime_directory, &status) == 0 && S_ISDIR(status.st_mode) && (status.st_mode & OTHERS_WRITE) == 0U) {
         self.service = status.st_uid;
     }
     return self;
 }
 
-bool gw_owners_have(const gw_owners_t *self, uid_t uid) {
+bool sock_owners_have(const sock_owners_t *self, uid_t uid) {
     return uid == 0U || uid == self->own || uid == self->service;
 }
 
-bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status) {
-    return S_ISREG(status->st_mode) && status->st_nlink == 1U && gw_owners_have(self, status->st_uid);
+bool sock_owners_wrote(const sock_owners_t *self, const struct stat *status) {
+    return S_ISREG(status->st_mode) && status->st_nlink == 1U && sock_owners_have(self, status->st_uid);
 }
 
 /// With a slash behind its name, a symbolic link would be followed.
@@ -47,64 +47,64 @@ static int open_unlinked(const char *path) {
     return fd;
 }
 
-static int judge(const struct stat *status, const gw_owners_t *owners, bool *out_shared) {
+static int judge(const struct stat *status, const sock_owners_t *owners, bool *out_shared) {
     const bool sticky = (status->st_mode & S_ISVTX) != 0U;
     *out_shared = (status->st_mode & OTHERS_WRITE) != 0U;
-    if (!gw_owners_have(owners, status->st_uid)) {
-        return GW_FOLDER_FOREIGN;
+    if (!sock_owners_have(owners, status->st_uid)) {
+        return SOCK_FOLDER_FOREIGN;
     }
-    return (*out_shared && !sticky) ? GW_FOLDER_SHARED : 0;
+    return (*out_shared && !sticky) ? SOCK_FOLDER_SHARED : 0;
 }
 
-int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owners) {
+int sock_folder_open(sock_folder_t *self, const char *path, const sock_owners_t *owners) {
     struct stat status;
-    *self = (gw_folder_t){.fd = open_unlinked(path)};
+    *self = (sock_folder_t){.fd = open_unlinked(path)};
     if (self->fd < 0) {
         return errno;
     }
     const int error = (fstat(self->fd, &status) != 0) ? errno : judge(&status, owners, &self->shared);
     if (error != 0) {
-        gw_folder_close(self);
+        sock_folder_close(self);
     }
     return error;
 }
 
-void gw_folder_close(gw_folder_t *self) {
+void sock_folder_close(sock_folder_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
         self->fd = -1;
     }
 }
 
-int gw_folder_open_own(const char *path) {
-    const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
-    gw_folder_t folder;
-    int error = gw_folder_open(&folder, path, &owners);
+int sock_folder_open_own(const char *path) {
+    const sock_owners_t owners = sock_owners_of(SOCK_RUNTIME_DIRECTORY);
+    sock_folder_t folder;
+    int error = sock_folder_open(&folder, path, &owners);
     if (error == 0 && folder.shared) {
-        error = GW_FOLDER_SHARED;
+        error = SOCK_FOLDER_SHARED;
     }
     const int fd = (error == 0) ? openat(folder.fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (error == 0 && fd < 0) {
         error = errno;
     }
-    gw_folder_close(&folder);
+    sock_folder_close(&folder);
     errno = error;
     return fd;
 }
 
-void gw_folder_of(const char *path, char *out_folder, size_t size) {
+void sock_folder_of(const char *path, char *out_folder, size_t size) {
     const char *slash = strrchr(path, '/');
     const int length = (slash == NULL || slash == path) ? 1 : (int)(slash - path);
     (void)snprintf(out_folder, size, "%.*s", length, (slash == NULL) ? "." : path);
 }
 
-const char *gw_folder_fault(int error) {
+const char *sock_folder_fault(int error) {
     switch (error) {
-    case GW_FOLDER_FOREIGN:
+    case SOCK_FOLDER_FOREIGN:
         return "the directory belongs to another user, who could put anything there";
-    case GW_FOLDER_SHARED:
+    case SOCK_FOLDER_SHARED:
         return "others than the directory's owner may write to it and put anything there";
-    case GW_FOLDER_FILE:
+    case SOCK_FOLDER_FILE:
         return "the file belongs to another user, has a second name, or is no ordinary file";
     case ELOOP:
         return "the directory is a symbolic link, which is not followed";
@@ -113,15 +113,15 @@ const char *gw_folder_fault(int error) {
     }
 }
 
-const char *gw_folder_cure(int error) {
+const char *sock_folder_cure(int error) {
     switch (error) {
-    case GW_FOLDER_FOREIGN:
+    case SOCK_FOLDER_FOREIGN:
     case EACCES:
     case EPERM:
         return "give the directory to the gateway's user";
-    case GW_FOLDER_SHARED:
+    case SOCK_FOLDER_SHARED:
         return "take that right away (chmod go-w)";
-    case GW_FOLDER_FILE:
+    case SOCK_FOLDER_FILE:
         return "remove it";
     case ELOOP:
         return "name the directory itself";

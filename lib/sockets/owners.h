@@ -11,52 +11,52 @@
 #include <sys/types.h>
 
 /// Where locks and markers of interfaces are. It vanishes when the machine is switched off, and the wheels with it.
-#define GW_RUNTIME_DIRECTORY "/run/iwheel"
+#define SOCK_RUNTIME_DIRECTORY "/run/iwheel"
 
 /// A path that fits a unix socket address, with its terminator; the same behind `unix:`.
-#define GW_PATH_SIZE    108U
-#define GW_ADDRESS_SIZE 113U
+#define SOCK_PATH_SIZE    108U
+#define SOCK_ADDRESS_SIZE 113U
 
 typedef struct {
     uid_t own;
     uid_t service; ///< Root's if there is no service.
-} gw_owners_t;
+} sock_owners_t;
 
 /// Reasons why a folder is not used, beside an errno.
 enum {
-    GW_FOLDER_FOREIGN = 0x10000, ///< It belongs to a stranger.
-    GW_FOLDER_SHARED,            ///< Others than its owner may write there.
-    GW_FOLDER_FILE,              ///< A file in it belongs to a stranger, has a second name, or is none.
+    SOCK_FOLDER_FOREIGN = 0x10000, ///< It belongs to a stranger.
+    SOCK_FOLDER_SHARED,            ///< Others than its owner may write there.
+    SOCK_FOLDER_FILE,              ///< A file in it belongs to a stranger, has a second name, or is none.
 };
 
 typedef struct {
     int fd;      ///< O_PATH; -1: not open.
     bool shared; ///< Anybody may put files there, but only their owners can take them away (sticky, like /tmp).
-} gw_folder_t;
+} sock_folder_t;
 
-/// `runtime_directory` is GW_RUNTIME_DIRECTORY but in tests. Its owner counts only if nobody else may write there.
-gw_owners_t gw_owners_of(const char *runtime_directory);
+/// `runtime_directory` is SOCK_RUNTIME_DIRECTORY but in tests. Its owner counts only if nobody else may write there.
+sock_owners_t sock_owners_of(const char *runtime_directory);
 
-bool gw_owners_have(const gw_owners_t *self, uid_t uid);
+bool sock_owners_have(const sock_owners_t *self, uid_t uid);
 
 /// True of a plain file with one name that belongs to one of them.
-bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status);
+bool sock_owners_wrote(const sock_owners_t *self, const struct stat *status);
 
 /// Opens a folder, not through a symbolic link, and judges it: it belongs to one of the owners, and nobody else may write
 /// to it or it is sticky. 0, an errno, or one of the reasons above; then `fd` is -1. Files are reached from `fd` only.
-int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owners);
+int sock_folder_open(sock_folder_t *self, const char *path, const sock_owners_t *owners);
 
-void gw_folder_close(gw_folder_t *self);
+void sock_folder_close(sock_folder_t *self);
 
 /// Opens a folder for reading and writing files, in which nobody else may put anything, sticky or not. A descriptor, or -1 with
 /// errno, which may be one of the reasons above.
-int gw_folder_open_own(const char *path);
+int sock_folder_open_own(const char *path);
 
 /// The folder of a path, as text.
-void gw_folder_of(const char *path, char *out_folder, size_t size);
+void sock_folder_of(const char *path, char *out_folder, size_t size);
 
 /// What is wrong, and what mends it, of an errno or one of the reasons.
-const char *gw_folder_fault(int error);
-const char *gw_folder_cure(int error);
+const char *sock_folder_fault(int error);
+const char *sock_folder_cure(int error);
 
 #endif

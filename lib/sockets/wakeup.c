@@ -33,8 +33,8 @@ static bool is_missing(int fd) {
     return wait_with_deadline(fd, &event, 1, &none) < 0 && (errno == ENOSYS || errno == EPERM);
 }
 
-int gw_wakeup_open(gw_wakeup_t *self) {
-    *self = (gw_wakeup_t){.fd = epoll_create1(EPOLL_CLOEXEC)};
+int sock_wakeup_open(sock_wakeup_t *self) {
+    *self = (sock_wakeup_t){.fd = epoll_create1(EPOLL_CLOEXEC)};
     if (self->fd < 0) {
         return errno;
     }
@@ -43,7 +43,7 @@ int gw_wakeup_open(gw_wakeup_t *self) {
     return 0;
 }
 
-void gw_wakeup_close(gw_wakeup_t *self) {
+void sock_wakeup_close(sock_wakeup_t *self) {
     (void)close(self->fd);
 }
 
@@ -56,10 +56,10 @@ static int wait_by_two_calls(int fd, struct epoll_event *events, int room, const
     return (ppoll(&watched, 1U, (span != NULL) ? &same : NULL, NULL) < 0) ? -1 : epoll_wait(fd, events, room, 0);
 }
 
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
-                   iw_time_us_t until_us) {
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+                     iw_time_us_t until_us) {
     const bool known = now_us != 0U || until_us == 0U || until_us == IW_NEVER;
-    const iw_time_us_t from_us = known ? now_us : iw_clock_now_us();
+    const iw_time_us_t from_us = known ? now_us : iwl_clock_now_us();
     const iw_time_us_t span_us = (until_us > from_us) ? until_us - from_us : 0U;
     const struct __kernel_timespec span = {.tv_sec = (int64_t)(span_us / US_PER_S),
                                            .tv_nsec = (int64_t)(span_us % US_PER_S) * NS_PER_US};

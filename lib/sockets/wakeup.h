@@ -11,17 +11,17 @@ struct epoll_event;
 typedef struct {
     int fd;         ///< The epoll set that is waited for.
     bool two_calls; ///< The kernel (before 5.11) has no wait with such a deadline: one call waits, a second one looks.
-} gw_wakeup_t;
+} sock_wakeup_t;
 
 /// An epoll set with nothing in it yet. The process asks the kernel to be woken without slack, which is 50 us elsewhere.
 /// 0, or an errno.
-int gw_wakeup_open(gw_wakeup_t *self);
-void gw_wakeup_close(gw_wakeup_t *self);
+int sock_wakeup_open(sock_wakeup_t *self);
+void sock_wakeup_close(sock_wakeup_t *self);
 
 /// As epoll_wait, until this time of CLOCK_MONOTONIC, never sooner without an event: IW_NEVER waits for ever, one that is
 /// past only looks. `now_us`: the time as read before, and it may be woken as much later as that is ago; 0: it is read, so that the
 /// wait ends in time.
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
-                   iw_time_us_t until_us);
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+                     iw_time_us_t until_us);
 
 #endif

@@ -5,32 +5,32 @@
 /// + 8). 24 quanta would need 14 before and 9 after the sample, one more than there is. Remain 8 and 16, so APB1 must
 /// be a multiple of 8 MHz; another clock does not compile. 16 quanta are taken where they can be had: the finer the
 /// quanta, the finer the resynchronisation.
-#ifndef IW_STM32_BIT_RATE_H
-#define IW_STM32_BIT_RATE_H
+#ifndef BRD_BIT_RATE_H
+#define BRD_BIT_RATE_H
 
 #include "board.h"
 #include "iwheel/bit_timing.h"
 
 #include <assert.h>
 
-#define IW_BIT_QUANTA    ((IW_BOARD_APB1_HZ % (16U * IW_BUS_BITRATE_HZ) == 0U) ? 16U : 8U)
-#define IW_BIT_PRESCALER (IW_BOARD_APB1_HZ / IW_BUS_BITRATE_HZ / IW_BIT_QUANTA)
-#define IW_BIT_BS1       (IW_BIT_QUANTA * 5U / 8U - 1U)
-#define IW_BIT_BS2       (IW_BIT_QUANTA * 3U / 8U)
+#define BRD_BIT_QUANTA    ((BRD_APB1_HZ % (16U * IW_BUS_BITRATE_HZ) == 0U) ? 16U : 8U)
+#define BRD_BIT_PRESCALER (BRD_APB1_HZ / IW_BUS_BITRATE_HZ / BRD_BIT_QUANTA)
+#define BRD_BIT_BS1       (BRD_BIT_QUANTA * 5U / 8U - 1U)
+#define BRD_BIT_BS2       (BRD_BIT_QUANTA * 3U / 8U)
 /// Resynchronisation jump width: as wide as possible, so that the wheels' oscillators need not be ours.
-#define IW_BIT_SJW ((IW_BIT_BS2 < 4U) ? IW_BIT_BS2 : 4U)
+#define BRD_BIT_SJW ((BRD_BIT_BS2 < 4U) ? BRD_BIT_BS2 : 4U)
 
 /// The value of BTR, bxCAN 9.2: each field holds one less than its meaning.
-#define IW_BIT_BTR                                                                                                     \
-    (((IW_BIT_SJW - 1U) << 24) | ((IW_BIT_BS2 - 1U) << 20) | ((IW_BIT_BS1 - 1U) << 16) | (IW_BIT_PRESCALER - 1U))
+#define BRD_BIT_BTR                                                                                                    \
+    (((BRD_BIT_SJW - 1U) << 24) | ((BRD_BIT_BS2 - 1U) << 20) | ((BRD_BIT_BS1 - 1U) << 16) | (BRD_BIT_PRESCALER - 1U))
 
 static_assert(
-    IW_BOARD_APB1_HZ != 0U && IW_BOARD_APB1_HZ % 8000000U == 0U,
+    BRD_APB1_HZ != 0U && BRD_APB1_HZ % 8000000U == 0U,
     "this APB1 clock cannot give 1 Mbit/s sampled at exactly 62.5 %: change the board's clock tree so that APB1 is a "
     "multiple of 8 MHz (8, 16, 24, 32, 40 or 48 MHz can; 36, 42, 45 and 54 MHz cannot)");
-static_assert(IW_BIT_PRESCALER <= 1024U && IW_BIT_BS1 <= 16U && IW_BIT_BS2 <= 8U, "bxCAN has no such segments");
-static_assert(IW_BIT_PRESCALER * IW_BIT_QUANTA * IW_BUS_BITRATE_HZ == IW_BOARD_APB1_HZ, "not exactly 1 Mbit/s");
-static_assert((1U + IW_BIT_BS1) * 1000U == IW_BUS_SAMPLE_POINT_PERMILLE * IW_BIT_QUANTA, "not exactly 62.5 %");
-static_assert(1U + IW_BIT_BS1 + IW_BIT_BS2 == IW_BIT_QUANTA, "the segments do not make a bit");
+static_assert(BRD_BIT_PRESCALER <= 1024U && BRD_BIT_BS1 <= 16U && BRD_BIT_BS2 <= 8U, "bxCAN has no such segments");
+static_assert(BRD_BIT_PRESCALER * BRD_BIT_QUANTA * IW_BUS_BITRATE_HZ == BRD_APB1_HZ, "not exactly 1 Mbit/s");
+static_assert((1U + BRD_BIT_BS1) * 1000U == IW_BUS_SAMPLE_POINT_PERMILLE * BRD_BIT_QUANTA, "not exactly 62.5 %");
+static_assert(1U + BRD_BIT_BS1 + BRD_BIT_BS2 == BRD_BIT_QUANTA, "the segments do not make a bit");
 
 #endif

@@ -11,30 +11,30 @@
 /// | PA11, PA12    | ... or these with -DIWHEEL_CAN_PINS=PA11: the USB socket's on Blue Pill and Discovery       |
 ///
 /// A `board.h` may define another pin before it includes this.
-#ifndef IW_STM32_BOARD_PINS_H
-#define IW_STM32_BOARD_PINS_H
+#ifndef BRD_BOARD_PINS_H
+#define BRD_BOARD_PINS_H
 
 /// A pin as one number: 16 to a port.
-#define IW_PIN(port, number) ((uint32_t)(port)*16U + (number))
-#define IW_PIN_A(number)     IW_PIN(0U, number)
-#define IW_PIN_B(number)     IW_PIN(1U, number)
-#define IW_PIN_C(number)     IW_PIN(2U, number)
-#define IW_PIN_D(number)     IW_PIN(3U, number)
+#define BRD_PIN(port, number) ((uint32_t)(port)*16U + (number))
+#define BRD_PIN_A(number)     BRD_PIN(0U, number)
+#define BRD_PIN_B(number)     BRD_PIN(1U, number)
+#define BRD_PIN_C(number)     BRD_PIN(2U, number)
+#define BRD_PIN_D(number)     BRD_PIN(3U, number)
 
-#ifndef IW_BOARD_ESTOP
-#define IW_BOARD_ESTOP IW_PIN_B(0U) ///< Of any port, but number 0: the interrupt is EXTI line 0's.
+#ifndef BRD_ESTOP
+#define BRD_ESTOP BRD_PIN_B(0U) ///< Of any port, but number 0: the interrupt is EXTI line 0's.
 #endif
-#ifndef IW_BOARD_BUTTON
-#define IW_BOARD_BUTTON IW_PIN_A(1U)
+#ifndef BRD_BUTTON
+#define BRD_BUTTON BRD_PIN_A(1U)
 #endif
 
-#define IW_BOARD_UART_TX IW_PIN_A(2U) ///< USART2's.
-#define IW_BOARD_UART_RX IW_PIN_A(3U)
+#define BRD_UART_TX BRD_PIN_A(2U) ///< USART2's.
+#define BRD_UART_RX BRD_PIN_A(3U)
 
-#ifndef IW_BOARD_CAN_ON_PA11
-#define IW_BOARD_CAN_ON_PA11 0 ///< 1 by -DIWHEEL_CAN_PINS=PA11.
+#ifndef BRD_CAN_ON_PA11
+#define BRD_CAN_ON_PA11 0 ///< 1 by -DIWHEEL_CAN_PINS=PA11.
 #endif
-#define IW_BOARD_CAN_RX (IW_BOARD_CAN_ON_PA11 != 0 ? IW_PIN_A(11U) : IW_PIN_B(8U))
-#define IW_BOARD_CAN_TX (IW_BOARD_CAN_ON_PA11 != 0 ? IW_PIN_A(12U) : IW_PIN_B(9U))
+#define BRD_CAN_RX (BRD_CAN_ON_PA11 != 0 ? BRD_PIN_A(11U) : BRD_PIN_B(8U))
+#define BRD_CAN_TX (BRD_CAN_ON_PA11 != 0 ? BRD_PIN_A(12U) : BRD_PIN_B(9U))
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "board.h"
 
-#define UNIQUE_ID ((const volatile uint32_t *)IW_BOARD_UNIQUE_ID_ADDRESS) // 96 bits.
+#define UNIQUE_ID ((const volatile uint32_t *)BRD_UNIQUE_ID_ADDRESS) // 96 bits.
 
 __attribute__((section(".noinit"))) static volatile uint32_t count, inverse;
 
@@ -14,7 +14,7 @@ static uint64_t mix(uint64_t value) {
     return value ^ value >> 31;
 }
 
-uint64_t iw_boot_id(uint32_t power_ons) {
+uint64_t brd_boot_id(uint32_t power_ons) {
     static uint64_t id;
     if (id == 0U) {
         count = (count == ~inverse) ? count + 1U : 1U;

@@ -12,13 +12,13 @@
 ///
 /// Once as 11-bit ids (two of them in each 16-bit bank) and once as 29-bit ids with the same number (one in each 32-bit
 /// bank). Remote frames pass with data frames.
-#ifndef IW_STM32_BXCAN_FILTERS_H
-#define IW_STM32_BXCAN_FILTERS_H
+#ifndef BRD_BXCAN_FILTERS_H
+#define BRD_BXCAN_FILTERS_H
 
 #include "bxcan_registers.h"
 
-/// Writes IW_BXCAN_BANKS banks from `first_bank` on and connects them to FIFO 0; leaves the other banks alone. `device`
-/// holds the banks. Nothing is received meanwhile.
-void iw_bxcan_filters_write(iw_bxcan_registers_t *device, uint32_t first_bank);
+/// Writes BRD_BXCAN_BANKS banks from `first_bank` on and connects them to FIFO 0; leaves the other banks alone.
+/// `device` holds the banks. Nothing is received meanwhile.
+void brd_bxcan_filters_write(brd_bxcan_registers_t *device, uint32_t first_bank);
 
 #endif

@@ -5,8 +5,8 @@
 /// (STM32F405/407), 30 of RM0390 (STM32F446). The sections within the chapter are the same; comments in this port name
 /// them as "bxCAN 7.4" for 24.7.4. Every gap is `reserved`, and offsets are asserted, so that a forgotten one does not
 /// compile.
-#ifndef IW_STM32_BXCAN_REGISTERS_H
-#define IW_STM32_BXCAN_REGISTERS_H
+#ifndef BRD_BXCAN_REGISTERS_H
+#define BRD_BXCAN_REGISTERS_H
 
 #include "register_access.h"
 
@@ -15,81 +15,81 @@
 
 /// Transmit mailbox: bxCAN 9.3.
 typedef struct {
-    iw_register_t TIR, TDTR, TDLR, TDHR;
-} iw_bxcan_mailbox_t;
+    brd_register_t TIR, TDTR, TDLR, TDHR;
+} brd_bxcan_mailbox_t;
 
 /// Output of a receive FIFO: bxCAN 9.3.
 typedef struct {
-    iw_register_t RIR, RDTR, RDLR, RDHR;
-} iw_bxcan_fifo_t;
+    brd_register_t RIR, RDTR, RDLR, RDHR;
+} brd_bxcan_fifo_t;
 
 typedef struct {
-    iw_register_t MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR; ///< Control and status: bxCAN 9.2.
+    brd_register_t MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR; ///< Control and status: bxCAN 9.2.
     uint32_t reserved1[88];
-    iw_bxcan_mailbox_t tx[3];
-    iw_bxcan_fifo_t rx[2];
+    brd_bxcan_mailbox_t tx[3];
+    brd_bxcan_fifo_t rx[2];
     uint32_t reserved2[12];
-    iw_register_t FMR, FM1R; ///< Filters: bxCAN 9.4. With two controllers only the first one's exist, for both.
+    brd_register_t FMR, FM1R; ///< Filters: bxCAN 9.4. With two controllers only the first one's exist, for both.
     uint32_t reserved3;
-    iw_register_t FS1R;
+    brd_register_t FS1R;
     uint32_t reserved4;
-    iw_register_t FFA1R;
+    brd_register_t FFA1R;
     uint32_t reserved5;
-    iw_register_t FA1R;
+    brd_register_t FA1R;
     uint32_t reserved6[8];
-    iw_register_t filter[28][2]; ///< 14 of them where there is one controller.
-} iw_bxcan_registers_t;
+    brd_register_t filter[28][2]; ///< 14 of them where there is one controller.
+} brd_bxcan_registers_t;
 
-static_assert(offsetof(iw_bxcan_registers_t, tx) == 0x180, "TI0R is at 0x180");
-static_assert(offsetof(iw_bxcan_registers_t, rx) == 0x1B0, "RI0R is at 0x1B0");
-static_assert(offsetof(iw_bxcan_registers_t, FMR) == 0x200, "FMR is at 0x200");
-static_assert(offsetof(iw_bxcan_registers_t, FS1R) == 0x20C, "FS1R is at 0x20C");
-static_assert(offsetof(iw_bxcan_registers_t, FFA1R) == 0x214, "FFA1R is at 0x214");
-static_assert(offsetof(iw_bxcan_registers_t, FA1R) == 0x21C, "FA1R is at 0x21C");
-static_assert(offsetof(iw_bxcan_registers_t, filter) == 0x240, "F0R1 is at 0x240");
+static_assert(offsetof(brd_bxcan_registers_t, tx) == 0x180, "TI0R is at 0x180");
+static_assert(offsetof(brd_bxcan_registers_t, rx) == 0x1B0, "RI0R is at 0x1B0");
+static_assert(offsetof(brd_bxcan_registers_t, FMR) == 0x200, "FMR is at 0x200");
+static_assert(offsetof(brd_bxcan_registers_t, FS1R) == 0x20C, "FS1R is at 0x20C");
+static_assert(offsetof(brd_bxcan_registers_t, FFA1R) == 0x214, "FFA1R is at 0x214");
+static_assert(offsetof(brd_bxcan_registers_t, FA1R) == 0x21C, "FA1R is at 0x21C");
+static_assert(offsetof(brd_bxcan_registers_t, filter) == 0x240, "F0R1 is at 0x240");
 
-#define IW_BXCAN_MAILBOXES 3U
+#define BRD_BXCAN_MAILBOXES 3U
 
-#define IW_MCR_INRQ 0x00000001U ///< Asks for initialisation mode; MSR.INAK answers.
-#define IW_MCR_DBF  0x00010000U ///< Frozen while a debugger halts the CPU: set after reset, and left so.
+#define BRD_MCR_INRQ 0x00000001U ///< Asks for initialisation mode; MSR.INAK answers.
+#define BRD_MCR_DBF  0x00010000U ///< Frozen while a debugger halts the CPU: set after reset, and left so.
 
-#define IW_MSR_INAK 0x00000001U ///< In initialisation mode, or still waiting for 11 recessive bits after it.
-#define IW_MSR_SLAK 0x00000002U ///< In sleep mode: so after reset.
-#define IW_MSR_ERRI 0x00000004U ///< An enabled error condition came up. Written 1: cleared.
+#define BRD_MSR_INAK 0x00000001U ///< In initialisation mode, or still waiting for 11 recessive bits after it.
+#define BRD_MSR_SLAK 0x00000002U ///< In sleep mode: so after reset.
+#define BRD_MSR_ERRI 0x00000004U ///< An enabled error condition came up. Written 1: cleared.
 
-#define IW_TSR_RQCP(mailbox)                                                                                           \
+#define BRD_TSR_RQCP(mailbox)                                                                                          \
     (UINT32_C(0x01) << (8U * (mailbox))) ///< Request completed: sent or aborted. Written 1: cleared.
-#define IW_TSR_TXOK(mailbox)                                                                                           \
+#define BRD_TSR_TXOK(mailbox)                                                                                          \
     (UINT32_C(0x02) << (8U * (mailbox))) ///< ... and it was sent and acknowledged. Cleared with RQCP.
-#define IW_TSR_ABRQ(mailbox)                                                                                           \
-    (UINT32_C(0x80) << (8U * (mailbox)))                        ///< Written 1: abort. Stays until the mailbox is empty.
-#define IW_TSR_TME(mailbox) (UINT32_C(0x04000000) << (mailbox)) ///< Mailbox empty.
+#define BRD_TSR_ABRQ(mailbox)                                                                                          \
+    (UINT32_C(0x80) << (8U * (mailbox))) ///< Written 1: abort. Stays until the mailbox is empty.
+#define BRD_TSR_TME(mailbox) (UINT32_C(0x04000000) << (mailbox)) ///< Mailbox empty.
 
-#define IW_RF0R_FMP0  0x00000003U ///< Frames waiting, 0..3.
-#define IW_RF0R_FOVR0 0x00000010U ///< A frame came while three were waiting. Written 1: cleared.
-#define IW_RF0R_RFOM0 0x00000020U ///< Written 1: release the oldest. Stays until done.
+#define BRD_RF0R_FMP0  0x00000003U ///< Frames waiting, 0..3.
+#define BRD_RF0R_FOVR0 0x00000010U ///< A frame came while three were waiting. Written 1: cleared.
+#define BRD_RF0R_RFOM0 0x00000020U ///< Written 1: release the oldest. Stays until done.
 
-#define IW_IER_TMEIE  0x00000001U ///< Interrupt when RQCP is set.
-#define IW_IER_FMPIE0 0x00000002U ///< Interrupt while FIFO 0 is not empty.
-#define IW_IER_EPVIE  0x00000200U ///< Error passive makes MSR.ERRI ...
-#define IW_IER_BOFIE  0x00000400U ///< ... and so does bus-off ...
-#define IW_IER_ERRIE  0x00008000U ///< ... which makes an interrupt.
+#define BRD_IER_TMEIE  0x00000001U ///< Interrupt when RQCP is set.
+#define BRD_IER_FMPIE0 0x00000002U ///< Interrupt while FIFO 0 is not empty.
+#define BRD_IER_EPVIE  0x00000200U ///< Error passive makes MSR.ERRI ...
+#define BRD_IER_BOFIE  0x00000400U ///< ... and so does bus-off ...
+#define BRD_IER_ERRIE  0x00008000U ///< ... which makes an interrupt.
 
-#define IW_ESR_EPVF       0x00000002U               ///< Error passive.
-#define IW_ESR_BOFF       0x00000004U               ///< Bus-off.
-#define IW_ESR_LEC(value) (((value) >> 4) & 0x7U)   ///< Last error code.
-#define IW_ESR_TEC(value) (((value) >> 16) & 0xFFU) ///< Transmit error counter, lower 8 bits.
-#define IW_ESR_REC(value) (((value) >> 24) & 0xFFU) ///< Receive error counter.
+#define BRD_ESR_EPVF       0x00000002U               ///< Error passive.
+#define BRD_ESR_BOFF       0x00000004U               ///< Bus-off.
+#define BRD_ESR_LEC(value) (((value) >> 4) & 0x7U)   ///< Last error code.
+#define BRD_ESR_TEC(value) (((value) >> 16) & 0xFFU) ///< Transmit error counter, lower 8 bits.
+#define BRD_ESR_REC(value) (((value) >> 24) & 0xFFU) ///< Receive error counter.
 
-#define IW_BTR_SILM 0x80000000U ///< Silent: neither frames nor acknowledgements nor error flags leave.
+#define BRD_BTR_SILM 0x80000000U ///< Silent: neither frames nor acknowledgements nor error flags leave.
 
-#define IW_TIR_TXRQ      0x00000001U ///< Written 1: send.
-#define IW_IR_RTR        0x00000002U ///< Remote frame.
-#define IW_IR_IDE        0x00000004U ///< 29-bit id.
-#define IW_IR_STID_SHIFT 21U
-#define IW_IR_EXID_SHIFT 3U
-#define IW_DTR_DLC       0x0000000FU
+#define BRD_TIR_TXRQ      0x00000001U ///< Written 1: send.
+#define BRD_IR_RTR        0x00000002U ///< Remote frame.
+#define BRD_IR_IDE        0x00000004U ///< 29-bit id.
+#define BRD_IR_STID_SHIFT 21U
+#define BRD_IR_EXID_SHIFT 3U
+#define BRD_DTR_DLC       0x0000000FU
 
-#define IW_FMR_FINIT 0x00000001U ///< Filter initialisation: nothing is received by either controller.
+#define BRD_FMR_FINIT 0x00000001U ///< Filter initialisation: nothing is received by either controller.
 
 #endif

@@ -9,20 +9,20 @@
 #define STABLE_US 20000U
 
 /// Nothing is kept over power-off.
-void iw_commander_open(bool power_on, bool in_motion) {
+void brd_commander_open(bool power_on, bool in_motion) {
     (void)power_on;
     (void)in_motion;
 }
 
 /// The options of the build are all there is.
-void iw_commander_configure(iw_config_t *config) {
+void brd_commander_configure(iw_config_t *config) {
     (void)config;
 }
 
 /// Debounced both ways. A button that is stuck or held from before power-on never makes a press (R3: nothing moves by
 /// itself).
-bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us) {
-    const bool level = iw_pins_button_low();
+bool brd_commander_pressed(brd_commander_t *self, iw_time_us_t now_us) {
+    const bool level = brd_pins_button_low();
     if (level != self->level) {
         self->level = level;
         self->change_us = now_us;
@@ -35,13 +35,13 @@ bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us) {
     return press;
 }
 
-void iw_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us) {
+void brd_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us) {
     if (iw_gateway_state(gateway) == IW_STATE_LATCHED) {
-        iw_report_reset(iw_gateway_reset(gateway, now_us));
+        brd_report_reset(iw_gateway_reset(gateway, now_us));
     }
 }
 
-bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+bool brd_commander_arm(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(gateway);
     if (state == IW_STATE_ARMED) {
         return true;
@@ -53,7 +53,7 @@ bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t 
     return false;
 }
 
-iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
+iw_refusal_t brd_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
     // As a setpoint, a current of 0: how much of it moves the machine is not known here.
     const iw_drive_t drive = {
         .speed_mm_s = {speed_mm_s, speed_mm_s},

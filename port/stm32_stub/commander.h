@@ -20,8 +20,8 @@
 /// Rules for one's own: call `iw_gateway_drive` only with a value that somebody wants *now*, since each accepted call
 /// feeds the lease and the lease is what stops the wheels when nobody is there any more. Do not repeat an old value, do
 /// not answer a refusal by trying again with a nonzero value, never wait in here.
-#ifndef IW_STM32_COMMANDER_H
-#define IW_STM32_COMMANDER_H
+#ifndef BRD_COMMANDER_H
+#define BRD_COMMANDER_H
 
 #include "iwheel/gateway.h"
 
@@ -33,39 +33,39 @@ typedef struct {
     bool level;              ///< The button's last level: pressed.
     bool released;           ///< ... and whether it was let go for long enough before.
     bool running;            ///< The profile.
-} iw_commander_t;
+} brd_commander_t;
 
 /// What this source does, for the console's first line.
-const char *iw_commander_words(void);
+const char *brd_commander_name(void);
 
 /// True if this source may command: the controller then takes part in the bus. False: it is silent and does not
 /// acknowledge.
-bool iw_commander_sends(void);
+bool brd_commander_sends(void);
 
 /// Called once, right after a start and before the watchdog runs: what outlives power may be read and written here.
 /// `in_motion`: the run before this one was sending, so nothing may take long.
-void iw_commander_open(bool power_on, bool in_motion);
+void brd_commander_open(bool power_on, bool in_motion);
 
 /// Called once, before the gateway begins: `config` has the defaults and the options of the build.
-void iw_commander_configure(iw_config_t *config);
+void brd_commander_configure(iw_config_t *config);
 
 /// Called once in every cycle, right before `iw_gateway_step`, at least every 20 ms: what it commands leaves in the
 /// same cycle. Must return within a millisecond.
-void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
 
 /// For sources: asks to be armed when that makes sense, and not more often than every 100 ms. True while armed and
 /// holder.
-bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+bool brd_commander_arm(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
 
 /// For sources: true once for each press of the button: low for 20 ms after it was high for 20 ms. Held, it repeats
 /// nothing, and one that is down from the start counts only after it was let go. To be asked in every cycle.
-bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us);
+bool brd_commander_pressed(brd_commander_t *self, iw_time_us_t now_us);
 
 /// For sources: resets a latch if there is one and tells how that went.
-void iw_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us);
+void brd_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us);
 
 /// For sources: one drive command for both wheels, with the configured maximum current if that is a limit, else with
 /// none.
-iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s);
+iw_refusal_t brd_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s);
 
 #endif

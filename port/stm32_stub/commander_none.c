@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "commander.h"
 
-bool iw_commander_sends(void) {
+bool brd_commander_sends(void) {
     return false;
 }
 
-const char *iw_commander_words(void) {
+const char *brd_commander_name(void) {
     return "listens and sends nothing";
 }
 
-void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
-    if (iw_commander_pressed(self, now_us)) {
-        iw_commander_reset(gateway, now_us);
+void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    if (brd_commander_pressed(self, now_us)) {
+        brd_commander_reset(gateway, now_us);
     }
 }

@@ -22,7 +22,7 @@ static_assert((LENGTH & (LENGTH - 1U)) == 0U, "the indices wrap at a power of tw
 static char waiting[LENGTH];
 static uint32_t put, taken; // Characters since the start.
 
-void iw_console_start(uint32_t apb1_hz) {
+void brd_console_start(uint32_t apb1_hz) {
     USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: sixteenths.
     USART2->CR1 = UE | TE | RE;
 }
@@ -34,14 +34,14 @@ static void append(char character) {
     }
 }
 
-void iw_console_text(const char *text) {
+void brd_console_text(const char *text) {
     for (; *text != '\0'; text++) {
         append(*text);
     }
 }
 
 /// No printf: newlib's would bring the heap.
-void iw_console_number(uint32_t value) {
+void brd_console_number(uint32_t value) {
     char digit[10];
     uint32_t digits = 0;
     do {
@@ -53,21 +53,21 @@ void iw_console_number(uint32_t value) {
     }
 }
 
-void iw_console_hex(uint32_t value) {
-    iw_console_text("0x");
+void brd_console_hex(uint32_t value) {
+    brd_console_text("0x");
     for (uint32_t shift = 32U; shift > 0U; shift -= 4U) {
         append("0123456789ABCDEF"[(value >> (shift - 4U)) & 0xFU]);
     }
 }
 
-bool iw_console_step(void) {
+bool brd_console_step(void) {
     if (put != taken && (USART2->SR & TXE) != 0U) {
         USART2->DR = (uint8_t)waiting[taken++ % LENGTH];
     }
     return put != taken;
 }
 
-bool iw_console_asked(void) {
+bool brd_console_asked(void) {
     if ((USART2->SR & RXNE) == 0U) {
         return false;
     }

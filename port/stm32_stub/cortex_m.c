@@ -11,7 +11,7 @@
 #define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU) // 4.4.5: key and SYSRESETREQ.
 #define PENDSTSET (1U << 26)
 
-void iw_systick_handler(void);
+void brd_systick_handler(void);
 
 // Written by interrupt handlers, which get no argument: so they stand at file scope.
 static volatile uint64_t ticks_ms;
@@ -19,16 +19,16 @@ static volatile uint32_t ticks_slept; // The lower half once more, read in one a
 static atomic_bool is_woken;
 static uint32_t cycles_per_us = 1;
 
-void iw_systick_handler(void) {
+void brd_systick_handler(void) {
     ticks_ms++;
     ticks_slept++;
 }
 
-void iw_irq_enable(iw_irq_t irq) {
+void brd_irq_enable(brd_irq_t irq) {
     NVIC_ISER[(uint32_t)irq / 32U] = 1UL << ((uint32_t)irq % 32U);
 }
 
-void iw_time_start(uint32_t core_hz) {
+void brd_time_start(uint32_t core_hz) {
     cycles_per_us = core_hz / 1000000U;
     SYST_RVR = core_hz / 1000U - 1U;
     SYST_CVR = 0;
@@ -36,7 +36,7 @@ void iw_time_start(uint32_t core_hz) {
 }
 
 /// A tick that came between the halves has either been counted meanwhile or is still pending.
-iw_time_us_t iw_time_now_us(void) {
+iw_time_us_t brd_time_now_us(void) {
     uint64_t now_ms;
     uint32_t left;
     do {
@@ -46,7 +46,7 @@ iw_time_us_t iw_time_now_us(void) {
     return now_ms * IW_US_PER_MS + (SYST_RVR - left) / cycles_per_us;
 }
 
-void iw_wake(void) {
+void brd_wake(void) {
     atomic_store_explicit(&is_woken, true, memory_order_relaxed);
 }
 
@@ -59,10 +59,10 @@ static void sleep_unless_woken(uint32_t tick) {
     __asm volatile("cpsie i\n isb" ::: "memory");
 }
 
-void iw_sleep_until(iw_time_us_t until_us) {
+void brd_sleep_until(iw_time_us_t until_us) {
     for (;;) {
         const uint32_t tick = ticks_slept;
-        if (atomic_load_explicit(&is_woken, memory_order_relaxed) || iw_time_now_us() >= until_us) {
+        if (atomic_load_explicit(&is_woken, memory_order_relaxed) || brd_time_now_us() >= until_us) {
             break;
         }
         sleep_unless_woken(tick);
@@ -70,7 +70,7 @@ void iw_sleep_until(iw_time_us_t until_us) {
     atomic_store_explicit(&is_woken, false, memory_order_relaxed);
 }
 
-void iw_system_reset(void) {
+void brd_system_reset(void) {
     __asm volatile("dsb" ::: "memory");
     SCB_AIRCR = 0x05FA0004U;
     __asm volatile("dsb" ::: "memory");

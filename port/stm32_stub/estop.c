@@ -12,12 +12,12 @@ typedef struct {
     volatile uint32_t IMR, EMR, RTSR, FTSR, SWIER, PR;
 } exti_t;
 
-#define EXTI ((exti_t *)IW_BOARD_EXTI_ADDRESS)
+#define EXTI ((exti_t *)BRD_EXTI_ADDRESS)
 #define LINE (1U << 0)
 
 static atomic_bool had_edge; // Set by the interrupt.
 
-void iw_estop_init(void) {
+void brd_estop_init(void) {
     EXTI->RTSR |= LINE;
     EXTI->FTSR |= LINE;
     EXTI->PR = LINE;
@@ -25,18 +25,18 @@ void iw_estop_init(void) {
 }
 
 /// Any edge counts, also the falling one: of a short pulse the level may be gone, and so may the first edge (fault 12).
-void iw_estop_on_edge(void) {
+void brd_estop_on_edge(void) {
     EXTI->PR = LINE;
     atomic_store_explicit(&had_edge, true, memory_order_relaxed);
-    iw_wake();
+    brd_wake();
 }
 
 /// An edge between load and store is covered by the 1 of this same call, so none is lost.
-int iw_estop_pressed(void *context) {
+int brd_estop_pressed(void *context) {
     (void)context;
     if (atomic_load_explicit(&had_edge, memory_order_relaxed)) {
         atomic_store_explicit(&had_edge, false, memory_order_relaxed);
         return 1;
     }
-    return iw_pins_estop_high() ? 1 : 0;
+    return brd_pins_estop_high() ? 1 : 0;
 }

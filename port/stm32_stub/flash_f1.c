@@ -23,13 +23,13 @@ typedef struct {
 
 // The CPU stands still while it fetches from a flash that is busy, so that few polls are ever made; the bound is for a
 // chip that is broken.
-#define POLLS_MAX (IW_BOARD_CORE_HZ / 8U / 20U)
+#define POLLS_MAX (BRD_CORE_HZ / 8U / 20U)
 
 static uint32_t address_of(unsigned page, unsigned word) {
-    return IW_BOARD_STORE_ADDRESS + page * PAGE_BYTES + 4U * word;
+    return BRD_STORE_ADDRESS + page * PAGE_BYTES + 4U * word;
 }
 
-const volatile uint32_t *iw_flash_page(unsigned page) {
+const volatile uint32_t *brd_flash_page(unsigned page) {
     return (const volatile uint32_t *)address_of(page, 0);
 }
 
@@ -53,7 +53,7 @@ static bool end(void) {
     return good;
 }
 
-bool iw_flash_erase(unsigned page) {
+bool brd_flash_erase(unsigned page) {
     if (!begin(PER)) {
         return false;
     }
@@ -71,7 +71,7 @@ static bool write_half(uint32_t address, uint16_t value) {
     return end() && *(volatile uint16_t *)address == value;
 }
 
-bool iw_flash_write(unsigned page, unsigned word, uint32_t value) {
+bool brd_flash_write(unsigned page, unsigned word, uint32_t value) {
     const uint32_t address = address_of(page, word);
     return write_half(address, (uint16_t)value) && write_half(address + 2U, (uint16_t)(value >> 16));
 }

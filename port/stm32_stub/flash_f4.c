@@ -27,14 +27,14 @@ typedef struct {
 
 // The CPU stands still while it fetches from a flash that is busy, so that few polls are ever made; the bound is for a
 // chip that is broken.
-#define POLLS_MAX (IW_BOARD_CORE_HZ / 8U * 2U)
+#define POLLS_MAX (BRD_CORE_HZ / 8U * 2U)
 
 static uint32_t address_of(unsigned page, unsigned word) {
-    static const uint32_t sectors[IW_FLASH_PAGES] = {0x08010000U, 0x08020000U}; // 3.3; memory.ld leaves them out.
+    static const uint32_t sectors[BRD_FLASH_PAGES] = {0x08010000U, 0x08020000U}; // 3.3; memory.ld leaves them out.
     return sectors[page] + 4U * word;
 }
 
-const volatile uint32_t *iw_flash_page(unsigned page) {
+const volatile uint32_t *brd_flash_page(unsigned page) {
     return (const volatile uint32_t *)address_of(page, 0);
 }
 
@@ -67,7 +67,7 @@ static bool end(void) {
     return good;
 }
 
-bool iw_flash_erase(unsigned page) {
+bool brd_flash_erase(unsigned page) {
     const uint32_t what = SER | SNB(FIRST_SECTOR + page) | BY_32;
     if (!begin(what)) {
         return false;
@@ -76,7 +76,7 @@ bool iw_flash_erase(unsigned page) {
     return end();
 }
 
-bool iw_flash_write(unsigned page, unsigned word, uint32_t value) {
+bool brd_flash_write(unsigned page, unsigned word, uint32_t value) {
     volatile uint32_t *const at = (volatile uint32_t *)address_of(page, word);
     if (!begin(PG | BY_32)) {
         return false;

@@ -2,23 +2,23 @@
 #include "lamp.h"
 
 /// The button comes first: while it is pressed no other cure helps.
-uint16_t iw_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed) {
+uint16_t brd_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed) {
     if (estop_pressed) {
-        return IW_LAMP_ESTOP;
+        return BRD_LAMP_ESTOP;
     }
     switch (seen->state) {
     case IW_STATE_ARMED:
-        return IW_LAMP_ARMED;
+        return BRD_LAMP_ARMED;
     case IW_STATE_STOPPING:
-        return IW_LAMP_STOPPING;
+        return BRD_LAMP_STOPPING;
     case IW_STATE_LATCHED:
-        return IW_LAMP_LATCHED;
+        return BRD_LAMP_LATCHED;
     case IW_STATE_LISTENING:
     default:
-        return (seen->bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING;
+        return (seen->bus < IW_BUS_PASSIVE) ? BRD_LAMP_NO_BUS : BRD_LAMP_LISTENING;
     }
 }
 
-bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us) {
-    return (((uint32_t)pattern >> (now_us / IW_LAMP_SLOT_US % 16U)) & 1U) != 0U;
+bool brd_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us) {
+    return (((uint32_t)pattern >> (now_us / BRD_LAMP_SLOT_US % 16U)) & 1U) != 0U;
 }

@@ -11,25 +11,25 @@
 /// | half on, half off     | e-stop pressed                                               |
 /// | 2 Hz                  | latched, e-stop released: waits for reset                    |
 /// | dark, or other        | no power, or no program                                      |
-#ifndef IW_STM32_LAMP_H
-#define IW_STM32_LAMP_H
+#ifndef BRD_LAMP_H
+#define BRD_LAMP_H
 
 #include "iwheel/snapshot.h"
 
-#define IW_LAMP_SLOT_US 62500U
+#define BRD_LAMP_SLOT_US 62500U
 
-#define IW_LAMP_LISTENING  0x0001U
-#define IW_LAMP_NO_BUS     0x0005U
-#define IW_LAMP_NO_CRYSTAL 0x0015U
-#define IW_LAMP_ARMED      0xFFFFU
-#define IW_LAMP_STOPPING   0x5555U
-#define IW_LAMP_ESTOP      0x00FFU
-#define IW_LAMP_LATCHED    0x0F0FU
+#define BRD_LAMP_LISTENING  0x0001U
+#define BRD_LAMP_NO_BUS     0x0005U
+#define BRD_LAMP_NO_CRYSTAL 0x0015U
+#define BRD_LAMP_ARMED      0xFFFFU
+#define BRD_LAMP_STOPPING   0x5555U
+#define BRD_LAMP_ESTOP      0x00FFU
+#define BRD_LAMP_LATCHED    0x0F0FU
 
 /// The pattern for what the gateway does; `estop_pressed` is the contact's level.
-uint16_t iw_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed);
+uint16_t brd_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed);
 
 /// Whether a pattern's lamp is lit at that time.
-bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);
+bool brd_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);
 
 #endif

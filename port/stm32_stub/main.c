@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The gateway on bare metal: one loop around the core that sleeps until there is something to do.
 #include "bit_rate.h"
+#include "board_clock.h"
 #include "bxcan.h"
-#include "clock.h"
 #include "commander.h"
 #include "console.h"
 #include "cortex_m.h"
@@ -16,73 +16,73 @@
 
 // A poll takes 4 cycles at the least, and the longest frame with an error at its end 200 us: 250 us, and 1.5 ms at the
 // most.
-#define ABORT_POLLS (IW_BOARD_CORE_HZ / 4U / 4000U)
+#define ABORT_POLLS (BRD_CORE_HZ / 4U / 4000U)
 #define CAN_RESET   (1U << 25) // In RCC's APB1RSTR, RM0008 7.3.4 and RM0090 7.3.8.
 // A crystal that has not started by now is reported.
 #define CRYSTAL_LATE_US 100000U
 // While text waits the loop goes round this often.
 #define CHARACTER_US 1000U
 
-void iw_exti0_handler(void);
-void iw_can_transmit_handler(void);
-void iw_can_receive_handler(void);
-void iw_can_error_handler(void);
+void brd_exti0_handler(void);
+void brd_can_transmit_handler(void);
+void brd_can_receive_handler(void);
+void brd_can_error_handler(void);
 
-static iw_bxcan_t bus; // The interrupts' handlers have no argument to bring it.
+static brd_bxcan_t bus; // The interrupts' handlers have no argument to bring it.
 
-void iw_exti0_handler(void) {
-    iw_estop_on_edge();
+void brd_exti0_handler(void) {
+    brd_estop_on_edge();
 }
 
-void iw_can_transmit_handler(void) {
-    iw_bxcan_on_transmit(&bus);
-    iw_wake();
+void brd_can_transmit_handler(void) {
+    brd_bxcan_on_transmit(&bus);
+    brd_wake();
 }
 
-void iw_can_receive_handler(void) {
-    iw_bxcan_on_receive(&bus);
-    iw_wake();
+void brd_can_receive_handler(void) {
+    brd_bxcan_on_receive(&bus);
+    brd_wake();
 }
 
-void iw_can_error_handler(void) {
-    iw_bxcan_on_error(&bus);
-    iw_wake();
+void brd_can_error_handler(void) {
+    brd_bxcan_on_error(&bus);
+    brd_wake();
 }
 
 /// Tries until the crystal runs; meanwhile time is counted on the internal oscillator, and lamp and console tell.
 static void wait_for_crystal(void) {
     bool is_told = false;
-    iw_time_start(IW_BOARD_INTERNAL_HZ);
-    iw_console_start(IW_BOARD_INTERNAL_HZ);
-    while (!iw_clock_start()) {
-        if (!is_told && iw_time_now_us() > CRYSTAL_LATE_US) {
+    brd_time_start(BRD_INTERNAL_HZ);
+    brd_console_start(BRD_INTERNAL_HZ);
+    while (!brd_clock_start()) {
+        if (!is_told && brd_time_now_us() > CRYSTAL_LATE_US) {
             is_told = true;
-            iw_report_no_crystal();
+            brd_report_no_crystal();
         }
-        (void)iw_console_step();
-        iw_pins_lamp(iw_lamp_is_lit(IW_LAMP_NO_CRYSTAL, iw_time_now_us()));
-        iw_watchdog_feed();
+        (void)brd_console_step();
+        brd_pins_lamp(brd_lamp_is_lit(BRD_LAMP_NO_CRYSTAL, brd_time_now_us()));
+        brd_watchdog_feed();
     }
-    iw_time_start(IW_BOARD_CORE_HZ);
-    iw_console_start(IW_BOARD_APB1_HZ);
+    brd_time_start(BRD_CORE_HZ);
+    brd_console_start(BRD_APB1_HZ);
 }
 
 /// Silent without a command source: the acknowledgement of an image that only listens would pass for a wheel's, and
 /// confirm frames to another master that no wheel has heard.
 static void start_bus(void) {
-    const iw_bxcan_config_t config = {
-        .registers = (iw_bxcan_registers_t *)IW_BOARD_BXCAN_ADDRESS,
-        .filters = (iw_bxcan_registers_t *)IW_BOARD_BXCAN_ADDRESS,
-        .bit_timing = IW_BIT_BTR,
+    const brd_bxcan_config_t config = {
+        .registers = (brd_bxcan_registers_t *)BRD_BXCAN_ADDRESS,
+        .filters = (brd_bxcan_registers_t *)BRD_BXCAN_ADDRESS,
+        .bit_timing = BRD_BIT_BTR,
         .poll_limit = ABORT_POLLS,
-        .silent = !iw_commander_sends(),
-        .reset_register = (iw_register_t *)IW_BOARD_CAN_RESET_ADDRESS,
+        .silent = !brd_commander_sends(),
+        .reset_register = (brd_register_t *)BRD_CAN_RESET_ADDRESS,
         .reset_bits = CAN_RESET,
     };
-    iw_bxcan_init(&bus, &config);
-    iw_irq_enable(IW_IRQ_CAN_TRANSMIT);
-    iw_irq_enable(IW_IRQ_CAN_RECEIVE);
-    iw_irq_enable(IW_IRQ_CAN_ERROR);
+    brd_bxcan_init(&bus, &config);
+    brd_irq_enable(BRD_IRQ_CAN_TRANSMIT);
+    brd_irq_enable(BRD_IRQ_CAN_RECEIVE);
+    brd_irq_enable(BRD_IRQ_CAN_ERROR);
 }
 
 static iw_config_t configuration(void) {
@@ -92,15 +92,15 @@ static iw_config_t configuration(void) {
     config.setpoint_type_set = IWHEEL_SETPOINT_TYPE_IS_SET;
     config.current_role = IWHEEL_CURRENT_ROLE_VALUE;
     config.track_mm = IWHEEL_TRACK_MM_VALUE;
-    iw_commander_configure(&config);
+    brd_commander_configure(&config);
     return config;
 }
 
 static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool restarted) {
-    static const iw_hal_t hal = {iw_bxcan_send,  iw_bxcan_receive, iw_bxcan_bus_state,
-                                 iw_bxcan_purge, iw_estop_pressed, &bus};
+    static const iw_hal_t hal = {brd_bxcan_send,  brd_bxcan_receive, brd_bxcan_bus_state,
+                                 brd_bxcan_purge, brd_estop_pressed, &bus};
     const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
-    if (iw_gateway_init(gateway, config, &hal, iw_time_now_us(), restarted) != IW_CONFIG_OK) {
+    if (iw_gateway_init(gateway, config, &hal, brd_time_now_us(), restarted) != IW_CONFIG_OK) {
         return false;
     }
     iw_gateway_bus_facts(gateway, &facts);
@@ -110,41 +110,41 @@ static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool
 /// Steps the gateway before and after the commander: a request and a report can each take milliseconds, and the e-stop
 /// is read between any two of them. The watchdog is fed at the end: only a cycle that got through all of it counts as
 /// alive (fault 26).
-static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
-    iw_time_us_t now_us = iw_time_now_us();
+static void cycle(iw_gateway_t *gateway, brd_commander_t *commander) {
+    iw_time_us_t now_us = brd_time_now_us();
     (void)iw_gateway_step(gateway, now_us);
-    iw_commander_step(commander, gateway, now_us);
-    now_us = iw_time_now_us();
+    brd_commander_step(commander, gateway, now_us);
+    now_us = brd_time_now_us();
     const iw_time_us_t next_us = iw_gateway_step(gateway, now_us);
-    const bool estop_high = iw_pins_estop_high();
-    iw_snapshot_t *const seen = iw_report_room(); // Not on the stack, which it would nearly double.
+    const bool estop_high = brd_pins_estop_high();
+    iw_snapshot_t *const seen = brd_report_room(); // Not on the stack, which it would nearly double.
     iw_gateway_snapshot(gateway, now_us, seen);
-    iw_marker_step(seen);
-    iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(seen, estop_high), now_us));
-    iw_report_step(seen, estop_high);
-    const bool more = iw_console_step();
-    iw_watchdog_feed();
-    iw_sleep_until((more && next_us > now_us + CHARACTER_US) ? now_us + CHARACTER_US : next_us);
+    brd_marker_step(seen);
+    brd_pins_lamp(brd_lamp_is_lit(brd_lamp_pattern(seen, estop_high), now_us));
+    brd_report_step(seen, estop_high);
+    const bool more = brd_console_step();
+    brd_watchdog_feed();
+    brd_sleep_until((more && next_us > now_us + CHARACTER_US) ? now_us + CHARACTER_US : next_us);
 }
 
 /// Returns only if the configuration is wrong, which the tests of the image exclude.
 int main(void) {
     static iw_gateway_t gateway;
-    static iw_commander_t commander;
-    const bool power_on = iw_clock_was_power_on();
-    const bool restarted = iw_marker_take(power_on);
-    iw_commander_open(power_on, restarted);
-    iw_watchdog_start();
-    iw_pins_init();
+    static brd_commander_t commander;
+    const bool power_on = brd_clock_was_power_on();
+    const bool restarted = brd_marker_take(power_on);
+    brd_commander_open(power_on, restarted);
+    brd_watchdog_start();
+    brd_pins_init();
     wait_for_crystal();
-    iw_estop_init();
-    iw_irq_enable(IW_IRQ_EXTI0);
+    brd_estop_init();
+    brd_irq_enable(BRD_IRQ_EXTI0);
     const iw_config_t config = configuration();
     start_bus();
     if (!start_gateway(&gateway, &config, restarted)) {
         return 1;
     }
-    iw_report_start(restarted);
+    brd_report_start(restarted);
     for (;;) {
         cycle(&gateway, &commander);
     }

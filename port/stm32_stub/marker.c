@@ -14,7 +14,7 @@ static void set(bool sending) {
 }
 
 /// Not cleared here when set: a run that dies before its zeros are acknowledged must find it again.
-bool iw_marker_take(bool power_on) {
+bool brd_marker_take(bool power_on) {
     const bool was_sending = !power_on && word == SENDING && inverse == ~SENDING;
     if (!was_sending) {
         set(false);
@@ -23,7 +23,7 @@ bool iw_marker_take(bool power_on) {
 }
 
 /// A zero that was only handed over proves nothing; the marker goes with the first zeros that both wheels acknowledged.
-void iw_marker_step(const iw_snapshot_t *seen) {
+void brd_marker_step(const iw_snapshot_t *seen) {
     const bool silent = seen->demand == IW_DEMAND_SILENCE;
     if (!silent) {
         set(true);

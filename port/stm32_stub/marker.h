@@ -3,17 +3,17 @@
 ///
 /// It outlives any number of resets: only zeros that were acknowledged clear it, since only then the wheels do not keep
 /// an older command.
-#ifndef IW_STM32_MARKER_H
-#define IW_STM32_MARKER_H
+#ifndef BRD_MARKER_H
+#define BRD_MARKER_H
 
 #include "iwheel/snapshot.h"
 
 /// True if a run before this start was sending setpoints and no run has ended that: the wheels would keep the last
-/// command for their full second. Ask once, before `iw_marker_step`. `power_on`: RAM holds nothing of such a run.
-bool iw_marker_take(bool power_on);
+/// command for their full second. Ask once, before `brd_marker_step`. `power_on`: RAM holds nothing of such a run.
+bool brd_marker_take(bool power_on);
 
 /// After each step of the gateway. Sets the marker while setpoints are sent; clears it in the silence after a hold in
 /// which zeros for both wheels were acknowledged.
-void iw_marker_step(const iw_snapshot_t *seen);
+void brd_marker_step(const iw_snapshot_t *seen);
 
 #endif

@@ -45,7 +45,7 @@ static void pull_up(uint32_t pin) {
 }
 
 static void enable_clocks(void) {
-    static const uint8_t pins[] = {IW_BOARD_ESTOP, IW_BOARD_BUTTON, IW_BOARD_LAMP, IW_BOARD_CAN_RX, IW_BOARD_UART_RX};
+    static const uint8_t pins[] = {BRD_ESTOP, BRD_BUTTON, BRD_LAMP, BRD_CAN_RX, BRD_UART_RX};
     uint32_t ports = 0;
     for (size_t i = 0; i < sizeof pins; i++) {
         ports |= 1U << (pins[i] / 16U);
@@ -55,29 +55,28 @@ static void enable_clocks(void) {
 }
 
 /// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
-void iw_pins_init(void) {
+void brd_pins_init(void) {
     enable_clocks();
-    pull_up(IW_BOARD_ESTOP);
-    pull_up(IW_BOARD_BUTTON);
-    pull_up(IW_BOARD_CAN_RX); // No transceiver reads recessive.
-    pull_up(IW_BOARD_UART_RX);
-    iw_pins_lamp(false);
-    set_mode(IW_BOARD_LAMP, OUTPUT_SLOW);
-    AFIO_MAPR =
-        (IW_BOARD_CAN_ON_PA11 != 0) ? 0U : (2U << 13); // 9.4.2: CAN_REMAP; SWJ_CFG 0 leaves the debugger its pins.
-    set_mode(IW_BOARD_CAN_TX, ALTERNATE);
-    set_mode(IW_BOARD_UART_TX, ALTERNATE);
-    AFIO_EXTICR1 = (AFIO_EXTICR1 & ~0xFU) | (IW_BOARD_ESTOP / 16U); // 9.4.3: EXTI0's port.
+    pull_up(BRD_ESTOP);
+    pull_up(BRD_BUTTON);
+    pull_up(BRD_CAN_RX); // No transceiver reads recessive.
+    pull_up(BRD_UART_RX);
+    brd_pins_lamp(false);
+    set_mode(BRD_LAMP, OUTPUT_SLOW);
+    AFIO_MAPR = (BRD_CAN_ON_PA11 != 0) ? 0U : (2U << 13); // 9.4.2: CAN_REMAP; SWJ_CFG 0 leaves the debugger its pins.
+    set_mode(BRD_CAN_TX, ALTERNATE);
+    set_mode(BRD_UART_TX, ALTERNATE);
+    AFIO_EXTICR1 = (AFIO_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.4.3: EXTI0's port.
 }
 
-bool iw_pins_estop_high(void) {
-    return is_high(IW_BOARD_ESTOP);
+bool brd_pins_estop_high(void) {
+    return is_high(BRD_ESTOP);
 }
 
-bool iw_pins_button_low(void) {
-    return !is_high(IW_BOARD_BUTTON);
+bool brd_pins_button_low(void) {
+    return !is_high(BRD_BUTTON);
 }
 
-void iw_pins_lamp(bool lit) {
-    set_level(IW_BOARD_LAMP, lit == (IW_BOARD_LAMP_LIT != 0));
+void brd_pins_lamp(bool lit) {
+    set_level(BRD_LAMP, lit == (BRD_LAMP_LIT != 0));
 }

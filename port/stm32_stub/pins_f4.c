@@ -50,7 +50,7 @@ static void set_alternate(uint32_t pin, uint32_t function) {
 }
 
 static void enable_clocks(void) {
-    static const uint8_t pins[] = {IW_BOARD_ESTOP, IW_BOARD_BUTTON, IW_BOARD_LAMP, IW_BOARD_CAN_RX, IW_BOARD_UART_RX};
+    static const uint8_t pins[] = {BRD_ESTOP, BRD_BUTTON, BRD_LAMP, BRD_CAN_RX, BRD_UART_RX};
     uint32_t ports = 0;
     for (size_t i = 0; i < sizeof pins; i++) {
         ports |= 1U << (pins[i] / 16U);
@@ -61,30 +61,30 @@ static void enable_clocks(void) {
 }
 
 /// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
-void iw_pins_init(void) {
+void brd_pins_init(void) {
     enable_clocks();
-    iw_pins_lamp(false);
-    set_two(&port_of(IW_BOARD_LAMP)->MODER, IW_BOARD_LAMP, OUTPUT);
-    pull_up(IW_BOARD_ESTOP);
-    pull_up(IW_BOARD_BUTTON);
-    pull_up(IW_BOARD_CAN_RX); // No transceiver reads recessive.
-    pull_up(IW_BOARD_UART_RX);
-    set_alternate(IW_BOARD_CAN_RX, AF_CAN1);
-    set_alternate(IW_BOARD_CAN_TX, AF_CAN1);
-    set_alternate(IW_BOARD_UART_RX, AF_USART2);
-    set_alternate(IW_BOARD_UART_TX, AF_USART2);
-    SYSCFG_EXTICR1 = (SYSCFG_EXTICR1 & ~0xFU) | (IW_BOARD_ESTOP / 16U); // 9.2.3: EXTI0's port.
+    brd_pins_lamp(false);
+    set_two(&port_of(BRD_LAMP)->MODER, BRD_LAMP, OUTPUT);
+    pull_up(BRD_ESTOP);
+    pull_up(BRD_BUTTON);
+    pull_up(BRD_CAN_RX); // No transceiver reads recessive.
+    pull_up(BRD_UART_RX);
+    set_alternate(BRD_CAN_RX, AF_CAN1);
+    set_alternate(BRD_CAN_TX, AF_CAN1);
+    set_alternate(BRD_UART_RX, AF_USART2);
+    set_alternate(BRD_UART_TX, AF_USART2);
+    SYSCFG_EXTICR1 = (SYSCFG_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.2.3: EXTI0's port.
 }
 
-bool iw_pins_estop_high(void) {
-    return is_high(IW_BOARD_ESTOP);
+bool brd_pins_estop_high(void) {
+    return is_high(BRD_ESTOP);
 }
 
-bool iw_pins_button_low(void) {
-    return !is_high(IW_BOARD_BUTTON);
+bool brd_pins_button_low(void) {
+    return !is_high(BRD_BUTTON);
 }
 
-void iw_pins_lamp(bool lit) {
-    const bool high = lit == (IW_BOARD_LAMP_LIT != 0);
-    port_of(IW_BOARD_LAMP)->BSRR = (high ? 1U : 0x10000U) << (IW_BOARD_LAMP % 16U); // 8.4.7: the upper half clears.
+void brd_pins_lamp(bool lit) {
+    const bool high = lit == (BRD_LAMP_LIT != 0);
+    port_of(BRD_LAMP)->BSRR = (high ? 1U : 0x10000U) << (BRD_LAMP % 16U); // 8.4.7: the upper half clears.
 }

@@ -6,24 +6,24 @@
 ///     sampled at 62.5 %, BTR 0x03590001; e-stop on PB0: released; holds both wheels at zero
 ///     latched by send_stalled; bus active; e-stop released; to reset: mend the cause, release the e-stop, then press
 ///     the button on PA1
-#ifndef IW_STM32_REPORT_H
-#define IW_STM32_REPORT_H
+#ifndef BRD_REPORT_H
+#define BRD_REPORT_H
 
 #include "iwheel/snapshot.h"
 
 /// There is no crystal yet.
-void iw_report_no_crystal(void);
+void brd_report_no_crystal(void);
 
 /// The first line. `restarted`: the run before was sending, so zeros come first.
-void iw_report_start(bool restarted);
+void brd_report_start(bool restarted);
 
 /// Where the loop puts the snapshot after each step: whoever reports has one anyway.
-iw_snapshot_t *iw_report_room(void);
+iw_snapshot_t *brd_report_room(void);
 
 /// After each step: a line when state, cause, bus or e-stop changed, or somebody asks.
-void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed);
+void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed);
 
 /// How a press of the button that should reset was answered.
-void iw_report_reset(iw_refusal_t refusal);
+void brd_report_reset(iw_refusal_t refusal);
 
 #endif

@@ -21,13 +21,13 @@ typedef struct {
 #define DMAR   (1U << 6)
 #define DMAT   (1U << 7)
 
-static_assert((IW_SERIAL_RECEIVE_BYTES & (IW_SERIAL_RECEIVE_BYTES - 1U)) == 0U &&
-                  (IW_SERIAL_SEND_BYTES & (IW_SERIAL_SEND_BYTES - 1U)) == 0U,
+static_assert((BRD_SERIAL_RECEIVE_BYTES & (BRD_SERIAL_RECEIVE_BYTES - 1U)) == 0U &&
+                  (BRD_SERIAL_SEND_BYTES & (BRD_SERIAL_SEND_BYTES - 1U)) == 0U,
               "the indices wrap at a power of two");
 
 // The DMA writes and reads these, and the interrupts' handlers have no argument: so they stand at file scope.
-static char received[IW_SERIAL_RECEIVE_BYTES];
-static char waiting[IW_SERIAL_SEND_BYTES];
+static char received[BRD_SERIAL_RECEIVE_BYTES];
+static char waiting[BRD_SERIAL_SEND_BYTES];
 static uint32_t taken;     // Where the next byte received is read.
 static uint32_t put, sent; // Bytes of `waiting` since the start.
 static uint32_t sending;   // Of them, how many the DMA has now.
@@ -37,51 +37,51 @@ static uint32_t lent_at; // It goes before this byte of `waiting`.
 static bool lent_is_sending;
 static atomic_bool had_error;
 
-void iw_serial_start(uint32_t apb1_hz) {
+void brd_serial_start(uint32_t apb1_hz) {
     USART2->CR1 = 0;
     taken = put = sent = sending = 0;
     lent = NULL;
     lent_is_sending = false;
-    USART2->BRR = (apb1_hz + IW_SERIAL_BAUD / 2U) / IW_SERIAL_BAUD; // 27.3.4: sixteenths.
+    USART2->BRR = (apb1_hz + BRD_SERIAL_BAUD / 2U) / BRD_SERIAL_BAUD; // 27.3.4: sixteenths.
     USART2->CR3 = DMAR | DMAT | EIE;
-    iw_serial_dma_start(&USART2->DR, received, sizeof received);
+    brd_serial_dma_start(&USART2->DR, received, sizeof received);
     USART2->CR1 = UE | TE | RE | IDLEIE;
-    iw_irq_enable(IW_IRQ_SERIAL_RECEIVE);
-    iw_irq_enable(IW_IRQ_SERIAL_TRANSMIT);
-    iw_irq_enable(IW_IRQ_SERIAL);
+    brd_irq_enable(BRD_IRQ_SERIAL_RECEIVE);
+    brd_irq_enable(BRD_IRQ_SERIAL_TRANSMIT);
+    brd_irq_enable(BRD_IRQ_SERIAL);
 }
 
-size_t iw_serial_read(char *out, size_t size) {
-    const uint32_t head = IW_SERIAL_RECEIVE_BYTES - iw_serial_dma_left();
+size_t brd_serial_read(char *out, size_t size) {
+    const uint32_t head = BRD_SERIAL_RECEIVE_BYTES - brd_serial_dma_left();
     size_t count = 0;
-    while (count < size && taken != head % IW_SERIAL_RECEIVE_BYTES) {
+    while (count < size && taken != head % BRD_SERIAL_RECEIVE_BYTES) {
         out[count++] = received[taken];
-        taken = (taken + 1U) % IW_SERIAL_RECEIVE_BYTES;
+        taken = (taken + 1U) % BRD_SERIAL_RECEIVE_BYTES;
     }
     return count;
 }
 
-bool iw_serial_had_error(void) {
+bool brd_serial_had_error(void) {
     return atomic_exchange_explicit(&had_error, false, memory_order_relaxed);
 }
 
-size_t iw_serial_room(void) {
-    return IW_SERIAL_SEND_BYTES - (put - sent);
+size_t brd_serial_room(void) {
+    return BRD_SERIAL_SEND_BYTES - (put - sent);
 }
 
-bool iw_serial_write(const char *bytes, size_t length) {
-    if (length > iw_serial_room()) {
+bool brd_serial_write(const char *bytes, size_t length) {
+    if (length > brd_serial_room()) {
         return false;
     }
-    const size_t at = put % IW_SERIAL_SEND_BYTES;
-    const size_t first = (length < IW_SERIAL_SEND_BYTES - at) ? length : IW_SERIAL_SEND_BYTES - at;
+    const size_t at = put % BRD_SERIAL_SEND_BYTES;
+    const size_t first = (length < BRD_SERIAL_SEND_BYTES - at) ? length : BRD_SERIAL_SEND_BYTES - at;
     memcpy(&waiting[at], bytes, first);
     memcpy(waiting, &bytes[first], length - first);
     put += (uint32_t)length;
     return true;
 }
 
-bool iw_serial_lend(const char *bytes, size_t length) {
+bool brd_serial_lend(const char *bytes, size_t length) {
     if (lent != NULL) {
         return false;
     }
@@ -91,12 +91,12 @@ bool iw_serial_lend(const char *bytes, size_t length) {
     return true;
 }
 
-bool iw_serial_lends(void) {
+bool brd_serial_lends(void) {
     return lent != NULL;
 }
 
-bool iw_serial_is_idle(void) {
-    return put == sent && lent == NULL && !iw_serial_dma_sends() && (USART2->SR & TC) != 0U;
+bool brd_serial_is_idle(void) {
+    return put == sent && lent == NULL && !brd_serial_dma_sends() && (USART2->SR & TC) != 0U;
 }
 
 /// What the DMA had is on its way.
@@ -109,40 +109,40 @@ static void settle(void) {
     sending = 0;
 }
 
-void iw_serial_step(void) {
-    if (iw_serial_dma_sends()) {
+void brd_serial_step(void) {
+    if (brd_serial_dma_sends()) {
         return;
     }
     settle();
     if (lent != NULL && sent == lent_at) {
         lent_is_sending = true;
-        iw_serial_dma_send(&USART2->DR, lent, lent_bytes);
+        brd_serial_dma_send(&USART2->DR, lent, lent_bytes);
         return;
     }
     const uint32_t until = (lent != NULL) ? lent_at : put;
-    const uint32_t to_end = IW_SERIAL_SEND_BYTES - sent % IW_SERIAL_SEND_BYTES;
+    const uint32_t to_end = BRD_SERIAL_SEND_BYTES - sent % BRD_SERIAL_SEND_BYTES;
     sending = (until - sent < to_end) ? until - sent : to_end;
     if (sending > 0U) {
-        iw_serial_dma_send(&USART2->DR, &waiting[sent % IW_SERIAL_SEND_BYTES], sending);
+        brd_serial_dma_send(&USART2->DR, &waiting[sent % BRD_SERIAL_SEND_BYTES], sending);
     }
 }
 
 /// Reading SR, then DR, ends pause and errors (27.6.1). The byte in DR has been fetched by the DMA already, or is
 /// damaged.
-void iw_serial_usart_handler(void) {
+void brd_serial_usart_handler(void) {
     if ((USART2->SR & ERRORS) != 0U) {
         atomic_store_explicit(&had_error, true, memory_order_relaxed);
     }
     (void)USART2->DR;
-    iw_wake();
+    brd_wake();
 }
 
-void iw_serial_receive_handler(void) {
-    iw_serial_dma_acknowledge();
-    iw_wake();
+void brd_serial_receive_handler(void) {
+    brd_serial_dma_acknowledge();
+    brd_wake();
 }
 
-void iw_serial_transmit_handler(void) {
-    iw_serial_dma_acknowledge();
-    iw_wake();
+void brd_serial_transmit_handler(void) {
+    brd_serial_dma_acknowledge();
+    brd_wake();
 }

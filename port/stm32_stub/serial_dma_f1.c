@@ -28,7 +28,7 @@ typedef struct {
 
 #define ALL_FLAGS (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
 
-void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
+void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
     AHBENR |= 1U << 0;
     RECEIVE->CCR = 0;
     TRANSMIT->CCR = 0;
@@ -39,12 +39,12 @@ void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_
     RECEIVE->CCR = HIGH | MEMORY_NEXT | CIRCULAR | AT_HALF | AT_END | ENABLE;
 }
 
-uint32_t iw_serial_dma_left(void) {
+uint32_t brd_serial_dma_left(void) {
     return RECEIVE->CNDTR;
 }
 
 /// 13.3.3: the count can be written only while the channel is off.
-void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
+void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     TRANSMIT->CCR = 0;
     TRANSMIT->CPAR = (uint32_t)(uintptr_t)data_register;
     TRANSMIT->CMAR = (uint32_t)(uintptr_t)bytes;
@@ -52,10 +52,10 @@ void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uin
     TRANSMIT->CCR = MEMORY_NEXT | FROM_MEMORY | AT_END | ENABLE;
 }
 
-bool iw_serial_dma_sends(void) {
+bool brd_serial_dma_sends(void) {
     return (TRANSMIT->CCR & ENABLE) != 0U && TRANSMIT->CNDTR != 0U;
 }
 
-void iw_serial_dma_acknowledge(void) {
+void brd_serial_dma_acknowledge(void) {
     DMA1->IFCR = ALL_FLAGS;
 }

@@ -28,7 +28,7 @@ typedef struct {
 
 #define ALL_FLAGS ((0x3DU << 6) | (0x3DU << 16)) // 10.5.4: streams 5 and 6.
 
-void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
+void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
     AHB1ENR |= 1U << 21;
     RECEIVE->CR = 0;
     TRANSMIT->CR = 0;
@@ -41,12 +41,12 @@ void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_
     RECEIVE->CR = CHANNEL_4 | HIGH | MEMORY_NEXT | CIRCULAR | AT_HALF | AT_END | ENABLE;
 }
 
-uint32_t iw_serial_dma_left(void) {
+uint32_t brd_serial_dma_left(void) {
     return RECEIVE->NDTR;
 }
 
 /// 10.3.17: the flags of the last time must be cleared before a stream is enabled again. It has disabled itself.
-void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
+void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     DMA1->HIFCR = 0x3DU << 16;
     TRANSMIT->PAR = (uint32_t)(uintptr_t)data_register;
     TRANSMIT->M0AR = (uint32_t)(uintptr_t)bytes;
@@ -54,10 +54,10 @@ void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uin
     TRANSMIT->CR = CHANNEL_4 | MEMORY_NEXT | FROM_MEMORY | AT_END | ENABLE;
 }
 
-bool iw_serial_dma_sends(void) {
+bool brd_serial_dma_sends(void) {
     return (TRANSMIT->CR & ENABLE) != 0U;
 }
 
-void iw_serial_dma_acknowledge(void) {
+void brd_serial_dma_acknowledge(void) {
     DMA1->HIFCR = ALL_FLAGS;
 }

@@ -2,52 +2,52 @@
 #include "cortex_m.h"
 
 int main(void);
-void iw_reset_handler(void);
-void iw_systick_handler(void);
-void iw_exti0_handler(void);
-void iw_can_transmit_handler(void);
-void iw_can_receive_handler(void);
-void iw_can_error_handler(void);
+void brd_reset_handler(void);
+void brd_systick_handler(void);
+void brd_exti0_handler(void);
+void brd_can_transmit_handler(void);
+void brd_can_receive_handler(void);
+void brd_can_error_handler(void);
 // Of serial.c: an image without it never enables them.
-__attribute__((weak)) void iw_serial_usart_handler(void);
-__attribute__((weak)) void iw_serial_receive_handler(void);
-__attribute__((weak)) void iw_serial_transmit_handler(void);
+__attribute__((weak)) void brd_serial_usart_handler(void);
+__attribute__((weak)) void brd_serial_receive_handler(void);
+__attribute__((weak)) void brd_serial_transmit_handler(void);
 
-extern uint32_t iw_link_stack_top[], iw_link_data_load[], iw_link_data_start[], iw_link_data_end[];
-extern uint32_t iw_link_bss_start[], iw_link_bss_end[];
+extern uint32_t brd_link_stack_top[], brd_link_data_load[], brd_link_data_start[], brd_link_data_end[];
+extern uint32_t brd_link_bss_start[], brd_link_bss_end[];
 
 /// Any fault, the failure of the crystal (NMI) and every unexpected exception: reset. If setpoints were being sent
 /// the next run begins with zeros; see marker.h. An overflow of the stack ends here too (see sections.ld), so the stack
 /// is not used; what the core makes of a fault without a stack, if not this handler, is a lockup, which the watchdog
 /// ends.
 __attribute__((naked)) static void fault_handler(void) {
-    __asm volatile("ldr r0, =iw_link_stack_top\n msr msp, r0\n b iw_system_reset");
+    __asm volatile("ldr r0, =brd_link_stack_top\n msr msp, r0\n b brd_system_reset");
 }
 
-void iw_reset_handler(void) {
-    const uint32_t *from = iw_link_data_load;
-    for (uint32_t *to = iw_link_data_start; to < iw_link_data_end; to++, from++) {
+void brd_reset_handler(void) {
+    const uint32_t *from = brd_link_data_load;
+    for (uint32_t *to = brd_link_data_start; to < brd_link_data_end; to++, from++) {
         *to = *from;
     }
-    for (uint32_t *to = iw_link_bss_start; to < iw_link_bss_end; to++) {
+    for (uint32_t *to = brd_link_bss_start; to < brd_link_bss_end; to++) {
         *to = 0;
     }
     (void)main();
-    iw_system_reset();
+    brd_system_reset();
 }
 
 typedef union {
     void (*handler)(void);
     uint32_t *stack_top;
-} iw_vector_t;
+} brd_vector_t;
 
 #define EXCEPTIONS 16
-#define VECTORS    (EXCEPTIONS + IW_IRQ_SERIAL + 1)
+#define VECTORS    (EXCEPTIONS + BRD_IRQ_SERIAL + 1)
 
 /// The vectors up to the last interrupt that is enabled. Empty ones cannot come.
-__attribute__((section(".vectors"), used)) static const iw_vector_t vectors[VECTORS] = {
-    [0] = {.stack_top = iw_link_stack_top},
-    [1] = {.handler = iw_reset_handler},
+__attribute__((section(".vectors"), used)) static const brd_vector_t vectors[VECTORS] = {
+    [0] = {.stack_top = brd_link_stack_top},
+    [1] = {.handler = brd_reset_handler},
     [2] = {.handler = fault_handler},
     [3] = {.handler = fault_handler},
     [4] = {.handler = fault_handler},
@@ -55,12 +55,12 @@ __attribute__((section(".vectors"), used)) static const iw_vector_t vectors[VECT
     [6] = {.handler = fault_handler},
     [11] = {.handler = fault_handler},
     [14] = {.handler = fault_handler},
-    [15] = {.handler = iw_systick_handler},
-    [EXCEPTIONS + IW_IRQ_EXTI0] = {.handler = iw_exti0_handler},
-    [EXCEPTIONS + IW_IRQ_SERIAL_RECEIVE] = {.handler = iw_serial_receive_handler},
-    [EXCEPTIONS + IW_IRQ_SERIAL_TRANSMIT] = {.handler = iw_serial_transmit_handler},
-    [EXCEPTIONS + IW_IRQ_SERIAL] = {.handler = iw_serial_usart_handler},
-    [EXCEPTIONS + IW_IRQ_CAN_TRANSMIT] = {.handler = iw_can_transmit_handler},
-    [EXCEPTIONS + IW_IRQ_CAN_RECEIVE] = {.handler = iw_can_receive_handler},
-    [EXCEPTIONS + IW_IRQ_CAN_ERROR] = {.handler = iw_can_error_handler},
+    [15] = {.handler = brd_systick_handler},
+    [EXCEPTIONS + BRD_IRQ_EXTI0] = {.handler = brd_exti0_handler},
+    [EXCEPTIONS + BRD_IRQ_SERIAL_RECEIVE] = {.handler = brd_serial_receive_handler},
+    [EXCEPTIONS + BRD_IRQ_SERIAL_TRANSMIT] = {.handler = brd_serial_transmit_handler},
+    [EXCEPTIONS + BRD_IRQ_SERIAL] = {.handler = brd_serial_usart_handler},
+    [EXCEPTIONS + BRD_IRQ_CAN_TRANSMIT] = {.handler = brd_can_transmit_handler},
+    [EXCEPTIONS + BRD_IRQ_CAN_RECEIVE] = {.handler = brd_can_receive_handler},
+    [EXCEPTIONS + BRD_IRQ_CAN_ERROR] = {.handler = brd_can_error_handler},
 };

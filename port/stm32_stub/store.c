@@ -8,17 +8,17 @@
 #include <assert.h>
 
 #define SLOT_WORDS 64U
-#define SLOTS      (IW_FLASH_PAGE_WORDS / SLOT_WORDS)
+#define SLOTS      (BRD_FLASH_PAGE_WORDS / SLOT_WORDS)
 #define CRC_AT     (SLOT_WORDS - 1U)
 #define BLANK      0xFFFFFFFFU
 /// Fewer, and a start makes room: one for a configuration, one for what is learnt.
 #define BLANK_LEAST 3U
 
-static_assert(IW_STORE_WORDS + 2U <= CRC_AT, "sequence, payload and CRC fit a slot");
+static_assert(BRD_STORE_WORDS + 2U <= CRC_AT, "sequence, payload and CRC fit a slot");
 static_assert(BLANK_LEAST < SLOTS, "a page that was just begun has so many");
 
 static uint32_t read(unsigned page, unsigned slot, unsigned word) {
-    return iw_flash_page(page)[slot * SLOT_WORDS + word];
+    return brd_flash_page(page)[slot * SLOT_WORDS + word];
 }
 
 static uint32_t crc_of(unsigned page, unsigned slot) {
@@ -44,9 +44,9 @@ static bool is_blank(unsigned page, unsigned slot) {
     return true;
 }
 
-void iw_store_open(iw_store_t *self) {
-    *self = (iw_store_t){.sequence = 0};
-    for (unsigned page = 0; page < IW_FLASH_PAGES; page++) {
+void brd_store_open(brd_store_t *self) {
+    *self = (brd_store_t){.sequence = 0};
+    for (unsigned page = 0; page < BRD_FLASH_PAGES; page++) {
         for (unsigned slot = 0; slot < SLOTS; slot++) {
             if (is_right(page, slot) && read(page, slot, 0) > self->sequence) {
                 self->sequence = read(page, slot, 0);
@@ -57,14 +57,14 @@ void iw_store_open(iw_store_t *self) {
     }
 }
 
-bool iw_store_read(const iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]) {
-    for (unsigned word = 0; word < IW_STORE_WORDS && self->sequence != 0U; word++) {
+bool brd_store_read(const brd_store_t *self, uint32_t out_payload[BRD_STORE_WORDS]) {
+    for (unsigned word = 0; word < BRD_STORE_WORDS && self->sequence != 0U; word++) {
         out_payload[word] = read(self->page, self->slot, 1U + word);
     }
     return self->sequence != 0U;
 }
 
-unsigned iw_store_blank(const iw_store_t *self) {
+unsigned brd_store_blank(const brd_store_t *self) {
     unsigned blank = 0;
     for (unsigned slot = 0; slot < SLOTS; slot++) {
         blank += is_blank(self->page, slot) ? 1U : 0U;
@@ -74,15 +74,15 @@ unsigned iw_store_blank(const iw_store_t *self) {
 
 /// The CRC last: before it the record does not count.
 static bool write_slot(unsigned page, unsigned slot, uint32_t sequence, const uint32_t *payload) {
-    bool good = iw_flash_write(page, slot * SLOT_WORDS, sequence);
-    for (unsigned word = 0; word < IW_STORE_WORDS && good; word++) {
-        good = payload[word] == BLANK || iw_flash_write(page, slot * SLOT_WORDS + 1U + word, payload[word]);
+    bool good = brd_flash_write(page, slot * SLOT_WORDS, sequence);
+    for (unsigned word = 0; word < BRD_STORE_WORDS && good; word++) {
+        good = payload[word] == BLANK || brd_flash_write(page, slot * SLOT_WORDS + 1U + word, payload[word]);
     }
-    return good && iw_flash_write(page, slot * SLOT_WORDS + CRC_AT, crc_of(page, slot)) && is_right(page, slot);
+    return good && brd_flash_write(page, slot * SLOT_WORDS + CRC_AT, crc_of(page, slot)) && is_right(page, slot);
 }
 
 /// Into the first blank slot of the page. One that fails is not blank any more, and the next is tried.
-static bool write_in(iw_store_t *self, unsigned page, const uint32_t *payload) {
+static bool write_in(brd_store_t *self, unsigned page, const uint32_t *payload) {
     for (unsigned slot = 0; slot < SLOTS; slot++) {
         if (is_blank(page, slot) && write_slot(page, slot, self->sequence + 1U, payload)) {
             self->sequence++;
@@ -94,14 +94,14 @@ static bool write_in(iw_store_t *self, unsigned page, const uint32_t *payload) {
     return false;
 }
 
-bool iw_store_write(iw_store_t *self, const uint32_t payload[IW_STORE_WORDS], bool may_erase) {
-    const unsigned other = (self->page + 1U) % IW_FLASH_PAGES;
+bool brd_store_write(brd_store_t *self, const uint32_t payload[BRD_STORE_WORDS], bool may_erase) {
+    const unsigned other = (self->page + 1U) % BRD_FLASH_PAGES;
     bool good = false;
-    if (!may_erase || iw_store_blank(self) >= BLANK_LEAST) {
+    if (!may_erase || brd_store_blank(self) >= BLANK_LEAST) {
         good = write_in(self, self->page, payload);
     }
     if (!good && may_erase) { // The newest record is on the page that stays.
-        good = iw_flash_erase(other) && write_in(self, other, payload);
+        good = brd_flash_erase(other) && write_in(self, other, payload);
     }
     self->failed = !good;
     return good;

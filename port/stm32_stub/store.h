@@ -9,33 +9,33 @@
 ///
 /// Wear: with a record at each power-on, an F103's pages are erased once in four of them: 40 000 power-ons at the 10
 /// 000 erasures that its maker promises.
-#ifndef IW_STM32_STORE_H
-#define IW_STM32_STORE_H
+#ifndef BRD_STORE_H
+#define BRD_STORE_H
 
 #include "iwheel/types.h"
 
 /// Of the payload of a record.
-#define IW_STORE_WORDS 60U
+#define BRD_STORE_WORDS 60U
 
-/// All zero before `iw_store_open`.
+/// All zero before `brd_store_open`.
 typedef struct {
     uint32_t sequence; ///< Of the newest record; 0: there is none.
     uint8_t page;      ///< Where it is ...
     uint8_t slot;
     bool failed; ///< The flash did not take a record.
-} iw_store_t;
+} brd_store_t;
 
 /// Finds the newest record.
-void iw_store_open(iw_store_t *self);
+void brd_store_open(brd_store_t *self);
 
 /// Its payload. False if there is none: `out_payload` is left alone.
-bool iw_store_read(const iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]);
+bool brd_store_read(const brd_store_t *self, uint32_t out_payload[BRD_STORE_WORDS]);
 
 /// Writes a record. `may_erase`: before the watchdog runs and with nothing being sent, so that it may take seconds;
 /// else false when no slot is blank. False, too, if the flash fails.
-bool iw_store_write(iw_store_t *self, const uint32_t payload[IW_STORE_WORDS], bool may_erase);
+bool brd_store_write(brd_store_t *self, const uint32_t payload[BRD_STORE_WORDS], bool may_erase);
 
 /// Slots that are blank now.
-unsigned iw_store_blank(const iw_store_t *self);
+unsigned brd_store_blank(const brd_store_t *self);
 
 #endif

@@ -16,24 +16,24 @@ typedef struct {
 #define UNLOCK 0x5555U
 #define START  0xCCCCU
 #define BY_4   0U
-#define RELOAD (IW_BOARD_LSI_MAX_HZ / 4U * IW_WATCHDOG_MS / 1000U + 1U)
+#define RELOAD (BRD_LSI_MAX_HZ / 4U * BRD_WATCHDOG_MS / 1000U + 1U)
 
 // The registers take the values within 5 cycles of the slow oscillator; reads of SR take 8 cycles of the core at the
 // least.
-#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 1000U)
+#define POLLS_MAX (BRD_INTERNAL_HZ / 8U / 1000U)
 
 static_assert(RELOAD <= 0xFFFU, "12 bits");
 
-void iw_watchdog_start(void) {
+void brd_watchdog_start(void) {
     IWDG->KR = START;
     IWDG->KR = UNLOCK;
     IWDG->PR = BY_4;
     IWDG->RLR = RELOAD;
     for (uint32_t poll = 0; IWDG->SR != 0U && poll < POLLS_MAX; poll++) {
     }
-    iw_watchdog_feed();
+    brd_watchdog_feed();
 }
 
-void iw_watchdog_feed(void) {
+void brd_watchdog_feed(void) {
     IWDG->KR = FEED;
 }

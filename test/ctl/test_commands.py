@@ -258,7 +258,7 @@ class Completion(unittest.TestCase):
 
     def test_lists_are_those_of_the_program(self):
         self.assertLessEqual(set(ITEMS), set(listed("confirm")))
-        ledger = subprocess.run(["grep", "-c", "IW_LEDGER_", os.path.join(ROOT, "core", "include", "iwheel", "types.h")],
+        ledger = subprocess.run(["grep", "-c", "IW_ASSUMPTION_", os.path.join(ROOT, "core", "include", "iwheel", "types.h")],
                                 capture_output=True, text=True, check=True)
         self.assertGreater(int(ledger.stdout), len(ITEMS))
         for verb in verbs():

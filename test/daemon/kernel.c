@@ -2,8 +2,8 @@
 // Descriptors, time, waiting and processes of the virtual kernel.
 #include "kernel.h"
 
-#include "judge.h"
-#include "world.h"
+#include "daemon_judge.h"
+#include "daemon_world.h"
 #include "wrapped.h"
 
 #include <errno.h>
@@ -73,7 +73,7 @@ static void die(void) {
 }
 
 /// The purge's process, and whatever else goes on beside the gateway in this machine.
-static void tend_link(void) {
+static void poll_link(void) {
     if (vk.now_us >= vk.link.down_at_us) {
         vk.link.down_at_us = IW_NEVER;
         vk_link_up(false);
@@ -99,7 +99,7 @@ void vk_pass(iw_time_us_t to_us) {
             break;
         }
         advance(next_us);
-        tend_link();
+        poll_link();
         world_run();
     }
     advance(to_us);

@@ -5,7 +5,7 @@
 /// all. One process lives at a time. Whatever it does takes virtual time only here, in a call, so that calls are all the instants
 /// at which anybody outside could tell one run from another; at each of them
 ///
-/// - time passes, the outside world goes on (world.h), and the process may be stopped, or preempted
+/// - time passes, the outside world goes on (daemon_world.h), and the process may be stopped, or preempted
 /// - it may be killed, before the call takes effect or right after
 /// - the call may fail, with an errno that its manual page names
 ///

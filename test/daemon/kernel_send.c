@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "wrapped.h"
 
+#include "daemon_world.h"
 #include "kernel.h"
-#include "world.h"
 
 #include <errno.h>
 #include <string.h>

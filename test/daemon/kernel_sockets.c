@@ -2,10 +2,10 @@
 // Sockets of the virtual kernel: clients' connections, the CAN interface with its netlink, the ends towards child processes.
 #include "kernel.h"
 
-#include "world.h"
+#include "daemon_world.h"
 #include "wrapped.h"
 
-#include "disk/keeper.h"
+#include "disk/file_store.h"
 #include "iwheel/codec.h"
 
 #include <errno.h>
@@ -223,7 +223,7 @@ int __wrap_socketpair(int domain, int type, int protocol, int ends[2]) {
         return -1;
     }
     vk_fd(ends[0])->locked = pairs == 0U;
-    vk_fd(ends[0])->offset = (pairs == 0U) ? (size_t)GW_KEEPER_ABSENT : 0U;
+    vk_fd(ends[0])->offset = (pairs == 0U) ? (size_t)GW_FILE_STORE_ABSENT : 0U;
     pairs++;
     return (int)vk_done(0);
 }
@@ -311,7 +311,8 @@ ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags) {
         return give_stream(&vk.stream[entry->number], bytes, size);
     case VK_CHILD:
         (void)vk_call("send", NULL);
-        entry->offset = (entry->locked && ((const char *)bytes)[0] == 'w') ? (size_t)GW_KEEPER_WRITTEN : entry->offset;
+        entry->offset =
+            (entry->locked && ((const char *)bytes)[0] == 'w') ? (size_t)GW_FILE_STORE_WRITTEN : entry->offset;
         return vk_done((long)size);
     default:
         (void)vk_call("send", NULL);
@@ -338,7 +339,7 @@ static ssize_t take_child(vk_fd_t *entry, char *out) {
     if (!vk_call("recv", errors)) {
         return -1;
     }
-    const int error = (entry->offset == (size_t)GW_KEEPER_ABSENT) ? ENOENT : 0;
+    const int error = (entry->offset == (size_t)GW_FILE_STORE_ABSENT) ? ENOENT : 0;
     errno = EAGAIN;
     if (entry->offset == 0U) {
         return vk_done(-1);

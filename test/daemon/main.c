@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "world.h"
+#include "daemon_world.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What happens in a scenario, drawn from its seed.
-#include "world.h"
+#include "daemon_world.h"
 
 #include "iwheel_sim/random.h"
 
@@ -122,7 +122,7 @@ void scenario_draw(scenario_t *self, uint64_t seed) {
     self->chaos_us = at_us + 1U * S;
 }
 
-/// Drives of all kinds behind each other; who is killed is decided call by call (world.c).
+/// Drives of all kinds behind each other; who is killed is decided call by call (daemon_world.c).
 void scenario_kills(scenario_t *self, uint64_t seed, uint32_t lives) {
     sim_random_t random;
     memset(self, 0, sizeof *self);

@@ -6,15 +6,15 @@
 /// Eva computes a superset of all values that every object can have at every statement of every such run. What it cannot
 /// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/static.md.
 #include "iwheel/bit_timing.h"
-#include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
+#include "iwheel/observation.h"
 
 #include <__fc_builtin.h>
 
 #define GEAR_MAX 100U
 
 static iw_gateway_t gateway;
-static iw_motion_evidence_t evidence;
+static iw_observation_t observation;
 static iw_time_us_t now_us;
 static iw_estop_pair_t contacts;
 
@@ -205,22 +205,22 @@ static void request(void) {
 }
 
 static void operate(iw_side_t side) {
-    const iw_ledger_item_t item = (iw_ledger_item_t)Frama_C_interval(0, IW_LEDGER_ITEMS - 1);
-    const iw_evidence_t evidence = (iw_evidence_t)Frama_C_interval(IW_EVIDENCE_NONE, IW_EVIDENCE_OPERATOR);
-    const iw_ledger_state_t state = (iw_ledger_state_t)Frama_C_interval(IW_LEDGER_ASSUMED, IW_LEDGER_CONTRADICTED);
-    const iw_ledger_entry_t entry = {state, evidence, any_i32()};
+    const iw_assumption_item_t item = (iw_assumption_item_t)Frama_C_interval(0, IW_ASSUMPTION_ITEMS - 1);
+    const iw_source_t source = (iw_source_t)Frama_C_interval(IW_SOURCE_NONE, IW_SOURCE_OPERATOR);
+    const iw_assumption_state_t state = (iw_assumption_state_t)Frama_C_interval(IW_ASSUMED, IW_CONTRADICTED);
+    const iw_assumption_entry_t entry = {state, source, any_i32()};
     switch (Frama_C_interval(0, 4)) {
     case 0:
-        iw_ledger_assume(&gateway.ledger, item, evidence);
+        iw_assumption_assume(&gateway.assumptions, item, source);
         break;
     case 1:
-        iw_ledger_confirm(&gateway.ledger, item, evidence, any_i32());
+        iw_assumption_confirm(&gateway.assumptions, item, source, any_i32());
         break;
     case 2:
-        iw_ledger_contradict(&gateway.ledger, item, evidence, any_i32());
+        iw_assumption_contradict(&gateway.assumptions, item, source, any_i32());
         break;
     case 3:
-        iw_gateway_know(&gateway, item, &entry);
+        iw_gateway_set_assumption(&gateway, item, &entry);
         break;
     default:
         iw_gateway_restore_offset(&gateway, side, any_bool() ? IW_OFFSET_STORED : IW_OFFSET_OPERATOR,
@@ -242,10 +242,10 @@ static void look(iw_side_t side) {
     (void)iw_gateway_is_sending(&gateway);
     iw_gateway_snapshot(&gateway, now_us, &seen);
     (void)iw_snapshot_force_validity(&seen, side);
-    iw_motion_evidence_look(&evidence, &gateway, &seen);
+    iw_observation_step(&source, &gateway, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
-    (void)iw_ledger_entry(&gateway.ledger, IW_LEDGER_DLC);
+    (void)iw_assumption_entry(&gateway.assumptions, IW_ASSUMPTION_DLC);
 }
 
 /// What does not belong to the loop of a gateway: the codec's other direction, the bit timing.
@@ -303,7 +303,7 @@ int main(void) {
     if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
         return 1;
     }
-    iw_motion_evidence_init(&evidence);
+    iw_observation_init(&source);
     //@ slevel merge;
     live();
     return 0;

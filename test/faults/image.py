@@ -10,10 +10,10 @@ from table import ROOT, Broken
 
 TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
 DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
-IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "small.c", "startup.c", "watchdog.c")
+IMAGE_FILES = (*DRIVER_FILES, "board_clock.c", "board_clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "small.c", "startup.c", "watchdog.c")
 ALONE_FILES = ("commander.c", "console.c", "report.c")
-GATEWAY_FILES = (*(path.name for path in sorted(SERVER.glob("*.c"))), "answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c",
-                 "kept.c", "learnt.c", "pending.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c", "told.c")
+GATEWAY_FILES = (*(path.name for path in sorted(SERVER.glob("*.c"))), "board_answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c",
+                 "board_records.c", "board_assumptions.c", "pending.c", "serial.c", "serial_dma_f1.c", "board_settings.c", "store.c", "board_events.c")
 
 
 def run(command):

@@ -241,8 +241,8 @@ static void weigh(world_t *world, int8_t load) {
 static void learn(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
     const uint8_t value = fuzz_byte(bytes);
     const iw_bus_facts_t facts = {(value & 1U) != 0U, (value & 2U) != 0U};
-    const iw_ledger_entry_t entry = {(iw_ledger_state_t)(what / 8U % 3U), (iw_evidence_t)(what % 4U),
-                                     (int8_t)value * 99};
+    const iw_assumption_entry_t entry = {(iw_assumption_state_t)(what / 8U % 3U), (iw_source_t)(what % 4U),
+                                         (int8_t)value * 99};
     iw_snapshot_t seen;
     iw_side_t side;
     switch (what % 5U) {
@@ -257,7 +257,7 @@ static void learn(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
                                   (int8_t)value * 3000);
         break;
     case 3:
-        iw_gateway_know(&world->gateway, (iw_ledger_item_t)(value % IW_LEDGER_ITEMS), &entry);
+        iw_gateway_set_assumption(&world->gateway, (iw_assumption_item_t)(value % IW_ASSUMPTION_ITEMS), &entry);
         break;
     default:
         iw_gateway_bus_facts(&world->gateway, &facts);

@@ -3,7 +3,7 @@
 // written and read again. The mutator puts the checksum right, or nothing would ever come behind it.
 #include "fuzz.h"
 
-#include "ledger/memory.h"
+#include "assumptions/assumptions_file.h"
 
 #include "iwheel_northbound/line.h"
 
@@ -29,28 +29,29 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static char again[GW_MEMORY_SIZE];
-    static gw_known_t known;
-    static gw_known_t before;
-    char reason[GW_MEMORY_REASON_SIZE] = "";
+    static char again[GW_ASSUMPTIONS_FILE_SIZE];
+    static gw_stored_t known;
+    static gw_stored_t before;
+    char reason[GW_ASSUMPTIONS_REASON_SIZE] = "";
     char *const text = malloc((size > 0U) ? size : 1U);
     memcpy(text, data, size); // Of exactly its length: a byte read behind it is found.
     memset(&known, 0xA5, sizeof known);
     before = known;
-    if (gw_memory_read(text, size, BUS, &known, reason)) {
+    if (gw_assumptions_file_read(text, size, BUS, &known, reason)) {
         fuzz_tell("taken");
-        for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-            fuzz_require(known.item[item].entry.state == IW_LEDGER_ASSUMED ||
-                             gw_bounds_item((iw_ledger_item_t)item, &known.item[item]),
+        for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+            fuzz_require(known.item[item].entry.state == IW_ASSUMED ||
+                             gw_bounds_item((iw_assumption_item_t)item, &known.item[item]),
                          "evidence that a run could find");
         }
         for (unsigned side = 0; side < IW_SIDES; side++) {
             fuzz_require(known.offset[side].from == IW_OFFSET_NONE || gw_bounds_offset(&known.offset[side]),
                          "an offset that a wheel could have");
         }
-        const size_t length = gw_memory_write(&known, BUS, again, sizeof again);
+        const size_t length = gw_assumptions_file_write(&known, BUS, again, sizeof again);
         memset(&before, 0, sizeof before);
-        fuzz_require(length > 0U && gw_memory_read(again, length, BUS, &before, reason), "written, it can be read");
+        fuzz_require(length > 0U && gw_assumptions_file_read(again, length, BUS, &before, reason),
+                     "written, it can be read");
         fuzz_require(memcmp(&before, &known, sizeof known) == 0, "and says the same");
     } else {
         fuzz_tell("refused");

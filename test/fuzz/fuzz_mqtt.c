@@ -73,7 +73,7 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     mqtt_order_t order;
     for (unsigned i = 0; crowded && i < MQTT_SENDERS; i++) {
         judge.senders[i].name[0] = (char)('A' + (char)i);
-        judge.senders[i].heard_us = NOW_US - 1U;
+        judge.senders[i].received_us = NOW_US - 1U;
     }
     mqtt_judge(&judge, rules, command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
@@ -168,7 +168,7 @@ static void read_file(const uint8_t *data, size_t size) {
 
 /// The same bytes as an event of the stream, and as the answer to whatever the console asks for.
 static void show(const uint8_t *data, size_t size) {
-    static const history_wish_t wish = {.since_us = 1, .until_us = INT64_MAX, .all = true};
+    static const history_config_t config = {.since_us = 1, .until_us = INT64_MAX, .all = true};
     static history_t history;
     static fetch_t fetch;
     char *text = NULL;
@@ -179,7 +179,7 @@ static void show(const uint8_t *data, size_t size) {
     memcpy(payload, data, size);
     payload[size] = '\0'; // As the libraries hand it over.
     FILE *out = open_memstream(&text, &length);
-    fuzz_require(out != NULL && history_open(&history, &wish, out), "memory");
+    fuzz_require(out != NULL && history_open(&history, &config, out), "memory");
     (void)history_take(&history, "iwheel/w1/event/stop", payload, size, 1000000);
     (void)history_take(&history, "iwheel/w1/event/fault", payload, size, 2000000);
     (void)fclose(out);

@@ -13,7 +13,7 @@
 #define TOTAL_MS 20000U
 
 static gateway_rig_t rig;
-static iw_host_t host;
+static brd_host_t host;
 static char wire[2U * IWN_LINE_BOARD_MAX];
 static size_t wire_length, wire_taken;
 static uint64_t t_us, seq, spent_ms, answers, asked, moved;
@@ -22,22 +22,22 @@ static size_t fuzz_unit(const uint8_t *data, size_t size) {
     return fuzz_until(data, size, '\n');
 }
 
-size_t iw_serial_read(char *out, size_t size) {
+size_t brd_serial_read(char *out, size_t size) {
     const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
     memcpy(out, &wire[wire_taken], count);
     wire_taken += count;
     return count;
 }
 
-bool iw_serial_had_error(void) {
+bool brd_serial_had_error(void) {
     return false;
 }
 
-size_t iw_serial_room(void) {
-    return IW_SERIAL_SEND_BYTES;
+size_t brd_serial_room(void) {
+    return BRD_SERIAL_SEND_BYTES;
 }
 
-bool iw_serial_write(const char *bytes, size_t length) {
+bool brd_serial_write(const char *bytes, size_t length) {
     iwn_line_t line;
     fuzz_require(length > 0U && bytes[length - 1U] == '\n' && memchr(bytes, '\n', length) == &bytes[length - 1U],
                  "one line");
@@ -48,33 +48,33 @@ bool iw_serial_write(const char *bytes, size_t length) {
     return true;
 }
 
-bool iw_serial_lend(const char *bytes, size_t length) {
-    return iw_serial_write(bytes, length);
+bool brd_serial_lend(const char *bytes, size_t length) {
+    return brd_serial_write(bytes, length);
 }
 
-bool iw_serial_lends(void) {
+bool brd_serial_lends(void) {
     return false;
 }
 
-bool iw_serial_is_idle(void) {
+bool brd_serial_is_idle(void) {
     return true;
 }
 
-bool iw_host_keep(const iw_settings_t *settings) {
+bool brd_host_keep(const brd_settings_t *settings) {
     (void)settings;
     return true;
 }
 
-static iw_learnt_t kept;
+static brd_assumptions_t kept;
 static bool has_kept;
 
-bool iw_host_recall(iw_learnt_t *out_learnt) {
-    *out_learnt = kept;
+bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
+    *out_learned = kept;
     return has_kept;
 }
 
-bool iw_host_remember(const iw_learnt_t *learnt) {
-    kept = *learnt;
+bool brd_host_write_assumptions(const brd_assumptions_t *learned) {
+    kept = *learned;
     has_kept = true;
     return true;
 }
@@ -83,7 +83,7 @@ static void say(uint8_t channel, const char *json, size_t length) {
     const iwn_line_t line = {.json = json, .length = length, .channel = channel};
     wire_taken = 0;
     wire_length = iwn_line_write(&line, wire, IWN_LINE_BOARD_MAX);
-    while (iw_host_take(&host, rig.now_us)) {
+    while (brd_host_take(&host, rig.now_us)) {
     }
     wire_length = wire_taken = 0;
 }
@@ -98,7 +98,7 @@ static void judge(const int32_t before[IW_SIDES], bool was_latched) {
     fuzz_require(rig.gateway.sender.envelope.stopped == 0U && rig.gateway.sender.sent.clamped == 0U,
                  "the gate has nothing to stop");
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const int32_t told = rig.bus.told_mm_s[side];
+        const int32_t told = rig.bus.commanded_mm_s[side];
         fuzz_require(abs(told) <= rig.config.max_speed_mm_s, "within the limits");
         fuzz_require(!was_latched || state != IW_STATE_LATCHED || abs(told) <= abs(before[side]),
                      "a latch never goes faster");
@@ -108,14 +108,14 @@ static void judge(const int32_t before[IW_SIDES], bool was_latched) {
 
 static void pass(uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms && spent_ms < TOTAL_MS; ms += 5U, spent_ms += 5U) {
-        const int32_t before[IW_SIDES] = {rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]};
+        const int32_t before[IW_SIDES] = {rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]};
         const bool was_latched = iw_gateway_state(&rig.gateway) == IW_STATE_LATCHED;
         if (ms % 100U == 0U) {
             say_text("{\"cmd\":\"alive\"}"); // Else all ends after 500 ms.
         }
         gateway_rig_step(&rig);
         const iw_snapshot_t seen = gateway_rig_look(&rig);
-        (void)iw_host_tell(&host, &seen, false);
+        (void)brd_host_tell(&host, &seen, false);
         rig.judge.violation = NULL; // It knows nothing of what was asked here.
         gateway_rig_run(&rig, 5000);
         judge(before, was_latched);
@@ -160,16 +160,16 @@ static void prepare(void) {
     memset(&host, 0, sizeof host);
     wire_length = wire_taken = 0;
     t_us = seq = 0;
-    const iw_host_place_t place = {.gateway = &rig.gateway,
-                                   .version = "0.0.0",
-                                   .bus = "can",
-                                   .estop = "PB0",
-                                   .bitrate_hz = 1000000,
-                                   .sample_point_permille = 625,
-                                   .settings = iw_settings_from(&rig.config),
-                                   .rate_max_hz = 10,
-                                   .boot = BOOT};
-    iw_host_init(&host, &place, rig.now_us);
+    const brd_host_place_t place = {.gateway = &rig.gateway,
+                                    .version = "0.0.0",
+                                    .bus = "can",
+                                    .estop = "PB0",
+                                    .bitrate_hz = 1000000,
+                                    .sample_point_permille = 625,
+                                    .settings = brd_settings_from(&rig.config),
+                                    .rate_max_hz = 10,
+                                    .boot = BOOT};
+    brd_host_init(&host, &place, rig.now_us);
     gateway_rig_run(&rig, 600000);
     say_text("{\"cmd\":\"link\"}");
     say_text("{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
@@ -178,7 +178,7 @@ static void prepare(void) {
 
 static void begin(void) {
     static gateway_rig_t first_rig;
-    static iw_host_t first_host;
+    static brd_host_t first_host;
     static uint64_t first_us;
     if (first_us == 0U) {
         prepare();

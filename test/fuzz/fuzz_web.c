@@ -4,7 +4,7 @@
 #include "fuzz.h"
 
 #include "driver.h"
-#include "judge.h"
+#include "web_judge.h"
 
 #include <strings.h>
 

@@ -197,9 +197,9 @@ static bool read_side(const json_t *value, uint8_t *target, iwn_refusal_t *out_r
     return true;
 }
 
-static bool read_item(const json_t *value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
+static bool read_item(const json_t *value, iw_assumption_item_t *target, iwn_refusal_t *out_refusal) {
     const char *name = json_string_value(value);
-    if (name == NULL || !iwn_ledger_item_of(name, target)) {
+    if (name == NULL || !iwn_assumption_item_of(name, target)) {
         return refuse(out_refusal, IWN_BAD_VALUE,
                       "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
     }
@@ -235,7 +235,7 @@ static bool read_field(const field_t *field, const json_t *value, iwn_request_t 
     case FIELD_SIDE:
         return read_side(value, (uint8_t *)target, out_refusal);
     case FIELD_ITEM:
-        return read_item(value, (iw_ledger_item_t *)target, out_refusal);
+        return read_item(value, (iw_assumption_item_t *)target, out_refusal);
     case FIELD_VALUE:
         return read_value(field, value, (char *)target, out_refusal);
     case FIELD_INTEGER:

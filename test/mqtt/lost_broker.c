@@ -78,7 +78,7 @@ void setUp(void) {
     TEST_ASSERT_NOT_NULL(bridge_lease_key(&bridge.lease));
     (void)snprintf(key, sizeof key, "%s", bridge_lease_key(&bridge.lease));
     drive(500);
-    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 void tearDown(void) {
@@ -110,7 +110,7 @@ static void test_sender_that_has_not_armed_drives_nothing(void) {
     command_from("other", "drive", ",\"left_mm_s\":-100,\"right_mm_s\":-100");
     pass(50);
     TEST_ASSERT_EQUAL_STRING(key, bridge_lease_key(&bridge.lease));
-    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_sender_that_stopped_drives_nothing_without_arm(void) {

@@ -70,7 +70,7 @@ class Meanings(Finder):
         """Nobody can tell which came first: members of an object, assignments of which neither has to do with the other, a line in the log beside what it does not tell."""
         texts = [self.text(node) for node in (one, other)]
         targets = [None if calls(node) else self.text(node["inner"][0]).lstrip("*") for node in (one, other)]
-        logs = [text.startswith("gw_log(") for text in texts]
+        logs = [text.startswith("sock_log(") for text in texts]
         if all(text.startswith("iwn_out_") for text in texts):
             return True
         if logs[0] != logs[1]:

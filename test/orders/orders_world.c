@@ -158,7 +158,7 @@ void world_init(world_t *self, world_mode_t mode, bool hold, world_stats_t *stat
     self->client = 1;
     self->cut = true;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        self->wheel[side].heard_us = IW_NEVER;
+        self->wheel[side].received_us = IW_NEVER;
         self->wheel[side].moved_us = START_US;
     }
     start_gateway(self, false);
@@ -354,9 +354,9 @@ static void put(world_t *self, const iw_can_frame_t *frame, uint8_t kind) {
 
 static void move_wheel(world_wheel_t *wheel, iw_time_us_t now_us) {
     const int64_t span_us = (int64_t)(now_us - wheel->moved_us);
-    const bool told = wheel->heard_us != IW_NEVER && now_us - wheel->heard_us < IW_WHEEL_WATCHDOG_US;
+    const bool told = wheel->received_us != IW_NEVER && now_us - wheel->received_us < IW_WHEEL_WATCHDOG_US;
     const int64_t pace = (told ? FOLLOW_UM_S_PER_MS : COAST_UM_S_PER_MS) * span_us / MS;
-    const int64_t way = (told ? (int64_t)wheel->told_mm_s * 1000 : 0) - wheel->speed_um_s;
+    const int64_t way = (told ? (int64_t)wheel->commanded_mm_s * 1000 : 0) - wheel->speed_um_s;
     const int64_t capped = (way > pace) ? pace : ((way < -pace) ? -pace : way);
     wheel->speed_um_s += (int32_t)capped;
     wheel->moved_us = now_us;
@@ -368,8 +368,8 @@ static void land(world_t *self) {
     self->flights--;
     memmove(&self->flight[0], &self->flight[1], self->flights * sizeof self->flight[0]);
     move_wheel(wheel, self->now_us);
-    wheel->told_mm_s = speed_of(&flight.frame);
-    wheel->heard_us = self->now_us;
+    wheel->commanded_mm_s = speed_of(&flight.frame);
+    wheel->received_us = self->now_us;
     if (flight.own) {
         oracle_on_bus(&self->oracle, self->now_us, &flight.frame, flight.handed_us);
     }

@@ -45,9 +45,9 @@ typedef struct {
 } world_flight_t;
 
 typedef struct {
-    iw_time_us_t heard_us;
+    iw_time_us_t received_us;
     iw_time_us_t moved_us;
-    int32_t told_mm_s;
+    int32_t commanded_mm_s;
     int32_t speed_um_s;
 } world_wheel_t;
 

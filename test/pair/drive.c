@@ -16,7 +16,7 @@ static int send_frames(void *context, const iw_can_frame_t *frames, uint32_t cou
         iw_can_frame_t *const echo = &self->waiting[(self->first + self->count++) % WAITING_MAX];
         *echo = frames[i];
         echo->kind = IW_CAN_ECHO;
-        sim_pair_hear(&self->pair, self->now_us, &frames[i]);
+        sim_pair_receive(&self->pair, self->now_us, &frames[i]);
     }
     return (int)count;
 }

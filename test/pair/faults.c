@@ -75,7 +75,7 @@ static void begin(situation_t situation, int32_t speed_mm_s, uint16_t pair_mm) {
 static void follow_setpoints(const iw_pair_t *applied) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const iw_codec_setpoint_t setpoint = {applied->wheel[side].speed_mm_s, applied->wheel[side].current_mA, 1U};
-        (void)sim_motion_hear(&sound.pair.wheel[side].motion, machine.now_us, &setpoint);
+        (void)sim_motion_receive(&sound.pair.wheel[side].motion, machine.now_us, &setpoint);
     }
     sound.now_us = machine.now_us;
 }

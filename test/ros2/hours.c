@@ -164,8 +164,8 @@ static void arm(void) {
 
 static void assert_told_zero(void) {
     pass(2500);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_RIGHT]);
     TEST_ASSERT_NOT_EQUAL(IW_STATE_ARMED, daemon_rig_state());
 }
 

@@ -147,7 +147,7 @@ static void test_ros_command_that_came_with_arm_prevents_it(void) {
     request_comes(ROS_ARM);
     pass(300);
     TEST_ASSERT_TRUE(answered && !success); // The gateway knows the intention from before: stale_command.
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
@@ -157,7 +157,7 @@ static void test_ros_stop_that_came_with_a_command_stops(void) {
         command_comes(0.3);
         pass(20);
     }
-    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     command_comes(0.3);
     request_comes(ROS_STOP);
     pass(2000);
@@ -190,7 +190,7 @@ static void test_ros_command_that_was_late_is_not_passed(void) {
     pass(20);
     TEST_ASSERT_EQUAL_UINT64(passed, bridge.facts.commands.passed);
     TEST_ASSERT_EQUAL_UINT64(1, bridge.facts.commands.late);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_estop_latches_and_reset_is_not_for_the_network(void) {
@@ -214,7 +214,7 @@ static void test_ros_command_with_an_old_header_is_not_passed(void) {
     command.stamp_us = command.sent_us - 5000000;
     pass(20);
     TEST_ASSERT_EQUAL_UINT64(1, bridge.facts.commands.late);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_arm_takes_no_lease_from_another_client(void) {
@@ -249,7 +249,7 @@ static void test_ros_first_command_of_a_minute_ago_moves_nothing(void) {
     }
     TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
     TEST_ASSERT_EQUAL_UINT64(40, bridge.facts.commands.late);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_first_request_of_a_minute_ago_is_refused(void) {
@@ -340,11 +340,11 @@ static void test_ros_one_person_drives_of_two_that_publish(void) {
     for (unsigned i = 0; i < 20U; i++) {
         command_comes_of(1, 0.3);
         command_comes_of(2, -0.3);
-        TEST_ASSERT_GREATER_OR_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     }
     TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.passed);
     TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.others);
-    TEST_ASSERT_GREATER_THAN_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(100, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
@@ -360,13 +360,13 @@ static void test_ros_one_person_keeps_the_wheels_until_they_are_stopped(void) {
     command_comes_of(1, 0.0);
     TEST_ASSERT_TRUE(answered && !success); // Busy.
     command_comes_of(2, 0.3);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     request_comes(ROS_STOP);
     pass(3000);
     arm();
     command_comes_of(2, 0.3);
     command_comes_of(2, 0.3);
-    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_one_person_without_the_lease_has_nothing(void) {
@@ -376,14 +376,14 @@ static void test_ros_one_person_without_the_lease_has_nothing(void) {
     for (unsigned i = 0; i < 3U; i++) {
         command_comes_of(2, 0.3);
     }
-    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     pass(3000); // The lease ends by itself.
     TEST_ASSERT_EQUAL_UINT64(0, bridge.driver);
     arm();
     for (unsigned i = 0; i < 3U; i++) {
         command_comes_of(1, 0.3);
     }
-    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_lease_that_ended_unseen_is_nobodys(void) {
@@ -431,7 +431,7 @@ static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     }
     TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.unknown);
     TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     for (unsigned i = 0; i < 60U; i++) { // Zeros pass, and teach.
         command_comes(0.0);
         pass(20);
@@ -440,7 +440,7 @@ static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     command_comes(0.3);
     pass(40);
     TEST_ASSERT_EQUAL_UINT64(61, bridge.facts.commands.passed);
-    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command(void) {
@@ -458,7 +458,7 @@ static void test_ros_command_that_arms_does_not_drive(void) {
     pass(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
     TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_ros_request_that_cannot_be_read_only_stops(void) {
@@ -485,7 +485,7 @@ static void test_ros_stop_at_rest_ends_arming_by_commands(void) {
         pass(50);
     }
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
-    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     pass(1100);
     command_comes(0.3);
     pass(50);

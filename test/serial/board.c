@@ -34,7 +34,7 @@ static size_t lent_left;
 static bool line_ended;
 
 /// The image asks byte by byte.
-size_t iw_serial_read(char *out, size_t size) {
+size_t brd_serial_read(char *out, size_t size) {
     static char taken[4096];
     static size_t at;
     static size_t end;
@@ -50,16 +50,16 @@ size_t iw_serial_read(char *out, size_t size) {
     return left;
 }
 
-bool iw_serial_had_error(void) {
+bool brd_serial_had_error(void) {
     return false;
 }
 
-size_t iw_serial_room(void) {
+size_t brd_serial_room(void) {
     return RING - waits;
 }
 
-bool iw_serial_write(const char *bytes, size_t length) {
-    if (length > iw_serial_room()) {
+bool brd_serial_write(const char *bytes, size_t length) {
+    if (length > brd_serial_room()) {
         return false;
     }
     memcpy(&waiting[waits], bytes, length);
@@ -67,7 +67,7 @@ bool iw_serial_write(const char *bytes, size_t length) {
     return true;
 }
 
-bool iw_serial_lend(const char *bytes, size_t length) {
+bool brd_serial_lend(const char *bytes, size_t length) {
     if (lent_left > 0U) {
         return false;
     }
@@ -76,11 +76,11 @@ bool iw_serial_lend(const char *bytes, size_t length) {
     return true;
 }
 
-bool iw_serial_lends(void) {
+bool brd_serial_lends(void) {
     return lent_left > 0U;
 }
 
-bool iw_serial_is_idle(void) {
+bool brd_serial_is_idle(void) {
     return waits == 0U && lent_left == 0U;
 }
 
@@ -92,7 +92,7 @@ static bool put(const char *bytes, size_t *left) {
 }
 
 /// A line that is begun is ended before another one: of the two sources one at a time.
-void iw_serial_step(void) {
+void brd_serial_step(void) {
     static bool in_lent;
     if (!in_lent) {
         const size_t before = waits;
@@ -119,21 +119,21 @@ static void on_hangup(int number) {
 static gateway_config_t config;
 static gw_box_t box;
 static gw_wheels_t wheels;
-static iw_host_t host;
+static brd_host_t host;
 
 /// There is no flash here: a configuration lives as long as the file it was read from.
-bool iw_host_keep(const iw_settings_t *settings) {
+bool brd_host_keep(const brd_settings_t *settings) {
     (void)settings;
     return false;
 }
 
-bool iw_host_recall(iw_learnt_t *out_learnt) {
-    (void)out_learnt;
+bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
+    (void)out_learned;
     return false;
 }
 
-bool iw_host_remember(const iw_learnt_t *learnt) {
-    (void)learnt;
+bool brd_host_write_assumptions(const brd_assumptions_t *learned) {
+    (void)learned;
     return false;
 }
 
@@ -145,38 +145,38 @@ static void must(bool holds, const char *what) {
 }
 
 static void begin(char **arguments, bool restarted) {
-    const iw_estop_wish_t estop = {.name = arguments[3]};
-    const char *culprit = "";
+    const iwl_estop_config_t estop = {.name = arguments[3]};
+    const char *cause = "";
     uint64_t boot = 0;
     must(gateway_config_load(arguments[1], &config, stderr) == 0, "the configuration");
-    must(gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = 0}) == 0, "memory");
-    must(iw_linux_hal_open(&wheels.hal, arguments[2], &estop, &culprit) == 0, culprit);
+    must(gw_box_open(&box, &(gw_box_config_t){.blackbox_s = 0}) == 0, "memory");
+    must(iwl_hal_open(&wheels.hal, arguments[2], &estop, &cause) == 0, cause);
     must(getrandom(&boot, sizeof boot, 0) == (ssize_t)sizeof boot, "random numbers");
-    wheels.now_us = iw_clock_now_us();
+    wheels.now_us = iwl_clock_now_us();
     must(gw_wheels_begin(&wheels, &config.core, box.ring, restarted) == IW_CONFIG_OK, "the configuration is refused");
     const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
     iw_gateway_bus_facts(&wheels.core, &facts);
-    const iw_host_place_t place = {.gateway = &wheels.core,
-                                   .version = IWHEEL_VERSION,
-                                   .bus = "can",
-                                   .estop = "PA0",
-                                   .bitrate_hz = 500000,
-                                   .sample_point_permille = 875,
-                                   .settings = iw_settings_from(&config.core),
-                                   .rate_max_hz = 10,
-                                   .boot = boot};
-    iw_host_init(&host, &place, wheels.now_us);
+    const brd_host_place_t place = {.gateway = &wheels.core,
+                                    .version = IWHEEL_VERSION,
+                                    .bus = "can",
+                                    .estop = "PA0",
+                                    .bitrate_hz = 500000,
+                                    .sample_point_permille = 875,
+                                    .settings = brd_settings_from(&config.core),
+                                    .rate_max_hz = 10,
+                                    .boot = boot};
+    brd_host_init(&host, &place, wheels.now_us);
 }
 
 /// As cycle() of the image's main.c.
 static iw_time_us_t cycle(void) {
-    wheels.now_us = iw_clock_now_us();
-    iw_linux_hal_tend(&wheels.hal, wheels.now_us);
-    const bool more = iw_host_take(&host, wheels.now_us);
+    wheels.now_us = iwl_clock_now_us();
+    iwl_hal_poll(&wheels.hal, wheels.now_us);
+    const bool more = brd_host_take(&host, wheels.now_us);
     static iw_snapshot_t seen;
     seen = gw_wheels_step(&wheels);
-    const iw_time_us_t tell_us = iw_host_tell(&host, &seen, wheels.hal.estop_last != 0);
-    iw_serial_step();
+    const iw_time_us_t tell_us = brd_host_tell(&host, &seen, wheels.hal.estop_last != 0);
+    brd_serial_step();
     const iw_time_us_t next_us = (tell_us < wheels.step_us) ? tell_us : wheels.step_us;
     return more ? wheels.now_us : next_us;
 }
@@ -189,17 +189,17 @@ int main(int argc, char **argv) {
     begin(argv, argc > 4);
     while (!line_ended) {
         const iw_time_us_t next_us = cycle();
-        const iw_time_us_t now_us = iw_clock_now_us();
+        const iw_time_us_t now_us = iwl_clock_now_us();
         struct pollfd entries[] = {{.fd = STDIN_FILENO, .events = POLLIN},
-                                   {.fd = iw_linux_hal_bus_fd(&wheels.hal), .events = POLLIN},
-                                   {.fd = iw_linux_hal_estop_fd(&wheels.hal), .events = POLLIN}};
-        entries[0].events = (short)(POLLIN | (iw_serial_is_idle() ? 0 : POLLOUT));
+                                   {.fd = iwl_hal_bus_fd(&wheels.hal), .events = POLLIN},
+                                   {.fd = iwl_hal_estop_fd(&wheels.hal), .events = POLLIN}};
+        entries[0].events = (short)(POLLIN | (brd_serial_is_idle() ? 0 : POLLOUT));
         // At most 1 ms, as the image wakes for each frame and by its timer.
         (void)poll(entries, 3, (next_us > now_us + 1000U) ? 1 : 0);
         if (reset_pressed != 0) {
             char *again[] = {argv[0], argv[1], argv[2], argv[3], gw_wheels_are_sent_to(&wheels) ? "restarted" : NULL,
                              NULL};
-            iw_linux_hal_close(&wheels.hal);
+            iwl_hal_close(&wheels.hal);
             (void)execv("/proc/self/exe", again);
         }
     }

@@ -80,11 +80,11 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
 
 /// Of what motion depends on: type, role and the signs.
 static bool is_contradicted(const iw_gateway_t *gateway) {
-    static const iw_ledger_item_t guards[] = {IW_LEDGER_SETPOINT_TYPE,      IW_LEDGER_CURRENT_ROLE,
-                                              IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_FEEDBACK_SIGN_RIGHT,
-                                              IW_LEDGER_MOUNT_SIGN_LEFT,    IW_LEDGER_MOUNT_SIGN_RIGHT};
+    static const iw_assumption_item_t guards[] = {IW_ASSUMPTION_SETPOINT_TYPE,      IW_ASSUMPTION_CURRENT_ROLE,
+                                                  IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
+                                                  IW_ASSUMPTION_MOUNT_SIGN_LEFT,    IW_ASSUMPTION_MOUNT_SIGN_RIGHT};
     for (size_t i = 0; i < sizeof guards / sizeof guards[0]; i++) {
-        if (gateway->ledger.entry[guards[i]].state == IW_LEDGER_CONTRADICTED) {
+        if (gateway->assumptions.entry[guards[i]].state == IW_CONTRADICTED) {
             return true;
         }
     }
@@ -93,8 +93,8 @@ static bool is_contradicted(const iw_gateway_t *gateway) {
 
 /// The operator has looked at the machine and says that it is as configured.
 static void settle_assumption(rig_t *rig) {
-    const iw_ledger_entry_t word = {IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(&rig->gateway, rig->gateway.ledger.doubt, &word);
+    const iw_assumption_entry_t word = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
+    iw_gateway_set_assumption(&rig->gateway, rig->gateway.assumptions.doubt, &word);
 }
 
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
@@ -239,7 +239,7 @@ void clients_start(rig_t *rig, const event_t *event) {
 }
 
 /// Speeds that change now and then: turned round, halved, stopped, held.
-static void wish(const rig_t *rig, const client_t *client, int32_t *out_a, int32_t *out_b) {
+static void config(const rig_t *rig, const client_t *client, int32_t *out_a, int32_t *out_b) {
     static const int8_t quarters[8] = {4, 4, -4, 2, 0, 4, -2, 4};
     const uint64_t turn = rig->now_us / (700U * MS);
     const int8_t share = (client->style & 4U) ? quarters[(turn + client->style) % 8U] : 4;
@@ -255,7 +255,7 @@ static void drive_well(rig_t *rig, const client_t *client) {
     if (state == IW_STATE_LATCHED) {
         ask(rig, client, EV_ONE_RESET, 0, 0);
     } else if (state == IW_STATE_ARMED && rig->gateway.permit.holder == client->id) {
-        wish(rig, client, &a, &b);
+        config(rig, client, &a, &b);
         ask(rig, client, EV_ONE_DRIVE, a, b);
     } else if (!iw_gateway_arming(&rig->gateway)) {
         ask(rig, client, EV_ONE_ARM, (client->style & 16U) != 0U, 0);

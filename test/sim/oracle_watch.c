@@ -127,10 +127,10 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
     bool comparable = ours && !self->stalled;
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
-        const iw_time_us_t heard_us =
+        const iw_time_us_t received_us =
             (wheel->fresh_us == IW_NEVER || wheel->fresh_us < wheel->excused_us) ? wheel->excused_us : wheel->fresh_us;
         const iw_time_us_t silent_us = oracle_us(self->config->wheel_silent_ms);
-        const bool silent = now_us - heard_us >= silent_us;
+        const bool silent = now_us - received_us >= silent_us;
         // Excused is not heard: what it does is known again with its next frame of known age.
         const bool known = wheel->fresh_us != IW_NEVER && !oracle_elapsed(now_us, wheel->fresh_us, silent_us);
         comparable = comparable && known;
@@ -141,7 +141,7 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
         }
         if (silent) {
             oracle_break(self, now_us, 709, "not LATCHED although a wheel was silent for %llu us",
-                         (unsigned long long)(now_us - heard_us));
+                         (unsigned long long)(now_us - received_us));
         }
         if (wheel->pending > 0U && now_us - wheel->waiting[0] >= oracle_us(self->config->echo_ms)) {
             oracle_break(self, now_us, 710, "not LATCHED although a frame was not echoed for %llu us",

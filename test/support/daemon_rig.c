@@ -2,7 +2,7 @@
 #include "daemon_rig.h"
 
 #include "daemon.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "iwheel_linux/clock.h"
 #include "iwheel_northbound/json_in.h"
@@ -28,51 +28,51 @@ daemon_rig_t daemon_rig;
 
 // The clocks ---------------------------------------------------------------------------------------------------------------
 
-iw_time_us_t iw_clock_now_us(void) {
+iw_time_us_t iwl_clock_now_us(void) {
     daemon_rig.now_us += daemon_rig.look_takes_us;
     return daemon_rig.now_us;
 }
 
-iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us) {
+iw_time_us_t iwl_clock_awake_us(iw_time_us_t suspended_us) {
     return daemon_rig.now_us + daemon_rig.suspended_us - suspended_us;
 }
 
-iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
+iw_time_us_t iwl_clock_read(iw_time_us_t *out_suspended_us) {
     *out_suspended_us = daemon_rig.suspended_us;
     return daemon_rig.now_us;
 }
 
-iw_time_us_t iw_clock_suspended_us(void) {
+iw_time_us_t iwl_clock_suspended_us(void) {
     return daemon_rig.suspended_us;
 }
 
-int64_t iw_clock_wall_us(void) {
+int64_t iwl_clock_wall_us(void) {
     return (int64_t)(daemon_rig.now_us - START_US);
 }
 
 // Bus and button -----------------------------------------------------------------------------------------------------------
 
-int iw_bus_open(iw_backend_store_t *self, const char *name) {
+int iwl_bus_open(iwl_backend_store_t *self, const char *name) {
     (void)self;
     (void)name;
     return 0;
 }
 
-void iw_bus_close(iw_backend_store_t *self) {
+void iwl_bus_close(iwl_backend_store_t *self) {
     (void)self;
 }
 
-void iw_bus_tend(iw_backend_store_t *self, iw_time_us_t now_us) {
+void iwl_bus_poll(iwl_backend_store_t *self, iw_time_us_t now_us) {
     (void)self;
     (void)now_us;
 }
 
-void iw_bus_waited(iw_backend_store_t *self, bool told) {
+void iwl_bus_waited(iwl_backend_store_t *self, bool told) {
     (void)self;
     (void)told;
 }
 
-iw_time_us_t iw_bus_next_us(const iw_backend_store_t *self) {
+iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *self) {
     (void)self;
     return IW_NEVER;
 }
@@ -86,9 +86,10 @@ static int send_one(daemon_rig_t *rig, const iw_can_frame_t *frame) {
         return 0;
     }
     rig->sent[side]++;
-    rig->told_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
-    rig->unmarked += (rig->told_mm_s[side] == 0 || daemon_rig_marked()) ? 0U : 1U;
-    rig->most_mm_s = (abs(rig->told_mm_s[side]) > rig->most_mm_s) ? (int16_t)abs(rig->told_mm_s[side]) : rig->most_mm_s;
+    rig->commanded_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
+    rig->unmarked += (rig->commanded_mm_s[side] == 0 || daemon_rig_marked()) ? 0U : 1U;
+    rig->most_mm_s =
+        (abs(rig->commanded_mm_s[side]) > rig->most_mm_s) ? (int16_t)abs(rig->commanded_mm_s[side]) : rig->most_mm_s;
     rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
     rig->sent_waits = rig->waits;
@@ -96,7 +97,7 @@ static int send_one(daemon_rig_t *rig, const iw_can_frame_t *frame) {
     return 1;
 }
 
-int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frames, uint32_t count) {
+int iwl_bus_send(iwl_backend_store_t *self, const iw_can_frame_t *frames, uint32_t count) {
     (void)self;
     for (uint32_t i = 0; i < count; i++) {
         const int result = send_one(&daemon_rig, &frames[i]);
@@ -107,7 +108,7 @@ int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frames, uint32_t
     return (int)count;
 }
 
-int iw_bus_receive(iw_backend_store_t *self, iw_can_frame_t *out_frame) {
+int iwl_bus_receive(iwl_backend_store_t *self, iw_can_frame_t *out_frame) {
     daemon_rig_t *rig = &daemon_rig;
     (void)self;
     if (rig->rx_next == rig->rx_count) {
@@ -118,12 +119,12 @@ int iw_bus_receive(iw_backend_store_t *self, iw_can_frame_t *out_frame) {
     return 1;
 }
 
-iw_bus_state_t iw_bus_state(iw_backend_store_t *self) {
+iw_bus_state_t iwl_bus_state(iwl_backend_store_t *self) {
     (void)self;
     return daemon_rig.bus;
 }
 
-int iw_bus_purge(iw_backend_store_t *self) {
+int iwl_bus_purge(iwl_backend_store_t *self) {
     (void)self;
     return 0;
 }
@@ -142,12 +143,12 @@ static iw_time_us_t rig_next_us(const void *self) {
     return IW_NEVER;
 }
 
-int iw_bus_fd(const iw_backend_store_t *self) {
+int iwl_bus_fd(const iwl_backend_store_t *self) {
     (void)self;
     return daemon_rig.bus_fd;
 }
 
-const iw_bus_link_t *iw_bus_link(const iw_backend_store_t *self) {
+const iwl_bus_link_t *iwl_bus_link(const iwl_backend_store_t *self) {
     (void)self;
     return &daemon_rig.link;
 }
@@ -176,13 +177,13 @@ static int rig_trouble(const void *self) {
     return (daemon_rig.estop < 0) ? ENODEV : 0;
 }
 
-static const iw_estop_ops_t estop_ops = {.close = rig_close,
-                                         .watch_fd = rig_estop_fd,
-                                         .tend = rig_tend,
-                                         .next_us = rig_next_us,
-                                         .pressed = rig_pressed,
-                                         .trouble = rig_trouble,
-                                         .present = true};
+static const iwl_estop_ops_t estop_ops = {.close = rig_close,
+                                          .watch_fd = rig_estop_fd,
+                                          .poll = rig_tend,
+                                          .next_us = rig_next_us,
+                                          .pressed = rig_pressed,
+                                          .trouble = rig_trouble,
+                                          .present = true};
 
 // The wait -----------------------------------------------------------------------------------------------------------------
 
@@ -218,17 +219,17 @@ static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-int gw_wakeup_open(gw_wakeup_t *self) {
-    *self = (gw_wakeup_t){.fd = epoll_create1(EPOLL_CLOEXEC)};
+int sock_wakeup_open(sock_wakeup_t *self) {
+    *self = (sock_wakeup_t){.fd = epoll_create1(EPOLL_CLOEXEC)};
     return (self->fd < 0) ? errno : 0;
 }
 
-void gw_wakeup_close(gw_wakeup_t *self) {
+void sock_wakeup_close(sock_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t now_us,
-                   iw_time_us_t end_us) {
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t now_us,
+                     iw_time_us_t end_us) {
     daemon_rig_t *rig = &daemon_rig;
     rig->wait_from_us = now_us; // Here a cycle takes no time.
     rig->waits++;
@@ -263,7 +264,7 @@ static int listen_somewhere(void) {
 
 static void begin_core(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
-    wheels->hal = (iw_linux_hal_t){.estop_ops = &estop_ops, .estop_last = -1};
+    wheels->hal = (iwl_hal_t){.estop_ops = &estop_ops, .estop_last = -1};
     wheels->now_us = daemon_rig.now_us;
     daemon->loop.suspended_us = daemon_rig.suspended_us;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, gw_wheels_begin(wheels, &daemon->config.core, daemon->box.ring,
@@ -279,17 +280,17 @@ void daemon_rig_start(void) {
     fixture_config(&daemon->config.core);
     daemon->config.core.hold = rig->hold;
     (void)snprintf(daemon->config.bus.interface, sizeof daemon->config.bus.interface, "unix:%.60s/bus", rig->folder);
-    gw_log_open(&daemon->log, GW_LOG_ERROR);
+    sock_log_open(&daemon->log, SOCK_LOG_ERROR);
     gw_daemon_compose(daemon);
     TEST_ASSERT_EQUAL_INT(0, gw_runtime_open(&daemon->runtime, daemon->config.bus.interface,
                                              daemon->config.northbound.socket, rig->folder, stderr));
-    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &(gw_box_wish_t){.blackbox_s = 0}));
-    for (unsigned right = 0; right < GW_RIGHTS; right++) {
+    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &(gw_box_config_t){.blackbox_s = 0}));
+    for (unsigned right = 0; right < SOCK_RIGHTS; right++) {
         daemon->clients.listener[right] =
-            (gw_listener_t){.wish = {.right = (gw_right_t)right}, .fd = listen_somewhere(), .reserve_fd = -1};
+            (sock_listener_t){.config = {.right = (sock_right_t)right}, .fd = listen_somewhere(), .reserve_fd = -1};
     }
-    daemon->knowledge.answered = true; // Nobody keeps anything.
-    daemon->knowledge.write_us = IW_NEVER;
+    daemon->assumptions.answered = true; // Nobody keeps anything.
+    daemon->assumptions.write_us = IW_NEVER;
     begin_core(daemon);
     TEST_ASSERT_EQUAL_INT(0, gw_loop_open(daemon));
     gw_notify_open(&daemon->notify);
@@ -297,14 +298,14 @@ void daemon_rig_start(void) {
 
 void daemon_rig_crash(void) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = 0; i < SOCK_CLIENTS_MAX; i++) {
         if (daemon->clients.client[i].id != IW_CLIENT_NONE) {
             (void)close(daemon->clients.client[i].fd);
         }
     }
     gw_loop_close(daemon);
     gw_notify_close(&daemon->notify);
-    for (unsigned right = 0; right < GW_RIGHTS; right++) {
+    for (unsigned right = 0; right < SOCK_RIGHTS; right++) {
         (void)close(daemon->clients.listener[right].fd);
         if (daemon->clients.listener[right].reserve_fd >= 0) {
             (void)close(daemon->clients.listener[right].reserve_fd);
@@ -312,7 +313,7 @@ void daemon_rig_crash(void) {
     }
     gw_box_close(&daemon->box);
     gw_runtime_close(&daemon->runtime);
-    gw_log_close(&daemon->log);
+    sock_log_close(&daemon->log);
     free(daemon);
     daemon_rig.daemon = NULL;
 }
@@ -322,7 +323,7 @@ void daemon_rig_begin(void) {
     sim_pair_config_t pair;
     *rig = (daemon_rig_t){.now_us = START_US,
                           .bus = IW_BUS_ACTIVE,
-                          .link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true},
+                          .link = {.presence = IWL_LINK_LOCAL, .is_virtual = true, .echo_proven = true},
                           .folder = "/tmp/iwheel-daemon-XXXXXX"};
     TEST_ASSERT_NOT_NULL(mkdtemp(rig->folder));
     rig->bus_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -354,7 +355,7 @@ void daemon_rig_run(unsigned for_ms) {
     daemon_rig.ended = gw_loop_run(daemon_rig.daemon) == 0;
 }
 
-int daemon_rig_connect_with(gw_right_t right) {
+int daemon_rig_connect_with(sock_right_t right) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
@@ -366,7 +367,7 @@ int daemon_rig_connect_with(gw_right_t right) {
 }
 
 int daemon_rig_connect(void) {
-    return daemon_rig_connect_with(GW_DRIVE);
+    return daemon_rig_connect_with(SOCK_DRIVE);
 }
 
 /// Whatever is asked: every line that is told is JSON to the letter.
@@ -430,13 +431,13 @@ void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms
 }
 
 void daemon_rig_keep_log(void) {
-    gw_log_t *log = &daemon_rig.daemon->log;
-    gw_log_close(log);
+    sock_log_t *log = &daemon_rig.daemon->log;
+    sock_log_close(log);
     char path[] = "/tmp/iwheel-log-XXXXXX";
     log->fd = mkstemp(path);
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, log->fd);
     (void)unlink(path);
-    log->level = GW_LOG_INFO;
+    log->level = SOCK_LOG_INFO;
 }
 
 const char *daemon_rig_log(void) {
@@ -468,10 +469,10 @@ iw_state_t daemon_rig_state(void) {
 void daemon_rig_begin_driving(int client) {
     daemon_rig_arm(client);
     daemon_rig_drive(client, 500, 500, 1000);
-    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.commanded_mm_s[IW_RIGHT]);
 }
 
 bool daemon_rig_is_told_zero(void) {
-    return daemon_rig.told_mm_s[IW_LEFT] == 0 && daemon_rig.told_mm_s[IW_RIGHT] == 0;
+    return daemon_rig.commanded_mm_s[IW_LEFT] == 0 && daemon_rig.commanded_mm_s[IW_RIGHT] == 0;
 }

@@ -146,7 +146,7 @@ void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us) {
     self->now_us = now_us;
     while (fake_bus_next_us(self) <= now_us) {
         iw_can_frame_t echo = self->flight[0].frame;
-        self->told_mm_s[side_of(&echo)] = fake_bus_command(&echo).speed_mm_s;
+        self->commanded_mm_s[side_of(&echo)] = fake_bus_command(&echo).speed_mm_s;
         self->told_us[side_of(&echo)] = now_us;
         echo.kind = IW_CAN_ECHO;
         fake_bus_put(self, &echo);

@@ -42,18 +42,18 @@ typedef struct {
 
     /// What happened.
     iw_time_us_t now_us;
-    uint32_t sent;                  ///< Frames accepted.
-    uint32_t refused;               ///< Frames not accepted.
-    uint32_t calls;                 ///< Of `send`.
-    uint32_t call_frame;            ///< Position of the frame in its call, for the listener ...
-    uint32_t call_frames;           ///< ... and how many frames the call has.
-    uint32_t purges;                ///< Calls of `purge`.
-    uint32_t lost;                  ///< Frames that found the receive queue full.
-    iw_can_frame_t last[IW_SIDES];  ///< Last setpoint accepted for each wheel.
-    iw_time_us_t last_us[IW_SIDES]; ///< When.
-    int16_t told_mm_s[IW_SIDES];    ///< What reached each wheel, as on the bus.
-    iw_time_us_t told_us[IW_SIDES]; ///< When; IW_NEVER: nothing yet.
-    uint8_t unechoed[IW_SIDES];     ///< Accepted, and echo not yet taken by the gateway.
+    uint32_t sent;                    ///< Frames accepted.
+    uint32_t refused;                 ///< Frames not accepted.
+    uint32_t calls;                   ///< Of `send`.
+    uint32_t call_frame;              ///< Position of the frame in its call, for the listener ...
+    uint32_t call_frames;             ///< ... and how many frames the call has.
+    uint32_t purges;                  ///< Calls of `purge`.
+    uint32_t lost;                    ///< Frames that found the receive queue full.
+    iw_can_frame_t last[IW_SIDES];    ///< Last setpoint accepted for each wheel.
+    iw_time_us_t last_us[IW_SIDES];   ///< When.
+    int16_t commanded_mm_s[IW_SIDES]; ///< What reached each wheel, as on the bus.
+    iw_time_us_t told_us[IW_SIDES];   ///< When; IW_NEVER: nothing yet.
+    uint8_t unechoed[IW_SIDES];       ///< Accepted, and echo not yet taken by the gateway.
     fake_flight_t flight[FAKE_BUS_FLIGHT_MAX];
     iw_can_frame_t rx[FAKE_BUS_RX_MAX];
     uint32_t flights;

@@ -22,11 +22,11 @@ typedef struct {
 
 typedef struct {
     /// What a test sets.
-    iw_link_presence_t presence;
+    iwl_link_presence_t presence;
     int index;
     int carrier;
     iw_bus_state_t state; ///< As netlink tells it when it is read.
-    iw_bus_link_t link;   ///< The same of the rest.
+    iwl_bus_link_t link;  ///< The same of the rest.
     bool netlink_fails;
     int open_error;     ///< Of netlink's sockets.
     bool events_dead;   ///< The socket that tells of interfaces has no descriptor.
@@ -34,7 +34,7 @@ typedef struct {
     bool news;          ///< Some interface has changed.
     unsigned late;      ///< So many frames come while it is looked whether the interface is up.
     int send_result;    ///< 1, 0 no room, -1 lost.
-    int restart_result; ///< Of `poll`; IW_NETLINK_RESTART_RUNNING at first.
+    int restart_result; ///< Of `poll`; IWL_NETLINK_RESTART_RUNNING at first.
     fake_queue_t ours;
     fake_queue_t others;
 

@@ -17,7 +17,7 @@ void force_rig_begin(force_rig_t *self, iw_side_t side, bool boot_seen) {
 
 void force_rig_hear(force_rig_t *self, int16_t raw, bool still) {
     self->now_us += MS(50);
-    iw_force_hear(&self->force, self->now_us, raw, still);
+    iw_force_receive(&self->force, self->now_us, raw, still);
 }
 
 void force_rig_quiet(force_rig_t *self, uint32_t samples, int16_t raw) {
@@ -33,7 +33,7 @@ void force_rig_alternate(force_rig_t *self, int16_t even, int16_t odd) {
 }
 
 void force_rig_offset(force_rig_t *self, int16_t offset_dN) {
-    iw_force_hear_offset(&self->force, self->now_us, offset_dN);
+    iw_force_receive_offset(&self->force, self->now_us, offset_dN);
 }
 
 iw_force_validity_t force_rig_validity(const force_rig_t *self) {

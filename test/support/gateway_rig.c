@@ -54,7 +54,7 @@ static int16_t rpm_of(const gateway_rig_t *self, size_t side) {
     if (bus->told_us[side] == IW_NEVER || self->now_us - bus->told_us[side] > IW_WHEEL_WATCHDOG_US) {
         return 0;
     }
-    return (int16_t)(bus->told_mm_s[side] * 1000 / UM_S_PER_RPM);
+    return (int16_t)(bus->commanded_mm_s[side] * 1000 / UM_S_PER_RPM);
 }
 
 static void wheel_send(gateway_rig_t *self, size_t side) {

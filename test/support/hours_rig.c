@@ -24,7 +24,7 @@ int __real_connect(int fd, const struct sockaddr *address, socklen_t size);
 int __wrap_connect(int fd, const struct sockaddr *address, socklen_t size);
 
 int __wrap_clock_gettime(clockid_t clock, struct timespec *out_time) {
-    const iw_time_us_t now_us = (clock == CLOCK_REALTIME) ? (iw_time_us_t)iw_clock_wall_us() : daemon_rig.now_us;
+    const iw_time_us_t now_us = (clock == CLOCK_REALTIME) ? (iw_time_us_t)iwl_clock_wall_us() : daemon_rig.now_us;
     *out_time = (struct timespec){.tv_sec = (time_t)(now_us / 1000000U), .tv_nsec = (long)(now_us % 1000000U * 1000U)};
     out_time->tv_sec += (clock == CLOCK_REALTIME) ? WALL_S : 0;
     return 0;
@@ -66,7 +66,7 @@ int __wrap_connect(int fd, const struct sockaddr *address, socklen_t size) {
         errno = ECONNREFUSED;
         return -1;
     }
-    const int listener = daemon_rig.daemon->clients.listener[GW_DRIVE].fd;
+    const int listener = daemon_rig.daemon->clients.listener[SOCK_DRIVE].fd;
     TEST_ASSERT_EQUAL_INT(0, getsockname(listener, (struct sockaddr *)&there, &length));
     return __real_connect(fd, (const struct sockaddr *)&there, length);
 }

@@ -44,7 +44,7 @@ static void step(world_rig_t *rig) {
     (void)iw_gateway_step(&rig->gateway, rig->now_us);
     iw_snapshot_t seen;
     iw_gateway_snapshot(&rig->gateway, rig->now_us, &seen);
-    iw_motion_evidence_look(&rig->evidence, &rig->gateway, &seen);
+    iw_observation_step(&rig->observation, &rig->gateway, &seen);
 }
 
 void world_rig_run(world_rig_t *self, unsigned for_ms) {
@@ -61,8 +61,8 @@ void world_rig_restart(world_rig_t *self) {
                           .purge = port_nothing,
                           .estop_pressed = port_nothing,
                           .context = self};
-    memset(&self->evidence, FIXTURE_POISON, sizeof self->evidence);
-    iw_motion_evidence_init(&self->evidence);
+    memset(&self->observation, FIXTURE_POISON, sizeof self->observation);
+    iw_observation_init(&self->observation);
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&self->gateway, &self->config, &hal, self->now_us, false));
 }
 

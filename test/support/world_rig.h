@@ -4,8 +4,8 @@
 #define TEST_WORLD_RIG_H
 
 #include "fixture.h"
-#include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
+#include "iwheel/observation.h"
 #include "iwheel_sim/world.h"
 
 #define WORLD_RX_MAX 256U
@@ -15,7 +15,7 @@ typedef struct {
     iw_config_t config;
     sim_world_t world;
     iw_gateway_t gateway;
-    iw_motion_evidence_t evidence;
+    iw_observation_t observation;
     iw_time_us_t now_us;
     iw_can_frame_t rx[WORLD_RX_MAX]; ///< What came since the last step.
     unsigned rx_count;

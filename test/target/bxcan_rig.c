@@ -12,7 +12,7 @@
 rig_device_t rig[RIG_DEVICES];
 static bool is_serving;
 
-static rig_device_t *device_at(const iw_register_t *address, uint32_t *out_offset) {
+static rig_device_t *device_at(const brd_register_t *address, uint32_t *out_offset) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         const uintptr_t base = (uintptr_t)&rig[i].window;
         const uintptr_t at = (uintptr_t)address;
@@ -32,11 +32,11 @@ static void serve(rig_device_t *device) {
     is_serving = true;
     for (int storm = 0;; storm++) {
         if (bxcan_model_irq_transmit(&device->model)) {
-            iw_bxcan_on_transmit(&device->driver);
+            brd_bxcan_on_transmit(&device->driver);
         } else if (bxcan_model_irq_fifo0(&device->model)) {
-            iw_bxcan_on_receive(&device->driver);
+            brd_bxcan_on_receive(&device->driver);
         } else if (bxcan_model_irq_error(&device->model)) {
-            iw_bxcan_on_error(&device->driver);
+            brd_bxcan_on_error(&device->driver);
         } else {
             break;
         }
@@ -47,7 +47,7 @@ static void serve(rig_device_t *device) {
 }
 
 /// RCC's register of one device: while its bit is set, the device is in reset.
-static rig_device_t *reset_at(const iw_register_t *address) {
+static rig_device_t *reset_at(const brd_register_t *address) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         if (address == &rig[i].reset) {
             return &rig[i];
@@ -56,7 +56,7 @@ static rig_device_t *reset_at(const iw_register_t *address) {
     return NULL;
 }
 
-uint32_t iw_register_read(const iw_register_t *address) {
+uint32_t brd_register_read(const brd_register_t *address) {
     uint32_t offset = 0;
     if (reset_at(address) != NULL) {
         return *address;
@@ -72,7 +72,7 @@ uint32_t iw_register_read(const iw_register_t *address) {
     return value;
 }
 
-void iw_register_write(iw_register_t *address, uint32_t value) {
+void brd_register_write(brd_register_t *address, uint32_t value) {
     uint32_t offset = 0;
     rig_device_t *const resetting = reset_at(address);
     if (resetting != NULL) {
@@ -84,7 +84,7 @@ void iw_register_write(iw_register_t *address, uint32_t value) {
     }
     rig_device_t *const device = device_at(address, &offset);
     TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread, "the mask was not read back");
-    device->mask_unread = !is_serving && offset == IER && (value & IW_IER_TMEIE) == 0U;
+    device->mask_unread = !is_serving && offset == IER && (value & BRD_IER_TMEIE) == 0U;
     if (device->on_write != NULL && !is_serving) {
         device->on_write(offset);
     }
@@ -106,7 +106,7 @@ void rig_reset(void) {
 }
 
 void rig_init(int device, bool silent) {
-    const iw_bxcan_config_t config = {
+    const brd_bxcan_config_t config = {
         .registers = &rig[device].window,
         .filters = &rig[0].window,
         .first_bank = (device == 0) ? 0U : 14U,
@@ -116,14 +116,14 @@ void rig_init(int device, bool silent) {
         .reset_register = &rig[device].reset,
         .reset_bits = RESET_BIT,
     };
-    iw_bxcan_init(&rig[device].driver, &config);
+    brd_bxcan_init(&rig[device].driver, &config);
 }
 
 void rig_start(int device) {
     rig_init(device, false);
-    (void)iw_bxcan_bus_state(&rig[device].driver);
+    (void)brd_bxcan_bus_state(&rig[device].driver);
     bxcan_model_recessive(&rig[device].model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(&rig[device].driver));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(&rig[device].driver));
 }
 
 bool rig_send_next(int device, model_frame_t *out_frame) {

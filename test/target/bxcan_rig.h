@@ -13,9 +13,9 @@
 
 typedef struct {
     bxcan_model_t model;
-    iw_bxcan_registers_t window; ///< Only its address means something.
-    iw_register_t reset;         ///< RCC's, with a bit for this device.
-    iw_bxcan_t driver;
+    brd_bxcan_registers_t window; ///< Only its address means something.
+    brd_register_t reset;         ///< RCC's, with a bit for this device.
+    brd_bxcan_t driver;
     bool mask_unread;    ///< Interrupts were masked, and IER was not read back yet: that write may still be under way.
     uint32_t interrupts; ///< Served so far.
     bool (*on_read)(uint32_t offset);  ///< Called after each read of this device; false: not again.

@@ -23,7 +23,7 @@ static struct {
 
 static iw_time_us_t time_us = 1000;
 static iw_time_us_t telemetry_us = 1000;
-static int16_t told_mm_s[IW_SIDES];
+static int16_t commanded_mm_s[IW_SIDES];
 static uint32_t feeds;
 
 static enum { FIRST_DRIVE, HELD_UP, SECOND_DRIVE } phase;
@@ -102,7 +102,7 @@ static void send_slots(void) {
         if (my_can.is_full[i]) {
             iw_can_frame_t *const frame = &my_can.slot[i];
             const iw_side_t side = (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
-            told_mm_s[side] = (int16_t)(((uint32_t)frame->data[1] << 8) | frame->data[2]);
+            commanded_mm_s[side] = (int16_t)(((uint32_t)frame->data[1] << 8) | frame->data[2]);
             frame->kind = IW_CAN_ECHO;
             put(frame);
             my_can.is_full[i] = false;
@@ -113,7 +113,7 @@ static void send_slots(void) {
 /// Both wheels do as told.
 static void send_telemetry(void) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_codec_wheel_t told = {.speed = {.speed_rpm = (int16_t)(told_mm_s[side] / 20)}};
+        const iw_codec_wheel_t told = {.speed = {.speed_rpm = (int16_t)(commanded_mm_s[side] / 20)}};
         iw_can_frame_t frame;
         (void)iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame);
         put(&frame);
@@ -122,7 +122,7 @@ static void send_telemetry(void) {
 }
 
 static bool is_told_wish(void) {
-    return told_mm_s[IW_LEFT] == 120 && told_mm_s[IW_RIGHT] == -80;
+    return commanded_mm_s[IW_LEFT] == 120 && commanded_mm_s[IW_RIGHT] == -80;
 }
 
 static void enter(int next) {
@@ -134,7 +134,7 @@ static void enter(int next) {
 static bool follow_phases(void) {
     const iw_time_us_t for_us = time_us - phase_us;
     if (phase == HELD_UP) {
-        if (for_us > 1000000U && (told_mm_s[IW_LEFT] != 0 || told_mm_s[IW_RIGHT] != 0)) {
+        if (for_us > 1000000U && (commanded_mm_s[IW_LEFT] != 0 || commanded_mm_s[IW_RIGHT] != 0)) {
             exit(3);
         }
         if (for_us > 5000000U) {

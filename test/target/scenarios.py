@@ -164,7 +164,7 @@ def passes_wrap(rig, wrap_ms):
     rig.run(SECOND)
     assert_gaps(rig.setpoints(100 * MS), 22 * MS)
     assert_lamp_steady_since(rig, SECOND)
-    assert rig.machine.call(rig.function("iw_time_now_us")) > wrap_ms * 1000, "time has wrapped"
+    assert rig.machine.call(rig.function("brd_time_now_us")) > wrap_ms * 1000, "time has wrapped"
 
 
 def time_passes_32_bits_of_microseconds(rig):
@@ -180,7 +180,7 @@ def time_passes_32_bits_of_milliseconds(rig):
 def time_never_goes_back(rig):
     """Asked at every cycle around a tick, the time only grows, and by as much as has passed."""
     arm(rig)
-    machine, now_us = rig.machine, rig.function("iw_time_now_us")
+    machine, now_us = rig.machine, rig.function("brd_time_now_us")
     last_us, offset_us = 0, None
     for early_ns in range(0, 1500, 10):
         machine.run(machine.tick_ns - machine.now_ns - early_ns)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FIELDS = {
-    "overruns": ("bus", "iw_bxcan_t", "overruns"),
-    "lost": ("bus", "iw_bxcan_t", "lost"),
-    "resets": ("bus", "iw_bxcan_t", "resets"),
-    "bus_offs": ("bus", "iw_bxcan_t", "bus_offs"),
+    "overruns": ("bus", "brd_bxcan_t", "overruns"),
+    "lost": ("bus", "brd_bxcan_t", "lost"),
+    "resets": ("bus", "brd_bxcan_t", "resets"),
+    "bus_offs": ("bus", "brd_bxcan_t", "bus_offs"),
     "received": ("gateway", "iw_gateway_t", "counters.received"),
     "bad_format": ("gateway", "iw_gateway_t", "counters.bad_format"),
     "unknown": ("gateway", "iw_gateway_t", "counters.unknown"),
@@ -44,8 +44,8 @@ def addresses(elf):
 def stack_area(elf):
     """(lowest, highest) address of the stack."""
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
-    found = dict(reversed(line.split()[0::2]) for line in run.stdout.splitlines() if " iw_link_" in line)
-    return int(found["iw_link_stack_bottom"], 16), int(found["iw_link_stack_top"], 16)
+    found = dict(reversed(line.split()[0::2]) for line in run.stdout.splitlines() if " brd_link_" in line)
+    return int(found["brd_link_stack_bottom"], 16), int(found["brd_link_stack_top"], 16)
 
 
 def variable(elf, name):

@@ -5,7 +5,7 @@
 
 #define REJOIN_BITS (128U * 11U)
 
-static iw_bxcan_t *const driver = &rig[0].driver;
+static brd_bxcan_t *const driver = &rig[0].driver;
 static bxcan_model_t *const model = &rig[0].model;
 
 void setUp(void);
@@ -20,7 +20,7 @@ void tearDown(void) {
 }
 
 static iw_bus_state_t state(void) {
-    return iw_bxcan_bus_state(driver);
+    return brd_bxcan_bus_state(driver);
 }
 
 static void test_bus_is_down_until_11_recessive_bits(void) {
@@ -113,8 +113,8 @@ static void test_silent_device_hears_but_neither_acknowledges_nor_sends(void) {
     bxcan_model_recessive(model, 11);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_FALSE(rig_hear(0, 256, 4));
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &heard));
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame, 1));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &heard));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
 static void test_device_that_is_not_silent_acknowledges(void) {
@@ -137,10 +137,10 @@ static void fail_until_bus_off(void) {
 static void test_bus_off_is_reported_and_left_after_128_times_11_bits(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     fail_until_bus_off();
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame, 1));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     bxcan_model_recessive(model, REJOIN_BITS - 1U);
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
@@ -152,7 +152,7 @@ static void test_bus_off_is_reported_and_left_after_128_times_11_bits(void) {
 static void test_bus_off_is_not_left_by_the_controller_alone(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     fail_until_bus_off();
     bxcan_model_recessive(model, 100U * REJOIN_BITS);
     TEST_ASSERT_TRUE(model->bus_off);
@@ -162,9 +162,9 @@ static void test_bus_off_is_not_left_by_the_controller_alone(void) {
 static void test_send_fails_in_bus_off_that_nobody_has_reported_yet(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     fail_until_bus_off();
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame, 1));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
 static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
@@ -173,8 +173,8 @@ static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
     model_frame_t frame;
     iw_can_frame_t echo;
     rig_start(0);
-    (void)iw_bxcan_send(driver, &left, 1);
-    (void)iw_bxcan_send(driver, &right, 1);
+    (void)brd_bxcan_send(driver, &left, 1);
+    (void)brd_bxcan_send(driver, &right, 1);
     fail_until_bus_off();
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
     for (int i = 0; i < MODEL_MAILBOXES; i++) {
@@ -185,13 +185,13 @@ static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
     bxcan_model_recessive(model, REJOIN_BITS);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_FALSE(rig_send_next(0, &frame));
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &echo));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
 static void test_recovery_waits_until_what_waits_is_taken_back(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     fail_until_bus_off();
     model->abort_reads = 5000;
     for (int i = 0; i < 3; i++) {
@@ -210,10 +210,10 @@ static void test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery(void
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     fail_until_bus_off();
     model->abort_reads = 2000;
-    TEST_ASSERT_EQUAL(0, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
@@ -227,7 +227,7 @@ static void test_error_passive_is_told_apart(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     for (int i = 0; i < 100; i++) { // Nobody acknowledges: passive, but never bus-off.
         const int mailbox = bxcan_model_offer(model, &on_bus);
         TEST_ASSERT_NOT_EQUAL(MODEL_NONE, mailbox);
@@ -235,8 +235,8 @@ static void test_error_passive_is_told_apart(void) {
         bxcan_model_end(model, mailbox, MODEL_NO_ACKNOWLEDGEMENT);
     }
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
-    TEST_ASSERT_EQUAL(128, iw_bxcan_errors(driver).transmit_errors);
-    TEST_ASSERT_EQUAL(3, iw_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(128, brd_bxcan_errors(driver).transmit_errors);
+    TEST_ASSERT_EQUAL(3, brd_bxcan_errors(driver).last_error);
 }
 
 static void test_receive_errors_are_told(void) {
@@ -244,8 +244,8 @@ static void test_receive_errors_are_told(void) {
     for (int i = 0; i < 130; i++) {
         bxcan_model_hear_error(model);
     }
-    TEST_ASSERT_EQUAL(130, iw_bxcan_errors(driver).receive_errors);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(130, brd_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_EQUAL(1, brd_bxcan_errors(driver).last_error);
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
 }
 
@@ -268,11 +268,11 @@ static void test_two_devices_share_filters_and_nothing_else(void) {
     rig_start(1);
     TEST_ASSERT_EQUAL_HEX32(0x3FU | (0x3FU << 14), model->fa1r);
     TEST_ASSERT_EQUAL(0, rig[1].model.fa1r);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_send(&rig[1].driver, &frame, 1));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_send(&rig[1].driver, &frame, 1));
     TEST_ASSERT_FALSE(rig_send_next(0, &on_bus));
     TEST_ASSERT_TRUE(rig_send_next(1, &on_bus));
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(&rig[0].driver, &heard));
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(&rig[1].driver, &heard));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(&rig[0].driver, &heard));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(&rig[1].driver, &heard));
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, heard.kind);
 }
 
@@ -280,35 +280,35 @@ static bool in_use_reads_back(uint32_t id) {
     const iw_can_frame_t frame = rig_frame(id, 5);
     model_frame_t on_bus;
     iw_can_frame_t echo;
-    return iw_bxcan_send(driver, &frame, 1) > 0 && rig_send_next(0, &on_bus) && iw_bxcan_receive(driver, &echo) > 0 &&
+    return brd_bxcan_send(driver, &frame, 1) > 0 && rig_send_next(0, &on_bus) && brd_bxcan_receive(driver, &echo) > 0 &&
            echo.id == id && echo.kind == IW_CAN_ECHO;
 }
 
 static void test_trouble_of_one_device_is_not_the_other_ones(void) {
-    iw_bxcan_t *const other = &rig[1].driver;
+    brd_bxcan_t *const other = &rig[1].driver;
     const iw_can_frame_t frame = rig_frame(298, 7);
     model_frame_t on_bus;
     iw_can_frame_t taken;
     rig_start(0);
     rig_start(1);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_send(other, &frame, 1));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_send(other, &frame, 1));
     while (bxcan_model_is_on(&rig[1].model)) {
         const int mailbox = bxcan_model_offer(&rig[1].model, &on_bus);
         bxcan_model_begin(&rig[1].model, mailbox);
         bxcan_model_end(&rig[1].model, mailbox, MODEL_BIT_ERROR);
     }
-    TEST_ASSERT_EQUAL(IW_BUS_OFF, iw_bxcan_bus_state(other));
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, brd_bxcan_bus_state(other));
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_TRUE(in_use_reads_back(266));
     TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
     TEST_ASSERT_EQUAL(0, driver->bus_offs);
     TEST_ASSERT_EQUAL(1, other->bus_offs);
-    (void)iw_bxcan_bus_state(other);
-    (void)iw_bxcan_bus_state(other);
+    (void)brd_bxcan_bus_state(other);
+    (void)brd_bxcan_bus_state(other);
     bxcan_model_recessive(&rig[1].model, REJOIN_BITS);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(other));
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(other));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(other));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(other));
     TEST_ASSERT_TRUE(in_use_reads_back(298));
 }
 
@@ -316,7 +316,7 @@ static void test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers(void
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
-    (void)iw_bxcan_send(driver, &frame, 1);
+    (void)brd_bxcan_send(driver, &frame, 1);
     bxcan_model_begin(model, bxcan_model_offer(model, &on_bus));
     bxcan_model_end(model, 0, MODEL_BIT_ERROR);
     bxcan_model_hold(model, 300, true);
@@ -334,7 +334,7 @@ static void test_bus_held_dominant_while_listening_is_passive_only(void) {
     rig_start(0);
     bxcan_model_hold(model, 1000000, false);
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
-    TEST_ASSERT_GREATER_THAN(127, iw_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_GREATER_THAN(127, brd_bxcan_errors(driver).receive_errors);
 }
 
 int main(void) {

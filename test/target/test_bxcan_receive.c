@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-static iw_bxcan_t *const driver = &rig[0].driver;
+static brd_bxcan_t *const driver = &rig[0].driver;
 static bxcan_model_t *const model = &rig[0].model;
 static const uint32_t ours[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
 
@@ -34,8 +34,8 @@ static bool is_ours(uint32_t id) {
 /// 1 if the frame comes through, with what was taken in `*out_frame`.
 static int pass(const model_frame_t *frame, iw_can_frame_t *out_frame) {
     (void)bxcan_model_hear(model, frame);
-    (void)iw_register_read(&rig[0].window.MSR); // Lets the interrupt strike.
-    return iw_bxcan_receive(driver, out_frame);
+    (void)brd_register_read(&rig[0].window.MSR); // Lets the interrupt strike.
+    return brd_bxcan_receive(driver, out_frame);
 }
 
 static void test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote(void) {
@@ -96,22 +96,22 @@ static void test_frames_come_in_the_order_of_the_bus_with_echoes_between(void) {
     const uint32_t expected[] = {256, 266, 512, 288};
     model_frame_t on_bus;
     iw_can_frame_t taken;
-    (void)iw_bxcan_send(driver, &left, 1);
+    (void)brd_bxcan_send(driver, &left, 1);
     (void)rig_hear(0, 256, 4);
     (void)rig_send_next(0, &on_bus);
     (void)rig_hear(0, 512, 4);
     (void)rig_hear(0, 288, 4);
     for (size_t i = 0; i < 4; i++) {
-        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
         TEST_ASSERT_EQUAL(expected[i], taken.id);
     }
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
 }
 
 static void test_foreign_setpoint_is_received_and_no_echo(void) {
     iw_can_frame_t taken;
     (void)rig_hear(0, 266, 5);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
 }
 
@@ -122,18 +122,18 @@ static void test_slow_release_shows_no_frame_twice(void) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
         (void)bxcan_model_hear(model, &frame);
     }
-    (void)iw_register_read(&rig[0].window.MSR);
+    (void)brd_register_read(&rig[0].window.MSR);
     for (uint8_t i = 0; i < 3; i++) {
-        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
         TEST_ASSERT_EQUAL(i, taken.data[0]);
     }
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
 }
 
 static void assert_loss_is_told(void) {
     iw_can_frame_t taken;
     memset(&taken, 0xA5, sizeof taken);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
     TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, taken.id);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
     TEST_ASSERT_EQUAL(0, taken.dlc);
@@ -145,7 +145,7 @@ static void overrun(void) {
     for (int i = 0; i < 5; i++) {
         (void)bxcan_model_hear(model, &frame);
     }
-    (void)iw_register_read(&rig[0].window.MSR);
+    (void)brd_register_read(&rig[0].window.MSR);
 }
 
 static void test_overrun_of_the_controller_is_counted_once(void) {
@@ -161,29 +161,29 @@ static void test_overrun_is_told_once_and_before_what_came_with_it(void) {
         overrun();
         assert_loss_is_told();
         for (int i = 0; i < 3; i++) {
-            TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+            TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
             TEST_ASSERT_EQUAL(256, taken.id);
         }
-        TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
     }
 }
 
 static void test_full_ring_loses_the_newest_and_counts(void) {
     iw_can_frame_t taken;
-    for (uint32_t i = 0; i < IW_FRAME_RING_LENGTH + 5U; i++) {
+    for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH + 5U; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
         (void)bxcan_model_hear(model, &frame);
-        (void)iw_register_read(&rig[0].window.MSR);
+        (void)brd_register_read(&rig[0].window.MSR);
     }
     TEST_ASSERT_EQUAL(5, driver->lost);
     assert_loss_is_told();
-    for (uint32_t i = 0; i < IW_FRAME_RING_LENGTH; i++) {
-        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH; i++) {
+        TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
         TEST_ASSERT_EQUAL(i, taken.data[0]);
     }
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
     (void)rig_hear(0, 257, 7);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
 }
 
 static void test_ring_goes_on_for_ever(void) {
@@ -238,8 +238,8 @@ static void test_receive_error_counter_goes_down_again(void) {
     for (int i = 0; i < 4; i++) {
         (void)rig_hear(0, 256, 4);
     }
-    TEST_ASSERT_EQUAL(6, iw_bxcan_errors(driver).receive_errors);
-    TEST_ASSERT_EQUAL(0, iw_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(6, brd_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_EQUAL(0, brd_bxcan_errors(driver).last_error);
 }
 
 int main(void) {

@@ -3,7 +3,7 @@
 #include "bxcan_rig.h"
 #include "unity.h"
 
-static iw_bxcan_t *const driver = &rig[0].driver;
+static brd_bxcan_t *const driver = &rig[0].driver;
 static bxcan_model_t *const model = &rig[0].model;
 
 void setUp(void);
@@ -20,7 +20,7 @@ void tearDown(void) {
 
 static int send(uint32_t id, uint8_t mark) {
     const iw_can_frame_t frame = rig_frame(id, mark);
-    return iw_bxcan_send(driver, &frame, 1);
+    return brd_bxcan_send(driver, &frame, 1);
 }
 
 static void assert_on_bus(uint32_t id, uint8_t mark) {
@@ -37,7 +37,7 @@ static void assert_nothing_waits(void) {
 
 static void assert_echo(uint32_t id, uint8_t mark) {
     iw_can_frame_t echo;
-    TEST_ASSERT_EQUAL_MESSAGE(1, iw_bxcan_receive(driver, &echo), "no echo");
+    TEST_ASSERT_EQUAL_MESSAGE(1, brd_bxcan_receive(driver, &echo), "no echo");
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, echo.kind);
     TEST_ASSERT_EQUAL(id, echo.id);
     TEST_ASSERT_EQUAL(mark, echo.data[0]);
@@ -45,7 +45,7 @@ static void assert_echo(uint32_t id, uint8_t mark) {
 
 static void assert_no_echo(void) {
     iw_can_frame_t echo;
-    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &echo));
+    TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
 static void test_frame_arrives_byte_for_byte(void) {
@@ -55,7 +55,7 @@ static void test_frame_arrives_byte_for_byte(void) {
     for (size_t i = 0; i < 8; i++) {
         frame.data[i] = bytes[i];
     }
-    TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame, 1));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_send(driver, &frame, 1));
     TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
     TEST_ASSERT_EQUAL(0x7FF, on_bus.id);
     TEST_ASSERT_EQUAL(0, on_bus.extended);
@@ -68,7 +68,7 @@ static void test_every_dlc_is_sent(void) {
     for (uint8_t dlc = 0; dlc <= 8; dlc++) {
         const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
         model_frame_t on_bus;
-        TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame, 1));
+        TEST_ASSERT_EQUAL(1, brd_bxcan_send(driver, &frame, 1));
         TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
         TEST_ASSERT_EQUAL(dlc, on_bus.dlc);
     }
@@ -83,7 +83,7 @@ static void test_what_is_no_plain_data_frame_is_refused(void) {
         {.id = 266, .dlc = 9},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &wrong[i], 1));
+        TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &wrong[i], 1));
     }
     assert_nothing_waits();
 }
@@ -123,7 +123,7 @@ static void note_write(uint32_t offset) {
 
 static int send_pair(uint8_t left_mark, uint8_t right_mark) {
     const iw_can_frame_t pair[] = {rig_frame(266, left_mark), rig_frame(298, right_mark)};
-    return iw_bxcan_send(driver, pair, 2);
+    return brd_bxcan_send(driver, pair, 2);
 }
 
 static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
@@ -161,8 +161,8 @@ static void test_pair_takes_the_places_of_the_waiting_one(void) {
 static void test_pair_with_a_wrong_frame_is_refused_whole(void) {
     const iw_can_frame_t left_wrong[] = {rig_frame(0x800, 1), rig_frame(298, 2)};
     const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, left_wrong, 2));
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, right_wrong, 2));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, left_wrong, 2));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, right_wrong, 2));
     assert_nothing_waits();
     assert_no_echo();
 }
@@ -170,7 +170,7 @@ static void test_pair_with_a_wrong_frame_is_refused_whole(void) {
 static void test_pair_whose_right_frame_finds_no_place_leaves_the_left_one(void) {
     const iw_can_frame_t right = rig_frame(298, 2);
     (void)send(298, 1);
-    (void)iw_bxcan_send(driver, &right, 1);
+    (void)brd_bxcan_send(driver, &right, 1);
     TEST_ASSERT_EQUAL(1, send_pair(3, 4));
     assert_on_bus(266, 3);
     assert_on_bus(298, 2);
@@ -207,7 +207,7 @@ static void test_pair_finds_places_though_both_old_frames_leave_meanwhile(void) 
 
 static void test_call_places_no_more_frames_than_wheels(void) {
     const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
-    TEST_ASSERT_EQUAL(2, iw_bxcan_send(driver, three, 3));
+    TEST_ASSERT_EQUAL(2, brd_bxcan_send(driver, three, 3));
     assert_on_bus(266, 1);
     assert_on_bus(298, 2);
     assert_nothing_waits();
@@ -294,10 +294,10 @@ static void test_old_frame_that_fails_while_being_replaced_never_comes(void) {
 }
 
 static void join_again(void) {
-    TEST_ASSERT_EQUAL(IW_BUS_DOWN, iw_bxcan_bus_state(driver));
-    (void)iw_bxcan_bus_state(driver);
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, brd_bxcan_bus_state(driver));
+    (void)brd_bxcan_bus_state(driver);
     bxcan_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(driver));
 }
 
 static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
@@ -305,7 +305,7 @@ static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
     begin_first();
     TEST_ASSERT_EQUAL(0, send(266, 2));
     (void)lose_frame_on_bus(0x08);
-    (void)iw_bxcan_errors(driver); // The interrupt strikes.
+    (void)brd_bxcan_errors(driver); // The interrupt strikes.
     assert_nothing_waits();
     assert_no_echo();
     TEST_ASSERT_EQUAL(1, send(266, 3));
@@ -318,7 +318,7 @@ static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_
     (void)send(266, 1);
     (void)send(298, 1);
     begin_first();
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, rig[0].reset, "the device is let go again");
     TEST_ASSERT_LESS_THAN(0, send(266, 2));
@@ -338,19 +338,19 @@ static void test_purge_that_resets_the_controller_keeps_echoes_of_before_from_th
     assert_on_bus(266, 1);
     (void)send(298, 1);
     model->abort_reads = UINT32_MAX;
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
-    TEST_ASSERT_EQUAL(-1, iw_bxcan_receive(driver, &echo));
+    TEST_ASSERT_EQUAL(-1, brd_bxcan_receive(driver, &echo));
 }
 
 static void test_purge_of_a_controller_that_ignores_aborts_resets_it(void) {
     (void)send(266, 1);
     model->abort_reads = UINT32_MAX;
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_nothing_waits();
     join_again();
     assert_nothing_waits();
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
 }
 
@@ -360,10 +360,10 @@ static void test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing(vo
     begin_first();
     (void)lose_frame_on_bus(0x08);
     bxcan_model_hold(model, 50, true);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
     bxcan_model_recessive(model, 11);
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(driver));
     assert_nothing_waits();
     assert_no_echo();
 }
@@ -378,7 +378,7 @@ static void test_failed_attempts_before_an_abort_are_no_echo(void) {
         bxcan_model_begin(model, mailbox);
         bxcan_model_end(model, mailbox, ends[i]);
         TEST_ASSERT_NOT_EQUAL(0, model->tsr & (0x0C0C0CU));
-        TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+        TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
         assert_no_echo();
         TEST_ASSERT_EQUAL(1, send(266, 2));
         assert_on_bus(266, 2);
@@ -407,7 +407,7 @@ static void test_fourth_frame_waits_for_a_free_mailbox(void) {
 static void test_purge_takes_everything_back(void) {
     (void)send(266, 1);
     (void)send(298, 1);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_nothing_waits();
     assert_no_echo();
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -419,15 +419,15 @@ static void test_purge_takes_everything_back(void) {
 static void test_echo_from_before_a_purge_never_comes(void) {
     (void)send(266, 1);
     assert_on_bus(266, 1);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_no_echo();
 }
 
 static void test_purge_keeps_what_was_received(void) {
     iw_can_frame_t frame;
     (void)rig_hear(0, 256, 4);
-    (void)iw_bxcan_purge(driver);
-    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &frame));
+    (void)brd_bxcan_purge(driver);
+    TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &frame));
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, frame.kind);
 }
 
@@ -435,7 +435,7 @@ static void test_frame_that_completes_during_a_purge_has_no_echo_afterwards(void
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = end_frame_on_bus;
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_no_echo();
     assert_nothing_waits();
     (void)send(266, 2);
@@ -472,17 +472,17 @@ static void fill_mailboxes(void) {
 
 static void test_purge_of_three_full_mailboxes_empties_them_all(void) {
     fill_mailboxes();
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
     assert_nothing_waits();
-    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(driver));
     fill_mailboxes();
 }
 
 static void test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting(void) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_no_echo();
     assert_nothing_waits();
     TEST_ASSERT_EQUAL(0, driver->resets);
@@ -503,14 +503,14 @@ static void test_completion_while_another_mailbox_is_withdrawn_is_not_lost(void)
 }
 
 static void test_purge_of_an_idle_device_succeeds(void) {
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
-    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
 }
 
 static void test_receive_of_a_stopped_device_is_broken(void) {
     iw_can_frame_t frame;
     rig_init(0, false);
-    TEST_ASSERT_LESS_THAN(0, iw_bxcan_receive(driver, &frame));
+    TEST_ASSERT_LESS_THAN(0, brd_bxcan_receive(driver, &frame));
     TEST_ASSERT_LESS_THAN(0, send(266, 1));
 }
 
@@ -552,13 +552,13 @@ static void test_random_traffic_keeps_the_account(void) {
             break;
         default:
             if ((chance >> 24) % 16U == 0U) {
-                TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+                TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
                 open[0] = 0;
                 open[1] = 0;
             }
             break;
         }
-        while (iw_bxcan_receive(driver, &echo) > 0) {
+        while (brd_bxcan_receive(driver, &echo) > 0) {
             const bool right = echo.id == 298U;
             TEST_ASSERT_GREATER_THAN_MESSAGE(0, open[right], "an echo too many");
             TEST_ASSERT_EQUAL(marks[right][0], echo.data[0]);

@@ -44,9 +44,9 @@ static void test_channel_of_a_relay_that_is_alive_stays(void) {
 static void start_with_lease(uint16_t lease_ms) {
     iw_config_t config = rig.config;
     config.lease_ms = lease_ms;
-    place.settings = iw_settings_from(&config);
+    place.settings = brd_settings_from(&config);
     memset(&host, 0, sizeof host);
-    iw_host_init(&host, &place, rig.now_us);
+    brd_host_init(&host, &place, rig.now_us);
     say(0, "{\"cmd\":\"link\"}");
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);
@@ -80,7 +80,7 @@ static void run_until_listening(void) {
         say(0, "{\"cmd\":\"alive\"}");
         run_ms(200);
     }
-    TEST_ASSERT_TRUE(iw_host_is_silent(&host));
+    TEST_ASSERT_TRUE(brd_host_is_silent(&host));
 }
 
 static void test_flash_is_not_written_while_an_arm_waits(void) {
@@ -99,11 +99,11 @@ static void test_take_of_two_lines_carries_out_one_a_time(void) {
     say(1, "{\"cmd\":\"hello\",\"id\":1}");
     say(1, "{\"cmd\":\"hello\",\"id\":2}");
     answer[0] = '\0';
-    TEST_ASSERT_TRUE(iw_host_take(&host, rig.now_us));
+    TEST_ASSERT_TRUE(brd_host_take(&host, rig.now_us));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":1"), answer);
-    TEST_ASSERT_TRUE(iw_host_take(&host, rig.now_us));
+    TEST_ASSERT_TRUE(brd_host_take(&host, rig.now_us));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":2"), answer);
-    TEST_ASSERT_FALSE(iw_host_take(&host, rig.now_us));
+    TEST_ASSERT_FALSE(brd_host_take(&host, rig.now_us));
 }
 
 static void test_channel_that_only_watches_may_not_arm(void) {
@@ -171,43 +171,43 @@ static void test_answer_that_waits_for_a_closed_channel_frees_its_place(void) {
 }
 
 static void test_pending_place_is_of_one_client_and_one_request(void) {
-    static iw_pending_t pool;
+    static brd_pending_t pool;
     const iwn_id_t one = {.kind = IWN_ID_NUMBER, .number = 1};
     const iwn_id_t two = {.kind = IWN_ID_NUMBER, .number = 2};
     memset(&pool, 0, sizeof pool);
-    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
-    iw_pending_put(&pool, 5, IWN_CMD_ARM, &one);
-    iw_pending_put(&pool, 5, IWN_CMD_STATUS, &two);
-    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 6, IWN_CMD_ARM)->kind);
-    iw_pending_put(&pool, 5, IWN_CMD_ARM, &two);
-    TEST_ASSERT_EQUAL_INT64(2, iw_pending_take(&pool, 5, IWN_CMD_ARM)->number);
-    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
-    TEST_ASSERT_EQUAL_INT64(2, iw_pending_take(&pool, 5, IWN_CMD_STATUS)->number);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, brd_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
+    brd_pending_put(&pool, 5, IWN_CMD_ARM, &one);
+    brd_pending_put(&pool, 5, IWN_CMD_STATUS, &two);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, brd_pending_take(&pool, 6, IWN_CMD_ARM)->kind);
+    brd_pending_put(&pool, 5, IWN_CMD_ARM, &two);
+    TEST_ASSERT_EQUAL_INT64(2, brd_pending_take(&pool, 5, IWN_CMD_ARM)->number);
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, brd_pending_take(&pool, 5, IWN_CMD_ARM)->kind);
+    TEST_ASSERT_EQUAL_INT64(2, brd_pending_take(&pool, 5, IWN_CMD_STATUS)->number);
 }
 
 static void test_pending_pool_that_is_full_refuses_all_but_who_waits_already(void) {
-    static iw_pending_t pool;
+    static brd_pending_t pool;
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 1};
     memset(&pool, 0, sizeof pool);
     for (iw_client_t client = 1; client <= IWN_LINE_CHANNELS; client++) {
-        TEST_ASSERT_TRUE(iw_pending_has_room(&pool, client, IWN_CMD_STATUS));
-        iw_pending_put(&pool, client, IWN_CMD_STATUS, &id);
+        TEST_ASSERT_TRUE(brd_pending_has_room(&pool, client, IWN_CMD_STATUS));
+        brd_pending_put(&pool, client, IWN_CMD_STATUS, &id);
     }
-    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 99, IWN_CMD_STATUS));
-    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 1, IWN_CMD_STATUS));
-    iw_pending_put(&pool, 99, IWN_CMD_STATUS, &id); // Nothing is pushed out.
-    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, iw_pending_take(&pool, 99, IWN_CMD_STATUS)->kind);
-    for (iw_client_t client = 1; client <= IW_PENDING_ARMS; client++) {
-        TEST_ASSERT_TRUE(iw_pending_has_room(&pool, client, IWN_CMD_ARM));
-        iw_pending_put(&pool, client, IWN_CMD_ARM, &id);
+    TEST_ASSERT_FALSE(brd_pending_has_room(&pool, 99, IWN_CMD_STATUS));
+    TEST_ASSERT_TRUE(brd_pending_has_room(&pool, 1, IWN_CMD_STATUS));
+    brd_pending_put(&pool, 99, IWN_CMD_STATUS, &id); // Nothing is pushed out.
+    TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, brd_pending_take(&pool, 99, IWN_CMD_STATUS)->kind);
+    for (iw_client_t client = 1; client <= BRD_PENDING_ARMS; client++) {
+        TEST_ASSERT_TRUE(brd_pending_has_room(&pool, client, IWN_CMD_ARM));
+        brd_pending_put(&pool, client, IWN_CMD_ARM, &id);
     }
-    TEST_ASSERT_FALSE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
-    iw_pending_forget(&pool, 2);
-    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 8, IWN_CMD_ARM));
-    TEST_ASSERT_TRUE(iw_pending_has_room(&pool, 99, IWN_CMD_STATUS));
-    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 1, IWN_CMD_STATUS)->number);
-    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, 1, IWN_CMD_ARM)->number);
-    TEST_ASSERT_EQUAL_INT64(1, iw_pending_take(&pool, IWN_LINE_CHANNELS, IWN_CMD_STATUS)->number);
+    TEST_ASSERT_FALSE(brd_pending_has_room(&pool, 8, IWN_CMD_ARM));
+    brd_pending_forget(&pool, 2);
+    TEST_ASSERT_TRUE(brd_pending_has_room(&pool, 8, IWN_CMD_ARM));
+    TEST_ASSERT_TRUE(brd_pending_has_room(&pool, 99, IWN_CMD_STATUS));
+    TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, 1, IWN_CMD_STATUS)->number);
+    TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, 1, IWN_CMD_ARM)->number);
+    TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, IWN_LINE_CHANNELS, IWN_CMD_STATUS)->number);
 }
 
 int main(void) {

@@ -45,16 +45,16 @@ static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void
     iw_snapshot_t seen = gateway_rig_look(&rig);
     seen.still_moving++;
     seen.present |= 1U << IW_CAUSE_ESTOP_LINE;
-    iw_host_observe(&host, &seen);
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     seen.rolling = seen.rolling_fault = seen.zeros_ending = true;
-    iw_host_observe(&host, &seen);
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"rolling\",\"present\":true"));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"rolling\""));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"zeros_ending\",\"present\":true"));
     seen.rolling = seen.rolling_fault = seen.zeros_ending = false;
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"rolling\",\"present\":false"));
     TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"rolling\""));
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"still_moving\",\"present\":true"));
@@ -90,25 +90,25 @@ static void test_host_zero_of_each_wheel_is_told_once_for_each_change(void) {
     force.offset_mN = 1234;
     force.offset_us = 77;
     seen.wheel[IW_RIGHT].force = &force;
-    iw_host_observe(&host, &seen);
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"side\":\"right\",\"offset_mN\":1234,"), all);
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
     force.provenance = IW_OFFSET_OPERATOR;
     force.offset_us = 99;
     forget();
-    iw_host_observe(&host, &seen);
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"before_mN\":1234,"), all);
     force.offset_us = 100;
     force.offset_mN = 55;
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"offset\""));
     force.provenance = IW_OFFSET_ESTIMATED;
     force.quality.deviation_mN = 31;
-    iw_host_observe(&host, &seen);
+    brd_host_observe(&host, &seen);
     TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_ESTIMATED, host.zero[IW_RIGHT].from);
     TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
 }
@@ -133,28 +133,28 @@ static void test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often
 }
 
 static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start(void) {
-    iw_ledger_state_t state;
+    iw_assumption_state_t state;
     disarm();
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
     pass(2500);
     const uint32_t writes = flash_writes;
     TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
-    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
     pass(5000);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
     start();
-    state = iwn_server_look(&host.server)->assumed[IW_LEDGER_TRACK].state;
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, state);
-    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, state);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
     has_flash = false;
     start();
-    state = iwn_server_look(&host.server)->assumed[IW_LEDGER_TRACK].state;
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, state);
-    TEST_ASSERT_EQUAL_INT(IW_MEMORY_NEW, host.memory);
+    state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, state);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.memory);
     flash_fails = true;
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
     pass(5000);
-    TEST_ASSERT_EQUAL_INT(IW_MEMORY_FAILED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.memory);
 }
 
 static void test_host_turn_is_refused_when_the_track_is_contradicted(void) {
@@ -199,10 +199,10 @@ static void test_host_state_after_a_stall_comes_in_no_burst(void) {
 }
 
 static bool is_accepted(const iw_config_t *config) {
-    const iw_settings_t settings = iw_settings_from(config);
+    const brd_settings_t settings = brd_settings_from(config);
     char text[256];
     iwn_text_t why = iwn_text_begin(text, sizeof text);
-    return iw_settings_check(&settings, &why);
+    return brd_settings_check(&settings, &why);
 }
 
 static void test_host_setting_out_of_its_range_is_refused(void) {
@@ -282,8 +282,8 @@ static void test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_go
 }
 
 static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) {
-    host.zero[IW_LEFT] = (iw_learnt_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
-    host.zero[IW_RIGHT] = (iw_learnt_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
+    host.zero[IW_LEFT] = (brd_assumptions_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
+    host.zero[IW_RIGHT] = (brd_assumptions_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
     const iwn_surroundings_t around = iwn_target_around(&host.server, iwn_server_look(&host.server));
     TEST_ASSERT_TRUE(around.estop.present);
     TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].deviation_mN);
@@ -291,9 +291,9 @@ static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) 
 }
 
 static void test_host_restarts_only_if_it_was_asked_to(void) {
-    TEST_ASSERT_FALSE(iw_host_wants_restart(&host));
+    TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
     host.restart_us = 1;
-    TEST_ASSERT_TRUE(iw_host_wants_restart(&host));
+    TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
 static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(void) {
@@ -303,7 +303,7 @@ static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(voi
     pass(3000);
     TEST_ASSERT_EQUAL_UINT(3, count_of("\"event\":\"link\""));
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, iw_host_tell(&host, &seen, false));
+    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_tell(&host, &seen, false));
 }
 
 static void test_host_hello_and_force_are_whole(void) {

@@ -54,7 +54,7 @@ static size_t damage(char *line, size_t length) {
 /// A hostile line: damaged, or whole and old, doubled, of another start, or without a quote.
 static void put_hostile(void) {
     static char kept[64][IWN_LINE_BOARD_MAX];
-    static size_t kept_length[64];
+    static size_t stored_length[64];
     char line[IWN_LINE_BOARD_MAX + 16U];
     char good[IWN_LINE_BOARD_MAX];
     const uint32_t slot = random_below(64);
@@ -70,7 +70,7 @@ static void put_hostile(void) {
         length = drive_line(FAST_MM_S, BOOT ^ 1ULL << random_below(64), seq + 1U, t_us, line);
         break;
     case 3: // One of those, later.
-        length = kept_length[slot];
+        length = stored_length[slot];
         memcpy(line, kept[slot], length);
         break;
     default:
@@ -81,15 +81,15 @@ static void put_hostile(void) {
         }
         break;
     }
-    kept_length[slot] = (length <= IWN_LINE_BOARD_MAX) ? length : 0U;
-    memcpy(kept[slot], line, kept_length[slot]);
+    stored_length[slot] = (length <= IWN_LINE_BOARD_MAX) ? length : 0U;
+    memcpy(kept[slot], line, stored_length[slot]);
     put(line, length);
     put("\n", random_below(2)); // Some run into the next line.
 }
 
 static void test_host_line_million_hostile_lines_none_is_obeyed(void) {
-    const char *const wish = getenv("IWHEEL_HOSTILE_LINES");
-    const uint32_t wanted = (wish != NULL) ? (uint32_t)strtoul(wish, NULL, 10) : 1000000U;
+    const char *const config = getenv("IWHEEL_HOSTILE_LINES");
+    const uint32_t wanted = (config != NULL) ? (uint32_t)strtoul(config, NULL, 10) : 1000000U;
     uint32_t lines = 0;
     for (uint32_t turn = 0; lines < wanted; turn++) {
         for (uint32_t i = 0; i < 60U; i++, lines++) {
@@ -102,7 +102,7 @@ static void test_host_line_million_hostile_lines_none_is_obeyed(void) {
         }
         run_ms(20);
         if (turn % 64U == 63U) {
-            TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.told_mm_s[IW_LEFT], "hostile lines kept the lease");
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.commanded_mm_s[IW_LEFT], "hostile lines kept the lease");
             run_ms(2500);
             say(0, "{\"cmd\":\"link\"}"); // So long without a relay: its channels are gone.
             say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
@@ -249,8 +249,8 @@ static void test_host_twist_turns_the_right_wheel_faster(void) {
                    (unsigned long long)BOOT, (unsigned long long)++seq, (unsigned long long)t_us);
     put(line, framed(1, json, line));
     run_ms(200);
-    TEST_ASSERT_GREATER_THAN_INT(0, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_GREATER_THAN_INT(rig.bus.told_mm_s[IW_LEFT] + 20, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_GREATER_THAN_INT(0, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT(rig.bus.commanded_mm_s[IW_LEFT] + 20, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall(void) {

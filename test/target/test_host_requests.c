@@ -86,7 +86,7 @@ static void test_host_answers_of_clients_that_have_gone_take_no_place(void) {
         say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
         say(2, "{\"cmd\":\"status\",\"id\":50}");
         say(0, "{\"cmd\":\"close\",\"channel\":2}");
-        while (iw_host_take(&host, rig.now_us)) {
+        while (brd_host_take(&host, rig.now_us)) {
         }
         wire_length = wire_taken = 0;
     }
@@ -131,7 +131,7 @@ static void test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     run_ms(20);
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    const iw_time_us_t next_us = iw_host_tell(&host, &seen, true);
+    const iw_time_us_t next_us = brd_host_tell(&host, &seen, true);
     TEST_ASSERT_EQUAL_INT(1, host.server.told.estop);
     TEST_ASSERT_EQUAL_UINT64(host.client[0].served.next_us, next_us);
     TEST_ASSERT_TRUE(next_us > rig.now_us && next_us < host.linked_us + 1000000U);
@@ -144,16 +144,16 @@ static void test_host_change_of_the_ledger_is_told_and_every_item_is_kept(void) 
     all_length = 0;
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"ok\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"ledger\""), all);
-    iw_learnt_t now;
+    brd_assumptions_t now;
     memset(&now, 0, sizeof now);
-    iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
+    iw_assumption_entry_t entry[IW_ASSUMPTION_ITEMS];
     iw_snapshot_t seen = gateway_rig_look(&rig);
     seen.assumed = entry;
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        entry[item] = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        entry[item] = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     }
-    iw_learnt_note(&now, &seen, &host.settings, host.zero);
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+    brd_assumptions_note(&now, &seen, &host.settings, host.zero);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         TEST_ASSERT_NOT_EQUAL_UINT8(0, now.item[item]);
     }
 }
@@ -161,7 +161,7 @@ static void test_host_change_of_the_ledger_is_told_and_every_item_is_kept(void) 
 static void test_host_without_a_track_refuses_arm_and_tells_null(void) {
     disarm();
     rig.gateway.config.track_mm = 0;
-    host.settings = host.staged = iw_settings_from(&rig.gateway.config);
+    host.settings = host.staged = brd_settings_from(&rig.gateway.config);
     assert_answer("{\"cmd\":\"config\",\"id\":1}", "{\"key\":\"wheels.track_mm\",\"value\":null}");
     assert_answer("{\"cmd\":\"arm\",\"id\":2}", "\"error\":\"track_not_set\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "track_mm not configured"), answer);
@@ -177,10 +177,10 @@ static void test_host_setting_that_is_refused_says_what_it_may_be(void) {
     TEST_ASSERT_TRUE_MESSAGE(to[4] >= '1' && to[4] <= '9', answer);
     iw_config_t config = rig.config;
     config.rest_rpm = 3;
-    const iw_settings_t settings = iw_settings_from(&config);
+    const brd_settings_t settings = brd_settings_from(&config);
     char text[256];
     iwn_text_t why = iwn_text_begin(text, sizeof text);
-    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    TEST_ASSERT_FALSE(brd_settings_check(&settings, &why));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "set it to 2 first"), text);
 }
 

@@ -96,11 +96,11 @@ static void test_host_link_line_comes_at_its_second_and_not_later(void) {
     pass(2500);
     iw_snapshot_t seen = gateway_rig_look(&rig);
     forget();
-    seen.at_us = host.linked_us + IW_HOST_LINK_US - 1U;
-    (void)iw_host_tell(&host, &seen, false);
+    seen.at_us = host.linked_us + BRD_HOST_LINK_US - 1U;
+    (void)brd_host_tell(&host, &seen, false);
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
     seen.at_us++;
-    (void)iw_host_tell(&host, &seen, false);
+    (void)brd_host_tell(&host, &seen, false);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
 }
 
@@ -130,9 +130,9 @@ static void test_host_tare_of_one_wheel_is_that_wheels_zero(void) {
 static void test_host_first_item_is_kept_like_the_others(void) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
     const iw_snapshot_t seen = gateway_rig_look(&rig);
-    iw_learnt_t learnt;
-    iw_learnt_note(&learnt, &seen, &host.settings, host.zero);
-    TEST_ASSERT_EQUAL_UINT8(IW_LEDGER_CONFIRMED, learnt.item[IW_LEDGER_SETPOINT_TYPE] & 0x0FU);
+    brd_assumptions_t learned;
+    brd_assumptions_note(&learned, &seen, &host.settings, host.zero);
+    TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, learned.item[IW_ASSUMPTION_SETPOINT_TYPE] & 0x0FU);
 }
 
 static void test_host_counts_its_channels_and_nothing_behind_them(void) {
@@ -146,7 +146,7 @@ static void test_host_counts_its_channels_and_nothing_behind_them(void) {
 static void test_host_line_has_room_for_what_stands_around_its_json(void) {
     const iwn_out_t json = iwn_server_begin_event(&host.server, "link");
     TEST_ASSERT_EQUAL_PTR(&host.scratch.small[IWN_LINE_PREFIX], json.data);
-    TEST_ASSERT_EQUAL_UINT32(IW_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);
+    TEST_ASSERT_EQUAL_UINT32(BRD_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);
 }
 
 int main(void) {

@@ -18,7 +18,7 @@ void tearDown(void) {}
 
 static uint16_t pattern_in(iw_state_t state) {
     seen.state = state;
-    return iw_lamp_pattern(&seen, false);
+    return brd_lamp_pattern(&seen, false);
 }
 
 static void test_each_state_has_its_own_pattern(void) {
@@ -26,9 +26,9 @@ static void test_each_state_has_its_own_pattern(void) {
                                  pattern_in(IW_STATE_ARMED),
                                  pattern_in(IW_STATE_STOPPING),
                                  pattern_in(IW_STATE_LATCHED),
-                                 iw_lamp_pattern(&seen, true),
-                                 IW_LAMP_NO_BUS,
-                                 IW_LAMP_NO_CRYSTAL};
+                                 brd_lamp_pattern(&seen, true),
+                                 BRD_LAMP_NO_BUS,
+                                 BRD_LAMP_NO_CRYSTAL};
     for (size_t a = 0; a < 7; a++) {
         TEST_ASSERT_NOT_EQUAL(0, patterns[a]);
         for (size_t b = 0; b < a; b++) {
@@ -40,14 +40,14 @@ static void test_each_state_has_its_own_pattern(void) {
 static void test_pressed_contact_shows_before_any_state(void) {
     for (int state = IW_STATE_LISTENING; state <= IW_STATE_LATCHED; state++) {
         (void)pattern_in((iw_state_t)state);
-        TEST_ASSERT_EQUAL_HEX16(IW_LAMP_ESTOP, iw_lamp_pattern(&seen, true));
+        TEST_ASSERT_EQUAL_HEX16(BRD_LAMP_ESTOP, brd_lamp_pattern(&seen, true));
     }
 }
 
 static void test_listening_tells_whether_the_bus_is_there(void) {
     for (int bus = IW_BUS_DOWN; bus <= IW_BUS_ACTIVE; bus++) {
         seen.bus = (iw_bus_state_t)bus;
-        TEST_ASSERT_EQUAL_HEX16((bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING,
+        TEST_ASSERT_EQUAL_HEX16((bus < IW_BUS_PASSIVE) ? BRD_LAMP_NO_BUS : BRD_LAMP_LISTENING,
                                 pattern_in(IW_STATE_LISTENING));
     }
 }
@@ -55,9 +55,9 @@ static void test_listening_tells_whether_the_bus_is_there(void) {
 static void test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second(void) {
     for (uint32_t slot = 0; slot < 16; slot++) {
         for (uint32_t second = 0; second < 3; second++) {
-            const iw_time_us_t at_us = second * 1000000U + slot * IW_LAMP_SLOT_US;
-            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, iw_lamp_is_lit(0x1234U, at_us));
-            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, iw_lamp_is_lit(0x1234U, at_us + IW_LAMP_SLOT_US - 1U));
+            const iw_time_us_t at_us = second * 1000000U + slot * BRD_LAMP_SLOT_US;
+            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, brd_lamp_is_lit(0x1234U, at_us));
+            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, brd_lamp_is_lit(0x1234U, at_us + BRD_LAMP_SLOT_US - 1U));
         }
     }
 }

@@ -7,14 +7,14 @@
 
 #include <string.h>
 
-static uint32_t flash[IW_FLASH_PAGES][IW_FLASH_PAGE_WORDS];
+static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
 static unsigned operations; ///< Since the start.
 static unsigned cut_after;  ///< So many are carried out, and of the next one a part.
 static unsigned erasures;
 static bool is_dead;     ///< Nothing is carried out any more.
 static uint32_t torn_by; ///< Which bits of the operation that was cut got through.
 
-const volatile uint32_t *iw_flash_page(unsigned page) {
+const volatile uint32_t *brd_flash_page(unsigned page) {
     return flash[page];
 }
 
@@ -23,19 +23,19 @@ static bool is_cut(void) {
     return operations++ >= cut_after;
 }
 
-bool iw_flash_erase(unsigned page) {
+bool brd_flash_erase(unsigned page) {
     const bool cut = is_cut();
     if (is_dead) {
         return false;
     }
     erasures++;
-    for (unsigned word = 0; word < IW_FLASH_PAGE_WORDS; word++) {
+    for (unsigned word = 0; word < BRD_FLASH_PAGE_WORDS; word++) {
         flash[page][word] |= (cut && word % 3U != 0U) ? torn_by : UINT32_MAX;
     }
     return !cut;
 }
 
-bool iw_flash_write(unsigned page, unsigned word, uint32_t value) {
+bool brd_flash_write(unsigned page, unsigned word, uint32_t value) {
     const bool cut = is_cut();
     if (is_dead) {
         return false;
@@ -55,8 +55,8 @@ void setUp(void) {
 
 void tearDown(void) {}
 
-static void fill(uint32_t payload[IW_STORE_WORDS], uint32_t number) {
-    for (uint32_t word = 0; word < IW_STORE_WORDS; word++) {
+static void fill(uint32_t payload[BRD_STORE_WORDS], uint32_t number) {
+    for (uint32_t word = 0; word < BRD_STORE_WORDS; word++) {
         payload[word] = number * 2654435761U + word * 40503U;
     }
 }
@@ -67,43 +67,43 @@ static void power_up(void) {
 }
 
 /// The number of the record that is there; 0: none.
-static uint32_t newest(iw_store_t *store) {
-    uint32_t found[IW_STORE_WORDS];
-    uint32_t wanted[IW_STORE_WORDS];
-    iw_store_open(store);
-    if (!iw_store_read(store, found)) {
+static uint32_t newest(brd_store_t *store) {
+    uint32_t found[BRD_STORE_WORDS];
+    uint32_t wanted[BRD_STORE_WORDS];
+    brd_store_open(store);
+    if (!brd_store_read(store, found)) {
         return 0;
     }
     fill(wanted, found[0] * 244002641U); // The inverse of the factor: which number it was made of.
-    TEST_ASSERT_EQUAL_HEX32_ARRAY_MESSAGE(wanted, found, IW_STORE_WORDS, "a record of parts of two");
+    TEST_ASSERT_EQUAL_HEX32_ARRAY_MESSAGE(wanted, found, BRD_STORE_WORDS, "a record of parts of two");
     return found[0] * 244002641U;
 }
 
-static bool write(iw_store_t *store, uint32_t number, bool may_erase) {
-    uint32_t payload[IW_STORE_WORDS];
+static bool write(brd_store_t *store, uint32_t number, bool may_erase) {
+    uint32_t payload[BRD_STORE_WORDS];
     fill(payload, number);
-    return iw_store_write(store, payload, may_erase);
+    return brd_store_write(store, payload, may_erase);
 }
 
 static void test_store_blank_flash_has_no_record(void) {
-    iw_store_t store;
+    brd_store_t store;
     TEST_ASSERT_EQUAL_UINT32(0, newest(&store));
-    TEST_ASSERT_EQUAL_UINT(4, iw_store_blank(&store));
+    TEST_ASSERT_EQUAL_UINT(4, brd_store_blank(&store));
 }
 
 static void test_store_each_record_is_the_newest(void) {
-    iw_store_t store;
+    brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 50U; number++) {
         TEST_ASSERT_TRUE(write(&store, number, true));
         TEST_ASSERT_EQUAL_UINT32(number, newest(&store));
-        TEST_ASSERT_GREATER_OR_EQUAL_UINT(2, iw_store_blank(&store));
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT(2, brd_store_blank(&store));
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(25, erasures);
 }
 
 static void test_store_without_erasing_full_page_refuses_and_keeps(void) {
-    iw_store_t store;
+    brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 4U; number++) {
         TEST_ASSERT_TRUE(write(&store, number, false));
@@ -118,7 +118,7 @@ static void test_store_without_erasing_full_page_refuses_and_keeps(void) {
 static void test_store_cut_at_any_instant_leaves_old_or_new(void) {
     static const uint32_t torn[] = {0, 0x0000FFFF, 0xFFFF0000, 0x55555555, UINT32_MAX};
     for (unsigned way = 0; way < sizeof torn / sizeof torn[0]; way++) {
-        iw_store_t store;
+        brd_store_t store;
         uint32_t number = 0;
         setUp();
         torn_by = torn[way];
@@ -139,14 +139,14 @@ static void test_store_cut_at_any_instant_leaves_old_or_new(void) {
 }
 
 static void test_store_flipped_bit_falls_back_to_the_record_before(void) {
-    iw_store_t store;
+    brd_store_t store;
     (void)newest(&store);
     TEST_ASSERT_TRUE(write(&store, 1, true));
     TEST_ASSERT_TRUE(write(&store, 2, true));
     for (unsigned bit = 0; bit < 64U * 32U; bit++) {
         uint32_t *const word = &flash[store.page][store.slot * 64U + bit / 32U];
         *word ^= 1U << bit % 32U;
-        iw_store_t again;
+        brd_store_t again;
         TEST_ASSERT_EQUAL_UINT32(1, newest(&again));
         *word ^= 1U << bit % 32U;
     }

@@ -5,7 +5,7 @@
 #include <stdio.h>
 
 static bool is_exact(const iw_bit_timing_t *timing) {
-    const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(IW_BOARD_APB1_HZ, timing);
+    const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(BRD_APB1_HZ, timing);
     return achieved.bitrate_hz == IW_BUS_BITRATE_HZ && achieved.sample_point_permille == IW_BUS_SAMPLE_POINT_PERMILLE;
 }
 
@@ -18,11 +18,11 @@ static iw_bit_timing_t decode(uint32_t btr) {
 int main(void) {
     const iw_bit_timing_limits_t limits = IW_BIT_TIMING_BXCAN;
     const iw_bit_timing_achieved_t wanted = {IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE};
-    const iw_bit_timing_t ours = decode(IW_BIT_BTR);
-    const uint32_t jump = ((IW_BIT_BTR >> 24) & 3U) + 1U;
+    const iw_bit_timing_t ours = decode(BRD_BIT_BTR);
+    const uint32_t jump = ((BRD_BIT_BTR >> 24) & 3U) + 1U;
     iw_bit_timing_t solved = {0, 0, 0};
-    const bool is_solved = iw_bit_timing_solve(&limits, IW_BOARD_APB1_HZ, &wanted, &solved) == IW_OK;
+    const bool is_solved = iw_bit_timing_solve(&limits, BRD_APB1_HZ, &wanted, &solved) == IW_OK;
     const bool same = ours.prescaler == solved.prescaler && ours.tseg1 == solved.tseg1 && ours.tseg2 == solved.tseg2;
-    (void)printf("%u Hz: BTR 0x%08X\n", (unsigned)IW_BOARD_APB1_HZ, (unsigned)IW_BIT_BTR);
+    (void)printf("%u Hz: BTR 0x%08X\n", (unsigned)BRD_APB1_HZ, (unsigned)BRD_BIT_BTR);
     return (is_exact(&ours) && is_solved && same && jump <= ours.tseg2 && jump <= 4U) ? 0 : 1;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // How long ago something was, in 32 bits: the longest there is stands for longer than that, never, and not yet.
-#include "magnitude.h"
+#include "arithmetic.h"
 
 #include "unity.h"
 

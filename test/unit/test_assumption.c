@@ -10,8 +10,8 @@
 #include <string.h>
 
 static iw_config_t config;
-static gw_configured_t configured = {&config, 540};
-static char text[GW_EVIDENCE_SIZE];
+static inspect_configured_t configured = {&config, 540};
+static char text[INSPECT_SOURCE_SIZE];
 
 void setUp(void) {
     iw_config_default(&config);
@@ -27,172 +27,172 @@ void setUp(void) {
 
 void tearDown(void) {}
 
-static void assert_value(iw_ledger_item_t item, const char *expected) {
+static void assert_value(iw_assumption_item_t item, const char *expected) {
     char value[IWN_VALUE_SIZE];
     memset(value, 0x5A, sizeof value);
-    gw_assumption_value(&configured, item, value);
+    inspect_assumption_value(&configured, item, value);
     TEST_ASSERT_EQUAL_STRING(expected, value);
 }
 
-static void assert_found(gw_found_t expected, iw_ledger_item_t item, const char *found) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, gw_assumption_compare(&configured, item, found), found);
+static void assert_found(inspect_found_t expected, iw_assumption_item_t item, const char *found) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, inspect_assumption_compare(&configured, item, found), found);
 }
 
 static void test_assumption_values_are_those_of_the_configuration(void) {
-    assert_value(IW_LEDGER_SETPOINT_TYPE, "7");
-    assert_value(IW_LEDGER_CURRENT_ROLE, "setpoint");
-    assert_value(IW_LEDGER_FORCE_UNIT_LEFT, "cN");
-    assert_value(IW_LEDGER_FORCE_UNIT_RIGHT, "dN");
-    assert_value(IW_LEDGER_MOUNT_SIGN_LEFT, "no");
-    assert_value(IW_LEDGER_MOUNT_SIGN_RIGHT, "yes");
-    assert_value(IW_LEDGER_WHEEL_RADIUS, "192");
-    assert_value(IW_LEDGER_TRACK, "540");
-    assert_value(IW_LEDGER_GEAR_RATIO, "10/3, rpm of the rotor");
-    assert_value(IW_LEDGER_OFFSET_INCLUDED, "yes");
-    assert_value(IW_LEDGER_DLC, "yes");
+    assert_value(IW_ASSUMPTION_SETPOINT_TYPE, "7");
+    assert_value(IW_ASSUMPTION_CURRENT_ROLE, "setpoint");
+    assert_value(IW_ASSUMPTION_FORCE_UNIT_LEFT, "cN");
+    assert_value(IW_ASSUMPTION_FORCE_UNIT_RIGHT, "dN");
+    assert_value(IW_ASSUMPTION_MOUNT_SIGN_LEFT, "no");
+    assert_value(IW_ASSUMPTION_MOUNT_SIGN_RIGHT, "yes");
+    assert_value(IW_ASSUMPTION_WHEEL_RADIUS, "192");
+    assert_value(IW_ASSUMPTION_TRACK, "540");
+    assert_value(IW_ASSUMPTION_GEAR_RATIO, "10/3, rpm of the rotor");
+    assert_value(IW_ASSUMPTION_OFFSET_INCLUDED, "yes");
+    assert_value(IW_ASSUMPTION_DLC, "yes");
     iw_config_default(&config);
-    assert_value(IW_LEDGER_SETPOINT_TYPE, "");
-    assert_value(IW_LEDGER_CURRENT_ROLE, "");
-    assert_value(IW_LEDGER_GEAR_RATIO, "1, rpm of the wheel");
+    assert_value(IW_ASSUMPTION_SETPOINT_TYPE, "");
+    assert_value(IW_ASSUMPTION_CURRENT_ROLE, "");
+    assert_value(IW_ASSUMPTION_GEAR_RATIO, "1, rpm of the wheel");
 }
 
 static void test_assumption_longest_values_fit(void) {
     config.gear_turns = 1000;
     config.gear_per = 999;
-    assert_value(IW_LEDGER_GEAR_RATIO, "1000/999, rpm of the rotor");
+    assert_value(IW_ASSUMPTION_GEAR_RATIO, "1000/999, rpm of the rotor");
 }
 
 static void test_assumption_every_item_is_found_by_its_name_and_nothing_else_is(void) {
-    for (unsigned n = 0; n < IW_LEDGER_ITEMS; n++) {
-        iw_ledger_item_t item = IW_LEDGER_ITEMS;
-        TEST_ASSERT_TRUE(iwn_ledger_item_of(iwn_ledger_item_name((iw_ledger_item_t)n), &item));
+    for (unsigned n = 0; n < IW_ASSUMPTION_ITEMS; n++) {
+        iw_assumption_item_t item = IW_ASSUMPTION_ITEMS;
+        TEST_ASSERT_TRUE(iwn_assumption_item_of(iwn_assumption_item_name((iw_assumption_item_t)n), &item));
         TEST_ASSERT_EQUAL_UINT(n, item);
     }
-    iw_ledger_item_t item = IW_LEDGER_ITEMS;
-    TEST_ASSERT_FALSE(iwn_ledger_item_of("", &item));
-    TEST_ASSERT_FALSE(iwn_ledger_item_of("unknown", &item));
-    TEST_ASSERT_FALSE(iwn_ledger_item_of("wheel_radius ", &item));
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, item);
+    iw_assumption_item_t item = IW_ASSUMPTION_ITEMS;
+    TEST_ASSERT_FALSE(iwn_assumption_item_of("", &item));
+    TEST_ASSERT_FALSE(iwn_assumption_item_of("unknown", &item));
+    TEST_ASSERT_FALSE(iwn_assumption_item_of("wheel_radius ", &item));
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, item);
 }
 
 static void test_assumption_without_a_value_the_configured_one_is_meant(void) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        assert_found(GW_FOUND_SAME, (iw_ledger_item_t)item, "");
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        assert_found(INSPECT_FOUND_SAME, (iw_assumption_item_t)item, "");
     }
 }
 
 static void test_assumption_what_is_not_configured_cannot_be_confirmed(void) {
     iw_config_default(&config);
-    assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "");
-    assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "7");
-    assert_found(GW_FOUND_UNSET, IW_LEDGER_CURRENT_ROLE, "limit");
+    assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "");
+    assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "7");
+    assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_CURRENT_ROLE, "limit");
 }
 
 static void test_assumption_numbers_are_compared_as_numbers(void) {
-    assert_found(GW_FOUND_SAME, IW_LEDGER_SETPOINT_TYPE, "7");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_SETPOINT_TYPE, "007");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_SETPOINT_TYPE, "0");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_SETPOINT_TYPE, "255");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "7");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "007");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_SETPOINT_TYPE, "0");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_SETPOINT_TYPE, "255");
     static const char *const impossible[] = {"256", "-1", "7 ", "0x7", "99999", "4294967303", "seven"};
     for (size_t i = 0; i < sizeof impossible / sizeof impossible[0]; i++) {
-        assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_SETPOINT_TYPE, impossible[i]);
+        assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_SETPOINT_TYPE, impossible[i]);
     }
 }
 
 static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
-    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "192");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "195");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "189");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "196");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "188");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "500");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_WHEEL_RADIUS, "501");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_WHEEL_RADIUS, "19");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "192");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "195");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "189");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_WHEEL_RADIUS, "196");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_WHEEL_RADIUS, "188");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_WHEEL_RADIUS, "500");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_WHEEL_RADIUS, "501");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_WHEEL_RADIUS, "19");
 }
 
 static void test_assumption_a_track_within_two_percent_is_the_same(void) {
     configured.track_mm = 600;
-    assert_value(IW_LEDGER_TRACK, "600");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "600");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "588");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "612");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "587");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "613");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "1500");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "1501");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "199");
+    assert_value(IW_ASSUMPTION_TRACK, "600");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_TRACK, "600");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_TRACK, "588");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_TRACK, "612");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_TRACK, "587");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_TRACK, "613");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_TRACK, "1500");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_TRACK, "1501");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_TRACK, "199");
 }
 
 static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
-    assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "10/3");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "20/6");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "10");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "1000/999");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "999/1000");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "10/3");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "20/6");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_GEAR_RATIO, "10");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_GEAR_RATIO, "1000/999");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_GEAR_RATIO, "999/1000");
     static const char *const impossible[] = {"0", "1/0", "/3", "10/", "1001", "1/1001", "10/3, rpm of the rotor"};
     for (size_t i = 0; i < sizeof impossible / sizeof impossible[0]; i++) {
-        assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_GEAR_RATIO, impossible[i]);
+        assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_GEAR_RATIO, impossible[i]);
     }
 }
 
 static void test_assumption_words_are_compared_as_words(void) {
-    assert_found(GW_FOUND_SAME, IW_LEDGER_FORCE_UNIT_RIGHT, "dN");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_FORCE_UNIT_RIGHT, "cN");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_FORCE_UNIT_RIGHT, "DN");
-    assert_found(GW_FOUND_SAME, IW_LEDGER_MOUNT_SIGN_RIGHT, "yes");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_MOUNT_SIGN_LEFT, "yes");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_MOUNT_SIGN_LEFT, "true");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_CURRENT_ROLE, "limit");
-    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_CURRENT_ROLE, "torque");
-    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_OFFSET_INCLUDED, "no");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "dN");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "cN");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "DN");
+    assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_MOUNT_SIGN_RIGHT, "yes");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_MOUNT_SIGN_LEFT, "yes");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_MOUNT_SIGN_LEFT, "true");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_CURRENT_ROLE, "limit");
+    assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_CURRENT_ROLE, "torque");
+    assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_OFFSET_INCLUDED, "no");
 }
 
 static void test_assumption_evidence_tells_the_figure(void) {
-    const gw_word_t word = {"", ""};
-    iw_ledger_entry_t entry = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, -1010};
-    gw_assumption_evidence(IW_LEDGER_FORCE_UNIT_LEFT, &entry, &word, text);
+    const inspect_word_t word = {"", ""};
+    iw_assumption_entry_t entry = {IW_CONTRADICTED, IW_SOURCE_BUS, -1010};
+    inspect_assumption_source(IW_ASSUMPTION_FORCE_UNIT_LEFT, &entry, &word, text);
     TEST_ASSERT_NOT_NULL(strstr(text, "-1.010"));
     entry.figure = INT32_MIN;
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        for (unsigned evidence = IW_EVIDENCE_NONE; evidence <= IW_EVIDENCE_OPERATOR; evidence++) {
-            entry.evidence = (iw_evidence_t)evidence;
-            gw_assumption_evidence((iw_ledger_item_t)item, &entry, &word, text);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        for (unsigned source = IW_SOURCE_NONE; source <= IW_SOURCE_OPERATOR; source++) {
+            entry.source = (iw_source_t)source;
+            inspect_assumption_source((iw_assumption_item_t)item, &entry, &word, text);
             TEST_ASSERT_GREATER_THAN_UINT(8, strlen(text));
-            TEST_ASSERT_LESS_THAN_UINT(GW_EVIDENCE_SIZE - 1U, strlen(text));
+            TEST_ASSERT_LESS_THAN_UINT(INSPECT_SOURCE_SIZE - 1U, strlen(text));
         }
     }
 }
 
-static void assert_word(iw_ledger_state_t state, const char *found, const char *how, const char *expected) {
-    const iw_ledger_entry_t entry = {state, IW_EVIDENCE_OPERATOR, 0};
-    gw_word_t word;
+static void assert_word(iw_assumption_state_t state, const char *found, const char *how, const char *expected) {
+    const iw_assumption_entry_t entry = {state, IW_SOURCE_OPERATOR, 0};
+    inspect_word_t word;
     (void)snprintf(word.found, sizeof word.found, "%s", found);
     (void)snprintf(word.how, sizeof word.how, "%s", how);
-    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, &word, text);
+    inspect_assumption_source(IW_ASSUMPTION_WHEEL_RADIUS, &entry, &word, text);
     TEST_ASSERT_EQUAL_STRING(expected, text);
 }
 
 static void test_assumption_evidence_tells_what_the_operator_found(void) {
-    assert_word(IW_LEDGER_CONTRADICTED, "181", "", "the operator found 181");
-    assert_word(IW_LEDGER_CONTRADICTED, "", "", "the operator found something else");
-    assert_word(IW_LEDGER_CONFIRMED, "192", "", "the operator says so");
+    assert_word(IW_CONTRADICTED, "181", "", "the operator found 181");
+    assert_word(IW_CONTRADICTED, "", "", "the operator found something else");
+    assert_word(IW_CONFIRMED, "192", "", "the operator says so");
 }
 
 static void test_assumption_evidence_tells_how_the_operator_found_it(void) {
-    assert_word(IW_LEDGER_CONFIRMED, "192", "bringup: 5.00 m pushed", "found by bringup: 5.00 m pushed");
-    assert_word(IW_LEDGER_CONTRADICTED, "181", "a tape", "the operator found 181 by a tape");
-    assert_word(IW_LEDGER_CONTRADICTED, "", "a tape", "the operator found something else by a tape");
+    assert_word(IW_CONFIRMED, "192", "bringup: 5.00 m pushed", "found by bringup: 5.00 m pushed");
+    assert_word(IW_CONTRADICTED, "181", "a tape", "the operator found 181 by a tape");
+    assert_word(IW_CONTRADICTED, "", "a tape", "the operator found something else by a tape");
 }
 
 static void test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm(void) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        const char *cost = gw_assumption_cost((iw_ledger_item_t)item);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        const char *cost = inspect_assumption_cost((iw_assumption_item_t)item);
         const bool refuses = strncmp(cost, "arm is refused; ", 16) == 0;
-        TEST_ASSERT_EQUAL_INT_MESSAGE(refuses, iw_ledger_guards_motion((iw_ledger_item_t)item), cost);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(refuses, iw_assumption_guards_motion((iw_assumption_item_t)item), cost);
         TEST_ASSERT_NOT_EQUAL(0, strcmp(cost, "unknown"));
     }
-    TEST_ASSERT_TRUE(iw_ledger_guards_motion(IW_LEDGER_MOUNT_SIGN_LEFT));
-    TEST_ASSERT_FALSE(iw_ledger_guards_motion(IW_LEDGER_DLC));
+    TEST_ASSERT_TRUE(iw_assumption_guards_motion(IW_ASSUMPTION_MOUNT_SIGN_LEFT));
+    TEST_ASSERT_FALSE(iw_assumption_guards_motion(IW_ASSUMPTION_DLC));
 }
 
 int main(void) {

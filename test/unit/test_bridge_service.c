@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The handling of signals that all bridges share, and a log without a reader.
-#include "common/service.h"
+#include "common/bridge_service.h"
 
 #include "unity.h"
 

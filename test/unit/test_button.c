@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Was the button of the e-stop ever seen to work? What counts as tried, what voids it, what is stored.
-#include "ledger/button.h"
-#include "ledger/memory.h"
+#include "assumptions/assumptions_file.h"
+#include "assumptions/button.h"
 
 #include "unity.h"
 
@@ -9,15 +9,15 @@
 
 #define MS(value) ((iw_time_us_t)(value)*1000U)
 
-static iw_estop_seen_t seen;
-static iw_estop_seen_t seen2;
+static iwl_estop_seen_t seen;
+static iwl_estop_seen_t seen2;
 static bool readable;
 static bool readable2;
 static unsigned names_read;
-static iw_estop_ops_t ops;
-static iw_linux_hal_t hal;
+static iwl_estop_ops_t ops;
+static iwl_hal_t hal;
 
-static const iw_estop_seen_t *fake_seen(const void *self) {
+static const iwl_estop_seen_t *fake_seen(const void *self) {
     const bool second = self == &hal.estop2;
     names_read++;
     return !(second ? readable2 : readable) ? NULL : second ? &seen2 : &seen;
@@ -28,12 +28,12 @@ static gw_tried_t tried;
 static iw_time_us_t now_us;
 
 void setUp(void) {
-    seen = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO4"};
-    seen2 = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO5"};
+    seen = (iwl_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO4"};
+    seen2 = (iwl_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "GPIO5"};
     readable = true;
     readable2 = true;
-    ops = (iw_estop_ops_t){.seen = fake_seen, .present = true};
-    hal = (iw_linux_hal_t){.estop_ops = &ops};
+    ops = (iwl_estop_ops_t){.seen = fake_seen, .present = true};
+    hal = (iwl_hal_t){.estop_ops = &ops};
     button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", true}}};
     memset(&tried, 0, sizeof tried);
     now_us = MS(5000);
@@ -282,16 +282,16 @@ static void test_button_that_says_the_same_is_not_asked_for_its_names(void) {
     TEST_ASSERT_EQUAL_UINT(1, names_read);
 }
 
-static bool stored_is_read(const gw_known_t *known, gw_known_t *out_known) {
-    static char text[GW_MEMORY_SIZE];
-    char reason[GW_MEMORY_REASON_SIZE];
-    const size_t length = gw_memory_write(known, "can0", text, sizeof text);
-    return length > 0U && gw_memory_read(text, length, "can0", out_known, reason);
+static bool stored_is_read(const gw_stored_t *known, gw_stored_t *out_known) {
+    static char text[GW_ASSUMPTIONS_FILE_SIZE];
+    char reason[GW_ASSUMPTIONS_REASON_SIZE];
+    const size_t length = gw_assumptions_file_write(known, "can0", text, sizeof text);
+    return length > 0U && gw_assumptions_file_read(text, length, "can0", out_known, reason);
 }
 
 static void test_button_is_stored_and_read_back(void) {
-    static gw_known_t known;
-    static gw_known_t got;
+    static gw_stored_t known;
+    static gw_stored_t got;
     memset(&known, 0, sizeof known);
     known.tried = (gw_tried_t){.wall_us = 1, .contact[0].active_high = true};
     memset(known.tried.contact[0].line, 'l', sizeof known.tried.contact[0].line - 1U);

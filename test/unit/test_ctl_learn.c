@@ -243,10 +243,10 @@ static void test_learn_pose_may_wrap(void) {
 // How far a drive left its path -------------------------------------------------------------------------------------------
 
 /// Both wheels are told that and show that, every 4 ms.
-static void drive_both(unsigned ms, const int16_t told_mm_s[IW_SIDES], const int16_t rpm[IW_SIDES]) {
+static void drive_both(unsigned ms, const int16_t commanded_mm_s[IW_SIDES], const int16_t rpm[IW_SIDES]) {
     for (unsigned passed = 0; passed < ms; passed += 4U) {
-        setpoint(IW_LEFT, told_mm_s[IW_LEFT], 500, CANDUMP_RECEIVED);
-        setpoint(IW_RIGHT, told_mm_s[IW_RIGHT], 500, CANDUMP_RECEIVED);
+        setpoint(IW_LEFT, commanded_mm_s[IW_LEFT], 500, CANDUMP_RECEIVED);
+        setpoint(IW_RIGHT, commanded_mm_s[IW_RIGHT], 500, CANDUMP_RECEIVED);
         now_us += 4 * MS;
         speed(IW_LEFT, rpm[IW_LEFT]);
         speed(IW_RIGHT, rpm[IW_RIGHT]);

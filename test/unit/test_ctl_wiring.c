@@ -9,14 +9,14 @@
 #include <errno.h>
 #include <string.h>
 
-int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
+int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen);
 
 static bringup_t bringup;
-static iw_estop_seen_t seen;
-static iw_estop_seen_t seen2;
+static iwl_estop_seen_t seen;
+static iwl_estop_seen_t seen2;
 static int error;
 
-int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen) {
     const bool second = strcmp(name, "ESTOP2") == 0;
     TEST_ASSERT_EQUAL_STRING(second ? "ESTOP2" : "ESTOP", name);
     *out_seen = second ? seen2 : seen;
@@ -26,8 +26,8 @@ int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
 void setUp(void) {
     memset(&bringup, 0, sizeof bringup);
     gateway_config_default(&bringup.config);
-    seen = (iw_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "ESTOP"};
-    seen2 = (iw_estop_seen_t){.chip = "expander", .line = "P7"};
+    seen = (iwl_estop_seen_t){.chip = "pinctrl-bcm2711", .line = "ESTOP"};
+    seen2 = (iwl_estop_seen_t){.chip = "expander", .line = "P7"};
     error = 0;
 }
 

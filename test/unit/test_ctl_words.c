@@ -82,15 +82,15 @@ static void test_duration_option_without_its_unit_is_told_as_it_should_be_writte
 }
 
 static void test_word_nearly_right_is_near_and_a_strange_one_is_not(void) {
-    TEST_ASSERT_EQUAL_size_t(0, gw_word_distance("stat", "status"));
-    TEST_ASSERT_EQUAL_size_t(1, gw_word_distance("staus", "status"));
-    TEST_ASSERT_EQUAL_size_t(2, gw_word_distance("hlep", "help"));
-    TEST_ASSERT_EQUAL_size_t(3, gw_word_distance("priod_m", "period_msx"));
-    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("xyz", "top"));
-    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("st", "status"));
-    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("", "top"));
-    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE,
-                             gw_word_distance("period_msperiod_msperiod_msperiod_msperiod_ms", "period_ms"));
+    TEST_ASSERT_EQUAL_size_t(0, settings_word_distance("stat", "status"));
+    TEST_ASSERT_EQUAL_size_t(1, settings_word_distance("staus", "status"));
+    TEST_ASSERT_EQUAL_size_t(2, settings_word_distance("hlep", "help"));
+    TEST_ASSERT_EQUAL_size_t(3, settings_word_distance("priod_m", "period_msx"));
+    TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE, settings_word_distance("xyz", "top"));
+    TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE, settings_word_distance("st", "status"));
+    TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE, settings_word_distance("", "top"));
+    TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE,
+                             settings_word_distance("period_msperiod_msperiod_msperiod_msperiod_ms", "period_ms"));
 }
 
 int main(void) {

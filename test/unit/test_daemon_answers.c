@@ -92,7 +92,7 @@ static void test_tare_of_one_wheel_tells_of_that_wheel(void) {
     char told[32];
     for (unsigned side = 0; side < IW_SIDES; side++) {
         daemon_rig_run(3000);
-        memset(daemon_rig.daemon->knowledge.tare, 0, sizeof daemon_rig.daemon->knowledge.tare);
+        memset(daemon_rig.daemon->assumptions.tare, 0, sizeof daemon_rig.daemon->assumptions.tare);
         force[1U - side].offset_mN = 7777;
         (void)snprintf(line, sizeof line, "{\"cmd\":\"tare\",\"side\":\"%s\"}", sides[side]);
         const char *reply = daemon_rig_ask(client, line);
@@ -109,7 +109,7 @@ static void carry_out(const char *line) {
     daemon->wheels.now_us = daemon_rig.now_us - 5000U; // Of a cycle that has gone on for a while,
     daemon->wheels.time_used = true;                   // and in which there was a request before.
     daemon->wheels.requested = false;
-    daemon->clients.servant.carry_out(daemon->clients.servant.context, &daemon->clients.client[0], line, strlen(line));
+    daemon->clients.handler.carry_out(daemon->clients.handler.context, &daemon->clients.client[0], line, strlen(line));
 }
 
 static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void) {
@@ -132,13 +132,13 @@ static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void
     daemon->wheels.now_us = daemon_rig.now_us - 5000U;
     daemon->wheels.time_used = true;
     daemon->wheels.requested = false;
-    daemon->clients.servant.leave(daemon->clients.servant.context, &daemon->clients.client[0]);
+    daemon->clients.handler.leave(daemon->clients.handler.context, &daemon->clients.client[0]);
     TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_look(&daemon->wheels).stop->at_us);
     TEST_ASSERT_TRUE(daemon->wheels.requested);
 }
 
 static void test_reset_that_waited_through_a_stop_is_refused(void) {
-    gw_client_t *own = &daemon_rig.daemon->clients.client[0];
+    sock_client_t *own = &daemon_rig.daemon->clients.client[0];
     assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
     daemon_rig_run(2000);
     own->stopped_us = own->caught_up_us + 1U;
@@ -167,12 +167,12 @@ static void test_change_of_state_is_noted_with_what_each_wheel_was_told(void) {
 }
 
 static void test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on(void) {
-    const iw_ledger_entry_t known = {IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    const iw_assumption_entry_t known = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     uint64_t at = noted_so_far();
-    gw_wheels_know(&daemon_rig.daemon->wheels, IW_LEDGER_TRACK, &known);
-    const blackbox_entry_t entry = noted(BLACKBOX_LEDGER, &at);
-    TEST_ASSERT_EQUAL_UINT8(IW_LEDGER_TRACK, entry.a);
-    TEST_ASSERT_EQUAL_UINT8(IW_LEDGER_CONFIRMED, entry.b);
+    gw_wheels_set_assumption(&daemon_rig.daemon->wheels, IW_ASSUMPTION_TRACK, &known);
+    const blackbox_entry_t entry = noted(BLACKBOX_ASSUMPTION, &at);
+    TEST_ASSERT_EQUAL_UINT8(IW_ASSUMPTION_TRACK, entry.a);
+    TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, entry.b);
 }
 
 /// At rest: a step with frames is noted by them, and they have its time.
@@ -211,8 +211,8 @@ static void test_reply_to_each_request_is_whole(void) {
 
 static void test_status_tells_of_each_wheel_its_own_zero(void) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    daemon->knowledge.known.offset[IW_LEFT].samples = 11;
-    daemon->knowledge.known.offset[IW_RIGHT].samples = 22;
+    daemon->assumptions.known.offset[IW_LEFT].samples = 11;
+    daemon->assumptions.known.offset[IW_RIGHT].samples = 22;
     const iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     const iwn_surroundings_t around = iwn_target_around(&daemon->answers.server, &seen);
     TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].samples);
@@ -263,15 +263,15 @@ static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
 }
 
 static void test_purge_by_the_port_is_told_once_in_the_log(void) {
-    static const char *const words[] = {[IW_LINK_PURGE_DONE] = "taken down and up again",
-                                        [IW_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
-                                        [IW_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
+    static const char *const words[] = {[IWL_LINK_PURGE_DONE] = "taken down and up again",
+                                        [IWL_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
+                                        [IWL_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
     daemon_rig_keep_log();
-    for (unsigned purge = IW_LINK_PURGE_DONE; purge <= IW_LINK_PURGE_FAILED; purge++) {
-        daemon_rig.link.purge = (iw_link_purge_t)purge;
+    for (unsigned purge = IWL_LINK_PURGE_DONE; purge <= IWL_LINK_PURGE_FAILED; purge++) {
+        daemon_rig.link.purge = (iwl_link_purge_t)purge;
         daemon_rig_run(100);
     }
-    for (unsigned purge = IW_LINK_PURGE_DONE; purge <= IW_LINK_PURGE_FAILED; purge++) {
+    for (unsigned purge = IWL_LINK_PURGE_DONE; purge <= IWL_LINK_PURGE_FAILED; purge++) {
         const char *told = strstr(daemon_rig_log(), words[purge]);
         TEST_ASSERT_NOT_NULL_MESSAGE(told, words[purge]);
         TEST_ASSERT_NULL(strstr(told + 1, words[purge]));
@@ -279,7 +279,8 @@ static void test_purge_by_the_port_is_told_once_in_the_log(void) {
 }
 
 static void test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link(void) {
-    daemon_rig.link = (iw_bus_link_t){.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
+    daemon_rig.link =
+        (iwl_bus_link_t){.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
     daemon_rig.daemon->answers.server.told.left_behind = true;
     gw_bus_facts_follow(&daemon_rig.daemon->facts, &daemon_rig.daemon->wheels, true);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
@@ -356,7 +357,7 @@ static void test_refusal_names_the_contact_that_is_meant(void) {
 }
 
 static void test_warning_that_goes_on_is_said_once(void) {
-    static iw_estop_ops_t none;
+    static iwl_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
     none.present = false;
     daemon_rig.daemon->wheels.hal.estop_ops = &none;

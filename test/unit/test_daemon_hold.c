@@ -156,7 +156,7 @@ static void test_release_from_before_a_stop_of_somebody_else_changes_nothing(voi
 
 static void test_release_is_refused_to_who_only_watches_and_while_somebody_drives(void) {
     drive_and_stop();
-    const int watcher = daemon_rig_connect_with(GW_WATCH);
+    const int watcher = daemon_rig_connect_with(SOCK_WATCH);
     daemon_rig_run(20);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(watcher, "{\"cmd\":\"release\"}"), "\"error\":\"denied\""));
     assert_held(IW_STATE_STOPPING, 5000);

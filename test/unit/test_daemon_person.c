@@ -76,8 +76,8 @@ static void test_one_person_reset_too_old_leaves_the_latch(void) {
 }
 
 static void test_one_person_confirm_too_old_is_refused(void) {
-    iw_ledger_t *ledger = &daemon_rig.daemon->wheels.core.ledger;
-    iw_ledger_contradict(ledger, IW_LEDGER_TRACK, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_store_t *assumptions = &daemon_rig.daemon->wheels.core.assumptions;
+    iw_assumption_contradict(assumptions, IW_ASSUMPTION_TRACK, IW_SOURCE_OPERATOR, 0);
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
         assert_reply(aged("confirm", late_ms[i]), "\"error\":\"stale_command\"");
         assert_reply("{\"cmd\":\"status\"}", "\"track\":{\"state\":\"contradicted\"");
@@ -263,7 +263,7 @@ static void test_one_person_without_lease_is_not_armed_with_any_key(void) {
 static void test_one_person_turn_by_wrong_track_is_a_stick(void) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
-    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_TRACK, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_TRACK, IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":200}", "\"error\":\"denied\"");
     assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"stale_command\""));
@@ -277,7 +277,7 @@ static void test_one_person_key_is_in_no_other_line(void) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
     daemon_rig_keep_log();
-    daemon_rig.daemon->log.level = GW_LOG_DEBUG;
+    daemon_rig.daemon->log.level = SOCK_LOG_DEBUG;
     (void)daemon_rig_ask(other,
                          "{\"cmd\":\"watch\",\"topics\":[\"state\",\"lease\",\"stop\",\"frame\"],\"rate_hz\":100}");
     arm_with_key(client, key);

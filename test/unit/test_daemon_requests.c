@@ -27,8 +27,8 @@ static bool says(const char *object, const char *words) {
 static void test_drive_reaches_the_wheel_it_is_for(void) {
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 100, 1000);
-    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(100, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(100, daemon_rig.commanded_mm_s[IW_RIGHT]);
     TEST_ASSERT_TRUE(says(wheel("left"), "\"applied_mm_s\":300,"));
     TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
 }
@@ -51,8 +51,10 @@ static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
         assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":250,\"yaw_mrad_s\":200}", "\"ok\":true");
         daemon_rig_run(20);
     }
-    TEST_ASSERT_EQUAL_INT(250 - 200 * daemon_rig.daemon->config.core.track_mm / 2000, daemon_rig.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(250 + 200 * daemon_rig.daemon->config.core.track_mm / 2000, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(250 - 200 * daemon_rig.daemon->config.core.track_mm / 2000,
+                          daemon_rig.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(250 + 200 * daemon_rig.daemon->config.core.track_mm / 2000,
+                          daemon_rig.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(void) {
@@ -71,8 +73,8 @@ static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(vo
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         assert_reply(lines[i], "\"error\":\"out_of_range\"");
         daemon_rig_run(40);
-        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
-        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_RIGHT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_RIGHT]);
     }
 }
 
@@ -127,8 +129,8 @@ static void test_command_behind_arm_in_one_breath_is_stale(void) {
     TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
     for (unsigned ms = 0; ms < 500U; ms++) {
         daemon_rig_run(1);
-        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
-        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_RIGHT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_RIGHT]);
     }
 }
 
@@ -211,7 +213,8 @@ static void test_arm_while_shutting_down_is_refused(void) {
 }
 
 static void test_arm_with_what_motion_depends_on_contradicted_is_denied(void) {
-    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
+                             IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"denied\"");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
@@ -257,7 +260,7 @@ static void test_burst_of_requests_is_answered_without_waiting_for_periods(void)
     static const char line[] = "{\"cmd\":\"why\"}\n";
     static char text[65536];
     unsigned answers = 0;
-    for (unsigned i = 0; i < 3U * GW_LINES_PER_CYCLE; i++) {
+    for (unsigned i = 0; i < 3U * SOCK_LINES_PER_CYCLE; i++) {
         TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
     }
     daemon_rig_run(1);
@@ -267,7 +270,7 @@ static void test_burst_of_requests_is_answered_without_waiting_for_periods(void)
     for (const char *at = strstr(text, "\"ok\":true"); at != NULL; at = strstr(at + 1, "\"ok\":true")) {
         answers++;
     }
-    TEST_ASSERT_EQUAL_UINT(3U * GW_LINES_PER_CYCLE, answers);
+    TEST_ASSERT_EQUAL_UINT(3U * SOCK_LINES_PER_CYCLE, answers);
 }
 
 static void test_stop_and_estop_need_no_lease(void) {
@@ -277,7 +280,7 @@ static void test_stop_and_estop_need_no_lease(void) {
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"stop\"}"), "\"state\":\"stopping\""));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\"}"), "\"state\":\"latched\""));
-    TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     (void)close(other);
 }
 
@@ -302,7 +305,7 @@ static void test_answer_to_arm_comes_without_waiting_for_the_next_period(void) {
 
 static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
     const int others[] = {daemon_rig_connect(), daemon_rig_connect(), daemon_rig_connect()};
-    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
     int pair[2];
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair));
     daemon_rig.daemon->box.reader.fd = pair[0];
@@ -323,10 +326,10 @@ static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_i
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     daemon_rig.daemon->config.core.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
-    const uint32_t track_mm = daemon_rig.daemon->knowledge.configured.track_mm;
-    daemon_rig.daemon->knowledge.configured.track_mm = 0;
+    const uint32_t track_mm = daemon_rig.daemon->assumptions.configured.track_mm;
+    daemon_rig.daemon->assumptions.configured.track_mm = 0;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"540\"}", "\"error\":\"track_not_set\"");
-    daemon_rig.daemon->knowledge.configured.track_mm = track_mm;
+    daemon_rig.daemon->assumptions.configured.track_mm = track_mm;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"how\":\"x\"}", "\"ok\":true");
     assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"7\"}", "\"ok\":true");
@@ -365,7 +368,7 @@ static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
     seen.still_moving++;
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_observe(&daemon->answers, &seen);
-    gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
+    sock_service_flush(&daemon->clients, IW_CLIENT_NONE);
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
     text[size] = '\0';
@@ -383,7 +386,7 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     seen.rolling_fault = is_fault;
     gw_answers_observe(&daemon->answers, &seen);
     gw_answers_observe(&daemon->answers, &seen);
-    gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
+    sock_service_flush(&daemon->clients, IW_CLIENT_NONE);
     const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(size > 0) ? size : 0] = '\0';
     unsigned count = 0;
@@ -442,7 +445,7 @@ static void test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told(void) 
     gw_box_t *box = &daemon_rig.daemon->box;
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends));
-    box->wish.blackbox_s = 1;
+    box->config.blackbox_s = 1;
     box->writer.fd = ends[0];
     (void)count_told(true, false, "rolling");
     TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes it.
@@ -460,7 +463,7 @@ static void test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told(void) 
     (void)count_told(false, false, "rolling");
     daemon_rig_run(60000);
     (void)count_told(true, true, "rolling"); // Nobody writes: the loop goes on.
-    box->wish.blackbox_s = 0;
+    box->config.blackbox_s = 0;
     box->writer.fd = -1;
     (void)close(ends[0]);
 }

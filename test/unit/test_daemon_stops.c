@@ -21,7 +21,7 @@ static unsigned crowded;
 static char text[1U << 17];
 
 /// Nothing of the gateway runs meanwhile.
-static int knock(gw_right_t door) {
+static int knock(sock_right_t door) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
@@ -31,7 +31,7 @@ static int knock(gw_right_t door) {
     return fd;
 }
 
-static void join(gw_right_t door, unsigned count) {
+static void join(sock_right_t door, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         crowd[crowded++] = knock(door);
         daemon_rig_run(2);
@@ -40,16 +40,16 @@ static void join(gw_right_t door, unsigned count) {
 
 /// Every ordinary place of both sockets, with `client` in one of them.
 static void take_all_places(void) {
-    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
     while (crowded > 0U) { // Of the test before.
         (void)close(crowd[--crowded]);
     }
-    clients->most[GW_DRIVE] = 16;
-    clients->most[GW_WATCH] = 16;
-    join(GW_DRIVE, 15);
-    join(GW_WATCH, 16);
-    TEST_ASSERT_EQUAL_UINT(16, clients->count[GW_DRIVE]);
-    TEST_ASSERT_EQUAL_UINT(16, clients->count[GW_WATCH]);
+    clients->most[SOCK_DRIVE] = 16;
+    clients->most[SOCK_WATCH] = 16;
+    join(SOCK_DRIVE, 15);
+    join(SOCK_WATCH, 16);
+    TEST_ASSERT_EQUAL_UINT(16, clients->count[SOCK_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(16, clients->count[SOCK_WATCH]);
 }
 
 static void say(int fd, const char *lines) {
@@ -75,14 +75,14 @@ static void begin_driving(void) {
     }
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
-    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 /// The first slower setpoint leaves in time.
 static void assert_slower(const char *why) {
     for (unsigned ms = 0; ms < STOP_WITHIN_MS; ms++) {
         daemon_rig_run(1);
-        if (daemon_rig.told_mm_s[IW_LEFT] < 300 && daemon_rig.told_mm_s[IW_RIGHT] < 300) {
+        if (daemon_rig.commanded_mm_s[IW_LEFT] < 300 && daemon_rig.commanded_mm_s[IW_RIGHT] < 300) {
             return;
         }
     }
@@ -95,7 +95,7 @@ static void come_to_rest(void) {
 
 static void test_stop_never_refused_with_all_places_idle(void) {
     take_all_places();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
             begin_driving();
             const int fd = knock(door);
@@ -108,31 +108,31 @@ static void test_stop_never_refused_with_all_places_idle(void) {
             come_to_rest();
         }
     }
-    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[GW_DRIVE]); // Nobody was evicted.
-    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[GW_WATCH]);
-    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[GW_STOP]);
+    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[SOCK_DRIVE]); // Nobody was evicted.
+    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[SOCK_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[SOCK_STOP]);
 }
 
 /// Eight connections wait for their first line; the next one at the same moment is refused without a wait.
 static void test_stop_places_are_eight_on_each_socket(void) {
     take_all_places();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
-        for (unsigned i = 0; i < GW_STOP_PLACES; i++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
+        for (unsigned i = 0; i < SOCK_STOP_PLACES; i++) {
             crowd[crowded++] = knock(door);
         }
         const int next = knock(door);
-        daemon_rig_run(GW_STOP_LEAST_US / IW_US_PER_MS - 1U);
+        daemon_rig_run(SOCK_STOP_LEAST_US / IW_US_PER_MS - 1U);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(next), "too_many_clients"), text);
         TEST_ASSERT_TRUE(has_ended(next));
         (void)close(next);
-        TEST_ASSERT_EQUAL_UINT((door + 1U) * GW_STOP_PLACES, daemon_rig.daemon->clients.count[GW_STOP]);
+        TEST_ASSERT_EQUAL_UINT((door + 1U) * SOCK_STOP_PLACES, daemon_rig.daemon->clients.count[SOCK_STOP]);
     }
 }
 
 /// Each of the crowd asks for more than it reads, without end.
 static void test_stop_never_refused_with_all_places_polling(void) {
     take_all_places();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         begin_driving();
         for (unsigned i = 0; i < crowded; i++) {
             say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\"],\"rate_hz\":100}\n{\"cmd\":\"status\"}\n"
@@ -150,7 +150,7 @@ static void test_stop_never_refused_with_all_places_polling(void) {
 static void test_stop_never_refused_if_its_line_comes_later(void) {
     take_all_places();
     begin_driving();
-    const int fd = knock(GW_DRIVE);
+    const int fd = knock(SOCK_DRIVE);
     daemon_rig_drive(client, 300, 300, 100);
     TEST_ASSERT_EQUAL_STRING_MESSAGE("", hear(fd), "no greeting: who waits for one does not stop");
     say(fd, "{\"cmd\":");
@@ -166,7 +166,7 @@ static void test_stop_never_refused_without_descriptors(void) {
     take_all_places();
     begin_driving();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
-    const int fd = knock(GW_WATCH);
+    const int fd = knock(SOCK_WATCH);
     say(fd, stops[1]);
     const int lowest = dup(fd);
     (void)close(lowest);
@@ -179,7 +179,7 @@ static void test_stop_never_refused_without_descriptors(void) {
 }
 
 /// A thousand silent connections a second, which stay as long as they are let, of the same user.
-static void flood(gw_right_t door, unsigned for_ms) {
+static void flood(sock_right_t door, unsigned for_ms) {
     static int open_ones[64];
     static unsigned next;
     for (unsigned ms = 0; ms < for_ms; ms++) {
@@ -194,7 +194,7 @@ static void flood(gw_right_t door, unsigned for_ms) {
 
 static void test_stop_never_refused_beside_1000_connections_a_second(void) {
     take_all_places();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // The line, after its connection.
             flood(door, 300);
             begin_driving();
@@ -203,7 +203,7 @@ static void test_stop_never_refused_beside_1000_connections_a_second(void) {
             flood(door, later_ms);
             say(fd, stops[later_ms % 3U]);
             flood(door, 30);
-            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.told_mm_s[IW_LEFT], "beside a flood");
+            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.commanded_mm_s[IW_LEFT], "beside a flood");
             TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"ok\":true"), text);
             (void)close(fd);
             come_to_rest();
@@ -225,23 +225,23 @@ static void test_stop_place_for_anything_else_is_refused(void) {
                                          "{\"cmd\":\"stop\",\"now\":true}\n"};
     take_all_places();
     begin_driving();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
             const int fd = knock(door);
             say(fd, others[i]);
             daemon_rig_drive(client, 300, 300, 20);
             TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"error\":\"too_many_clients\""), others[i]);
-            TEST_ASSERT_NOT_NULL(strstr(text, (door == GW_DRIVE) ? "max_clients" : "max_watchers"));
+            TEST_ASSERT_NOT_NULL(strstr(text, (door == SOCK_DRIVE) ? "max_clients" : "max_watchers"));
             TEST_ASSERT_TRUE_MESSAGE(has_ended(fd), others[i]);
             (void)close(fd);
         }
     }
-    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
 static void test_stop_behind_another_line_is_carried_out(void) {
     take_all_places();
-    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+    for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         begin_driving();
         const int fd = knock(door);
         say(fd,
@@ -257,7 +257,7 @@ static void test_stop_behind_another_line_is_carried_out(void) {
 }
 
 /// It asks for more than it reads, and its stop comes with the request whose answer finds no room any more.
-static void ask_too_much_and_stop(int fd, const gw_client_t *greedy) {
+static void ask_too_much_and_stop(int fd, const sock_client_t *greedy) {
     for (unsigned i = 0; i < 5000U && greedy->out_end - greedy->out_start < sizeof greedy->out / 2U; i++) {
         say(fd, "{\"cmd\":\"status\"}\n");
         say(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n");
@@ -277,7 +277,7 @@ static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
     begin_driving();
     ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
     assert_slower("given up");
-    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
 /// An answer finds no room in the step, before its stop is read.
@@ -285,9 +285,9 @@ static void test_stop_not_yet_read_of_a_broken_connection_is_carried_out(void) {
     take_all_places();
     begin_driving();
     say(crowd[0], "{\"cmd\":\"stop\"}\n");
-    gw_client_break(&daemon_rig.daemon->clients.client[1]);
+    sock_client_break(&daemon_rig.daemon->clients.client[1]);
     assert_slower("broken");
-    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[GW_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
 /// It has stopped before it is gone.
@@ -300,7 +300,7 @@ static void test_stop_of_a_holder_that_is_given_up_is_its_own(void) {
 
 static void test_stop_place_answers_one_line_and_all_stops(void) {
     take_all_places();
-    const int fd = knock(GW_DRIVE);
+    const int fd = knock(SOCK_DRIVE);
     say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
     daemon_rig_run(20);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"id\":1,\"ok\":true"), text);
@@ -312,17 +312,18 @@ static void test_stop_place_answers_one_line_and_all_stops(void) {
 }
 
 static void test_stop_place_of_the_silent_is_free_after_200_ms(void) {
-    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
     take_all_places();
     const unsigned before = crowded;
-    join(GW_DRIVE, GW_STOP_PLACES);
-    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES, clients->count[GW_STOP]);
+    join(SOCK_DRIVE, SOCK_STOP_PLACES);
+    TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES, clients->count[SOCK_STOP]);
     daemon_rig.waits = 0;
     daemon_rig_run(150);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(GW_STOP_PLACES, clients->count[GW_STOP], "while nobody wants its place it stays");
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_STOP_PLACES, clients->count[SOCK_STOP],
+                                   "while nobody wants its place it stays");
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and keeps nobody awake");
     daemon_rig_run(60);
-    TEST_ASSERT_EQUAL_UINT(0, clients->count[GW_STOP]);
+    TEST_ASSERT_EQUAL_UINT(0, clients->count[SOCK_STOP]);
     for (unsigned i = before; i < crowded; i++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(crowd[i]), "\"error\":\"too_many_clients\""), text);
         TEST_ASSERT_TRUE(has_ended(crowd[i]));
@@ -332,7 +333,7 @@ static void test_stop_place_of_the_silent_is_free_after_200_ms(void) {
 // A share for each user ----------------------------------------------------------------------------------------------------
 
 /// As another user connects it. -1: this test runs as a user who cannot be another.
-static int knock_as(uid_t uid, gw_right_t door) {
+static int knock_as(uid_t uid, sock_right_t door) {
     if (geteuid() != 0 || seteuid(uid) != 0) {
         return -1;
     }
@@ -343,8 +344,8 @@ static int knock_as(uid_t uid, gw_right_t door) {
 
 static unsigned held_by(uid_t uid) {
     unsigned held = 0;
-    gw_clients_t *clients = &daemon_rig.daemon->clients;
-    for (uint32_t i = GW_DRIVERS_MAX + GW_WATCHERS_MAX; i < GW_CLIENTS_MAX; i++) {
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
+    for (uint32_t i = SOCK_DRIVERS_MAX + SOCK_WATCHERS_MAX; i < SOCK_CLIENTS_MAX; i++) {
         held += (clients->client[i].id != IW_CLIENT_NONE && clients->client[i].uid == uid) ? 1U : 0U;
     }
     return held;
@@ -353,22 +354,22 @@ static unsigned held_by(uid_t uid) {
 static void test_stop_places_of_one_user_are_half_of_them(void) {
     take_all_places();
     for (unsigned i = 0; i < 12U; i++) {
-        const int fd = knock_as(FOREIGN, GW_DRIVE);
+        const int fd = knock_as(FOREIGN, SOCK_DRIVE);
         if (fd < 0) {
             TEST_IGNORE_MESSAGE("only root can connect as another user");
         }
         crowd[crowded++] = fd;
         daemon_rig_run(10);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(FOREIGN));
+        TEST_ASSERT_LESS_OR_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
     }
-    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(FOREIGN));
-    join(GW_DRIVE, GW_STOP_PLACES / 2U); // The other half is for others, and those are not pushed out.
-    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(0));
-    crowd[crowded++] = knock_as(FOREIGN, GW_DRIVE);
+    TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
+    join(SOCK_DRIVE, SOCK_STOP_PLACES / 2U); // The other half is for others, and those are not pushed out.
+    TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
+    crowd[crowded++] = knock_as(FOREIGN, SOCK_DRIVE);
     daemon_rig_run(10);
-    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(0));
+    TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
     begin_driving();
-    const int fd = knock_as(FOREIGN, GW_DRIVE); // And its stop needs no place.
+    const int fd = knock_as(FOREIGN, SOCK_DRIVE); // And its stop needs no place.
     say(fd, stops[0]);
     assert_slower("beyond its share");
     (void)close(fd);
@@ -378,7 +379,7 @@ static void test_stop_in_a_place_names_who_asked_for_it(void) {
     char who[64];
     take_all_places();
     begin_driving();
-    const int fd = knock(GW_WATCH);
+    const int fd = knock(SOCK_WATCH);
     say(fd, stops[0]);
     assert_slower("named");
     (void)close(fd);

@@ -143,11 +143,11 @@ static void test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence(vo
 static void test_stop_is_told_with_the_request_that_asks_for_it(void) {
     static const char line[] = "{\"cmd\":\"stop\"}";
     gw_daemon_t *daemon = daemon_rig.daemon;
-    const gw_servant_t *servant = &daemon->clients.servant;
+    const sock_handler_t *handler = &daemon->clients.handler;
     daemon_rig_arm(client);
     daemon_rig_drive(client, 100, 100, 200);
     const uint32_t before = daemon->answers.server.told.stop_number;
-    servant->carry_out(servant->context, &daemon->clients.client[0], line, sizeof line - 1U);
+    handler->carry_out(handler->context, &daemon->clients.client[0], line, sizeof line - 1U);
     TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
 }
 
@@ -171,7 +171,7 @@ static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
     char told[64];
     daemon_rig_run(3000);
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"tare\"}");
-    const iw_force_quality_t *kept = daemon_rig.daemon->knowledge.tare;
+    const iw_force_quality_t *kept = daemon_rig.daemon->assumptions.tare;
     const iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     TEST_ASSERT_NOT_EQUAL_INT(kept[IW_LEFT].deviation_mN, kept[IW_RIGHT].deviation_mN);
     for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -192,7 +192,8 @@ static void test_request_behind_an_arm_is_answered_after_it(void) {
 
 static void test_refusal_of_recordings_and_of_a_contradicted_arm_says_why(void) {
     assert_reply("{\"cmd\":\"recordings\"}", "nothing is recorded: [record] blackbox_s is 0");
-    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
+                             IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
 }
 
@@ -229,7 +230,7 @@ static void test_frame_is_told_whole(void) {
 static void test_assumption_of_the_button_is_of_its_time_in_force(void) {
     const gw_daemon_t *daemon = daemon_rig.daemon;
     TEST_ASSERT_NOT_EQUAL_UINT(0, daemon->config.estop.debounce_ms);
-    TEST_ASSERT_EQUAL_UINT64(MS(daemon->config.estop.debounce_ms), daemon->knowledge.button.debounce_us);
+    TEST_ASSERT_EQUAL_UINT64(MS(daemon->config.estop.debounce_ms), daemon->assumptions.button.debounce_us);
 }
 
 int main(void) {

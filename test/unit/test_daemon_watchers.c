@@ -2,7 +2,7 @@
 // Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
 #include "answers/answers.h"
 #include "daemon_rig.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "unity.h"
 
@@ -13,9 +13,9 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#define CROWD GW_WATCHERS_MAX
+#define CROWD SOCK_WATCHERS_MAX
 /// After so long whoever came too many and said no stop is turned away.
-#define STOP_MS (GW_STOP_US / IW_US_PER_MS + 2U)
+#define STOP_MS (SOCK_STOP_US / IW_US_PER_MS + 2U)
 
 typedef struct {
     const char *line;
@@ -50,9 +50,9 @@ static unsigned crowded;
 
 void setUp(void) {
     daemon_rig_begin();
-    daemon_rig.daemon->clients.most[GW_WATCH] = CROWD;
+    daemon_rig.daemon->clients.most[SOCK_WATCH] = CROWD;
     driver = daemon_rig_connect();
-    watcher = daemon_rig_connect_with(GW_WATCH);
+    watcher = daemon_rig_connect_with(SOCK_WATCH);
     crowded = 0;
 }
 
@@ -81,7 +81,7 @@ static void say(int client, const char *line) {
 
 static void connect_crowd(unsigned count) {
     for (unsigned i = 0; i < count; i++) {
-        crowd[crowded++] = daemon_rig_connect_with(GW_WATCH);
+        crowd[crowded++] = daemon_rig_connect_with(SOCK_WATCH);
         daemon_rig_run(3);
     }
 }
@@ -120,7 +120,7 @@ static void test_watcher_who_asks_to_drive_changes_nothing(void) {
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"drive\",\"left_mm_s\":900,\"right_mm_s\":900}"), "\"denied\"");
     daemon_rig_drive(driver, 300, 300, 100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
-    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
     (void)daemon_rig_ask(driver, "{\"cmd\":\"stop\"}");
     daemon_rig_run(2000);
     (void)daemon_rig_ask(watcher, "{\"cmd\":\"drive\",\"left_mm_s\":900,\"right_mm_s\":900}");
@@ -132,7 +132,7 @@ static void test_stop_of_a_watcher_stops_whoever_drives(void) {
     daemon_rig_drive(driver, 300, 300, 500);
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"stop\"}"), "\"ok\":true");
     daemon_rig_run(2000);
-    TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     const char *reply = daemon_rig_ask(driver, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
     char who[64];
     (void)snprintf(who, sizeof who, "user %u (process %d)", (unsigned)getuid(), (int)getpid());
@@ -157,9 +157,9 @@ static void test_reset_that_an_estop_keeps_away_names_user_and_process(void) {
 // Quotas -------------------------------------------------------------------------------------------------------------------
 
 static void test_watchers_take_no_slot_of_a_driver(void) {
-    daemon_rig.daemon->clients.most[GW_DRIVE] = 2;
+    daemon_rig.daemon->clients.most[SOCK_DRIVE] = 2;
     connect_crowd(CROWD - 1U);
-    TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     const int second = daemon_rig_connect();
     assert_has(daemon_rig_ask(second, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
     const int third = daemon_rig_connect();
@@ -172,7 +172,7 @@ static void test_watchers_take_no_slot_of_a_driver(void) {
 }
 
 static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again(void) {
-    daemon_rig.daemon->clients.most[GW_WATCH] = 2;
+    daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(2);
     char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
     daemon_rig_run(STOP_MS);
@@ -184,8 +184,8 @@ static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_ag
     daemon_rig_run(10);
     connect_crowd(1);
     assert_has(daemon_rig_ask(crowd[2], "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
-    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[GW_WATCH]);
-    TEST_ASSERT_EQUAL_UINT(3, gw_clients_count(&daemon_rig.daemon->clients));
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(3, sock_clients_count(&daemon_rig.daemon->clients));
 }
 
 static void test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing(void) {
@@ -257,8 +257,8 @@ static void test_frames_come_one_by_one_to_few_and_together_to_many(void) {
 }
 
 static void test_states_for_many_are_written_once(void) {
-    char first[GW_REPLY_MAX];
-    char second[GW_REPLY_MAX];
+    char first[SOCK_REPLY_MAX];
+    char second[SOCK_REPLY_MAX];
     connect_crowd(2);
     for (unsigned i = 0; i < crowded; i++) {
         say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}\n");
@@ -279,18 +279,18 @@ static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace
         say(watcher, "{\"cmd\":\"hello\"}\n");
     }
     daemon_rig_run(1);
-    TEST_ASSERT_EQUAL_UINT(GW_LINES_PER_CYCLE, replies_of(watcher));
+    TEST_ASSERT_EQUAL_UINT(SOCK_LINES_PER_CYCLE, replies_of(watcher));
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
-    TEST_ASSERT_UINT_WITHIN(1, 100000U / GW_WATCHER_LINE_US, replies_of(watcher));
+    TEST_ASSERT_UINT_WITHIN(1, 100000U / SOCK_WATCHER_LINE_US, replies_of(watcher));
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "lines that have to wait keep nobody awake");
     daemon_rig_run(1000);
-    TEST_ASSERT_UINT_WITHIN(2, 100U - GW_LINES_PER_CYCLE - 10U, replies_of(watcher));
+    TEST_ASSERT_UINT_WITHIN(2, 100U - SOCK_LINES_PER_CYCLE - 10U, replies_of(watcher));
     for (unsigned i = 0; i < 10U; i++) {
         say(watcher, "{\"cmd\":\"hello\"}\n");
     }
     daemon_rig_run(1);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(GW_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
 }
 
 static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void) {
@@ -303,7 +303,7 @@ static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void
             say(crowd[i], "{\"cmd\":\"estop\"}\n");
         }
         daemon_rig_run(20);
-        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.commanded_mm_s[IW_LEFT]);
     }
     const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
     TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= IWN_ESTOP_AGAIN_US + MS(20));
@@ -336,7 +336,7 @@ static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 
@@ -344,7 +344,7 @@ static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
     daemon_rig_keep_log();
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
-    const gw_listener_t *listener = &daemon_rig.daemon->clients.listener[GW_WATCH];
+    const sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_WATCH];
     TEST_ASSERT_EQUAL_INT(0, getsockname(listener->fd, (struct sockaddr *)&address, &length));
     daemon_rig_run(10);
     for (; crowded < 60U; crowded++) {
@@ -353,17 +353,17 @@ static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
     }
     daemon_rig.waits = 0;
     daemon_rig_run(9);
-    TEST_ASSERT_EQUAL_UINT(1U + GW_ACCEPTS_PER_CYCLE * (9000U / GW_WATCHER_ACCEPT_US + 1U),
-                           daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(1U + SOCK_ACCEPTS_PER_CYCLE * (9000U / SOCK_WATCHER_ACCEPT_US + 1U),
+                           daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
     daemon_rig_run(20);
-    TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
 }
 
 static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in(void) {
     daemon_rig_keep_log();
-    daemon_rig.daemon->clients.most[GW_WATCH] = 2;
+    daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(3);
     daemon_rig_run(STOP_MS);
     TEST_ASSERT_EQUAL_UINT(1, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
@@ -376,7 +376,7 @@ static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_h
 }
 
 static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one(void) {
-    gw_listener_t *listener = &daemon_rig.daemon->clients.listener[GW_DRIVE];
+    sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_DRIVE];
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     struct rlimit before;
@@ -394,17 +394,17 @@ static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_i
     const struct rlimit none = {.rlim_cur = (rlim_t)lowest, .rlim_max = before.rlim_max};
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
     daemon_rig.waits = 0;
-    daemon_rig_run(GW_LISTENER_PAUSE_US / IW_US_PER_MS - 5U);
-    const unsigned count = daemon_rig.daemon->clients.count[GW_DRIVE];
+    daemon_rig_run(SOCK_LISTENER_PAUSE_US / IW_US_PER_MS - 5U);
+    const unsigned count = daemon_rig.daemon->clients.count[SOCK_DRIVE];
     const unsigned lines = daemon_rig_logged("cannot accept clients for want of descriptors; trying again in 200 ms");
     const uint32_t waits = daemon_rig.waits;
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_UINT(1, count);
     TEST_ASSERT_EQUAL_UINT(1, lines);
     TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it keeps nobody awake");
-    TEST_ASSERT_EQUAL_UINT(1, daemon_rig.daemon->clients.count[GW_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(1, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
     daemon_rig_run(10);
-    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[GW_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
 static void test_requests_in_one_breath_are_answered_in_their_order(void) {
@@ -429,22 +429,22 @@ static void test_round_of_sending_ends_when_its_time_is_up(void) {
     for (unsigned i = 0; i < crowded; i++) {
         (void)recv(crowd[i], text, sizeof text, MSG_DONTWAIT);
     }
-    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    sock_clients_t *clients = &daemon_rig.daemon->clients;
     iwn_server_t *server = &daemon_rig.daemon->answers.server;
     iwn_out_t json = iwn_server_begin_event(server, "state");
     iwn_server_send_event(server, IWN_TOPIC_STATE, &json);
     daemon_rig.look_takes_us = 100U;
-    gw_service_flush(clients, IW_CLIENT_NONE);
+    sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;
     unsigned reached = 0;
     for (unsigned i = 0; i < crowded; i++) {
         reached += (recv(crowd[i], text, sizeof text, MSG_DONTWAIT) > 0) ? 1U : 0U;
     }
-    TEST_ASSERT_UINT_WITHIN(1, GW_ROUND_US / 100U, reached);
-    TEST_ASSERT_TRUE(gw_service_is_busy(clients));
+    TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
+    TEST_ASSERT_TRUE(sock_service_is_busy(clients));
     daemon_rig_run(20); // All is sent: who has nothing waiting costs nothing of the time.
-    daemon_rig.look_takes_us = 2U * GW_ROUND_US;
-    gw_service_flush(clients, IW_CLIENT_NONE);
+    daemon_rig.look_takes_us = 2U * SOCK_ROUND_US;
+    sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;
     TEST_ASSERT_FALSE(clients->lines_wait);
 }

@@ -41,8 +41,8 @@ static uint32_t go_on(speeds_t applied, speeds_t measured, uint32_t for_ms) {
     verdict = IW_DIVERGE_NOT;
     pair.applied_mm_s[IW_LEFT] = applied.left_mm_s;
     pair.applied_mm_s[IW_RIGHT] = applied.right_mm_s;
-    iw_diverge_hear(&pair, IW_LEFT, measured.left_mm_s);
-    iw_diverge_hear(&pair, IW_RIGHT, measured.right_mm_s);
+    iw_diverge_receive(&pair, IW_LEFT, measured.left_mm_s);
+    iw_diverge_receive(&pair, IW_RIGHT, measured.right_mm_s);
     while (verdict == IW_DIVERGE_NOT && now_us < from_us + MS(for_ms)) {
         now_us += STEP_US;
         verdict = iw_diverge_step(&pair, now_us);
@@ -52,8 +52,8 @@ static uint32_t go_on(speeds_t applied, speeds_t measured, uint32_t for_ms) {
 
 /// Both go as commanded: nothing differs, and what is expected has settled.
 static void settle(speeds_t speeds) {
-    iw_diverge_hear(&pair, IW_LEFT, speeds.left_mm_s);
-    iw_diverge_hear(&pair, IW_RIGHT, speeds.right_mm_s);
+    iw_diverge_receive(&pair, IW_LEFT, speeds.left_mm_s);
+    iw_diverge_receive(&pair, IW_RIGHT, speeds.right_mm_s);
     pair.applied_mm_s[IW_LEFT] = speeds.left_mm_s;
     pair.applied_mm_s[IW_RIGHT] = speeds.right_mm_s;
     iw_diverge_restart(&pair, now_us);
@@ -244,7 +244,7 @@ static void test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on(void)
 
 static void test_diverge_steps_within_a_millisecond_count_together(void) {
     settle((speeds_t){1000, 1000});
-    iw_diverge_hear(&pair, IW_LEFT, 0);
+    iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US - 1U);
     TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
     (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US);
@@ -253,7 +253,7 @@ static void test_diverge_steps_within_a_millisecond_count_together(void) {
 
 static void test_diverge_long_pause_counts_as_50_ms(void) {
     settle((speeds_t){1000, 1000});
-    iw_diverge_hear(&pair, IW_LEFT, 0);
+    iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + MS(5000));
     TEST_ASSERT_INT32_WITHIN(500, 100000, pair.path_um);
 }
@@ -278,12 +278,12 @@ static void test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand(void)
 
 static void test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm(void) {
     settle((speeds_t){1000, 1000});
-    iw_diverge_hear(&pair, IW_LEFT, 942); // 58000 um/s less than it should: 408 more than 57592.
+    iw_diverge_receive(&pair, IW_LEFT, 942); // 58000 um/s less than it should: 408 more than 57592.
     (void)iw_diverge_step(&pair, now_us + MS(50));
     TEST_ASSERT_EQUAL_INT32(20, pair.path_um);
     begin();
     settle((speeds_t){1000, 1000});
-    iw_diverge_hear(&pair, IW_LEFT, 0);
+    iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + MS(50));
     TEST_ASSERT_EQUAL_INT32(100006, pair.path_um); // Double.
 }
@@ -302,9 +302,9 @@ static void test_diverge_limit_is_exact(void) {
 static void test_diverge_four_fifths_of_the_expected_speed_are_exact(void) {
     settle((speeds_t){10000, 10000});
     pair.path_um = 60000;
-    iw_diverge_hear(&pair, IW_LEFT, 7993);
+    iw_diverge_receive(&pair, IW_LEFT, 7993);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, iw_diverge_step(&pair, now_us));
-    iw_diverge_hear(&pair, IW_LEFT, 8000);
+    iw_diverge_receive(&pair, IW_LEFT, 8000);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
@@ -333,12 +333,12 @@ static void test_diverge_names_the_wheel_that_differs_more(void) {
 }
 
 static void test_diverge_no_measured_speed_counts_beyond_40_metres_a_second(void) {
-    iw_diverge_hear(&pair, IW_LEFT, 40001);
-    iw_diverge_hear(&pair, IW_RIGHT, -40001);
+    iw_diverge_receive(&pair, IW_LEFT, 40001);
+    iw_diverge_receive(&pair, IW_RIGHT, -40001);
     iw_diverge_restart(&pair, now_us);
     TEST_ASSERT_EQUAL_INT32(40000000, pair.expected_um_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT32(-40000000, pair.expected_um_s[IW_RIGHT]);
-    iw_diverge_hear(&pair, IW_LEFT, 39999);
+    iw_diverge_receive(&pair, IW_LEFT, 39999);
     iw_diverge_restart(&pair, now_us);
     TEST_ASSERT_EQUAL_INT32(39999000, pair.expected_um_s[IW_LEFT]);
 }
@@ -348,8 +348,8 @@ static void test_diverge_absurd_values_stay_within_bounds(void) {
         now_us += MS(50);
         pair.applied_mm_s[IW_LEFT] = INT16_MIN;
         pair.applied_mm_s[IW_RIGHT] = INT16_MAX;
-        iw_diverge_hear(&pair, IW_LEFT, 2000000);
-        iw_diverge_hear(&pair, IW_RIGHT, -2000000);
+        iw_diverge_receive(&pair, IW_LEFT, 2000000);
+        iw_diverge_receive(&pair, IW_RIGHT, -2000000);
         (void)iw_diverge_step(&pair, now_us);
         TEST_ASSERT_TRUE(abs(pair.path_um) <= 1000000);
         TEST_ASSERT_TRUE(abs(pair.expected_um_s[IW_LEFT]) <= 40000000);

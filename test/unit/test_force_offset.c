@@ -147,13 +147,13 @@ static void test_force_reboot_under_load_is_seen_against_the_operators_offset(vo
 static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_offset(&rig, 100);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.evidence);
-    TEST_ASSERT_EQUAL_INT32(1000, rig.force.evidence_permille);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.observation);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.observed_permille);
     iw_force_reopen(&rig.force, false);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
-    TEST_ASSERT_EQUAL_INT32(0, rig.force.evidence_permille);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
+    TEST_ASSERT_EQUAL_INT32(0, rig.force.observed_permille);
     force_rig_quiet(&rig, 40, 900);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
     assert_offset(IW_OFFSET_ESTIMATED, 9000);
 }
 
@@ -297,7 +297,7 @@ static void test_force_is_stale_after_five_periods(void) {
     rig.now_us += MS(250) - 1U;
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
     rig.now_us += 1;
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
 }
 
 static void test_force_saturated_sample_is_invalid_only_while_it_lasts(void) {
@@ -323,11 +323,11 @@ static void test_force_extremes_do_not_overflow(void) {
     begin(IW_LEFT, false);
     force_rig_quiet(&rig, 40, -32767);
     force_rig_offset(&rig, -32768);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.observation);
     begin(IW_LEFT, false);
     force_rig_quiet(&rig, 40, 32766);
     force_rig_offset(&rig, -32768);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);
 }
 
 int main(void) {

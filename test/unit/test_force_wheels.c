@@ -201,7 +201,7 @@ static void test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent(v
     rig.world.pair.wheel[IW_LEFT].muted = true;
     world_rig_run(&rig, SECOND);
     assert_tare(IW_TARE_NO_FORCE, IW_LEFT);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, validity(IW_LEFT));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, validity(IW_LEFT));
 }
 
 static void test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it(void) {

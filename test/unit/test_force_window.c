@@ -22,10 +22,10 @@ static void assert_window(iw_window_t expected) {
 
 static void test_force_begins_open_and_knows_nothing(void) {
     assert_window(IW_WINDOW_OPEN);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
     TEST_ASSERT_EQUAL_INT32(0, rig.force.offset_mN);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
 }
 
 static void test_force_quiet_window_estimates_the_offset_with_its_last_sample(void) {
@@ -95,8 +95,8 @@ static void test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy(void) {
 }
 
 static void test_force_never_heard_is_not_heard_when_time_has_just_begun(void) {
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_force_validity(&rig.force, 0));
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_force_validity(&rig.force, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 0));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 1000));
 }
 
 /// 30 of 40 samples are 2 cN off the mean: the root of 3 cN2 is 17.3 mN.
@@ -279,11 +279,11 @@ static void test_force_estimate_is_made_once(void) {
     TEST_ASSERT_EQUAL_INT32(49000, iw_force_net_mN(&rig.force));
 }
 
-static iw_unit_evidence_t evidence_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
+static iw_unit_observation_t evidence_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
     begin(side, false);
     force_rig_quiet(&rig, 40, raw);
     force_rig_offset(&rig, offset_dN);
-    return rig.force.evidence;
+    return rig.force.observation;
 }
 
 static void test_force_unit_is_told_from_raw_over_offset(void) {
@@ -292,11 +292,11 @@ static void test_force_unit_is_told_from_raw_over_offset(void) {
         for (size_t i = 0; i < 6; i++) {
             const int16_t offset = offsets_dN[i];
             TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(10 * offset), offset));
-            TEST_ASSERT_EQUAL_INT32(10000, rig.force.evidence_permille);
+            TEST_ASSERT_EQUAL_INT32(10000, rig.force.observed_permille);
             TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(9 * offset), offset));
             TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(11 * offset), offset));
             TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of((iw_side_t)side, offset, offset));
-            TEST_ASSERT_EQUAL_INT32(1000, rig.force.evidence_permille);
+            TEST_ASSERT_EQUAL_INT32(1000, rig.force.observed_permille);
             TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of((iw_side_t)side, 0, offset));
             TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(4 * offset), offset));
             TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(offset / 2), offset));
@@ -338,22 +338,22 @@ static void test_force_small_offset_is_far_off_beyond_20_N(void) {
     force_rig_quiet(&rig, 4, 2001);
     TEST_ASSERT_EQUAL_INT32(20001, rig.force.quality.mean_mN);
     force_rig_offset(&rig, 0);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);
 }
 
 static void test_force_unit_evidence_waits_for_both_and_survives_either_order(void) {
     force_rig_offset(&rig, 100);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
     force_rig_quiet(&rig, 39, 1000);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
     force_rig_quiet(&rig, 1, 1000);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.observation);
 }
 
 static void test_force_contaminated_window_is_no_evidence(void) {
     force_rig_alternate(&rig, 0, 2000);
     force_rig_offset(&rig, 100);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
 }
 
 int main(void) {

@@ -56,13 +56,13 @@ void tearDown(void) {
 /// As from a terminal, whatever started this program.
 static void start(void) {
     (void)signal(SIGINT, SIG_DFL);
-    const gw_box_wish_t wish = {.blackbox_s = config.record.blackbox_s,
-                                .keep_stops = config.record.keep_stops,
-                                .directory = config.record.directory,
-                                .bus = config.bus.interface,
-                                .estop = config.estop.line,
-                                .config = CONFIG};
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &wish));
+    const gw_box_config_t wanted = {.blackbox_s = config.record.blackbox_s,
+                                    .keep_stops = config.record.keep_stops,
+                                    .directory = config.record.directory,
+                                    .bus = config.bus.interface,
+                                    .estop = config.estop.line,
+                                    .config = CONFIG};
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &wanted));
     open_box = true;
 }
 
@@ -74,7 +74,7 @@ static gw_child_news_t wait_news(void) {
 
 /// Ten frames and ten steps in the last second, then a stop that is over.
 static gw_box_order_t stopped(const char *cause) {
-    const iw_time_us_t now_us = iw_clock_now_us();
+    const iw_time_us_t now_us = iwl_clock_now_us();
     const iw_time_us_t stop_us = now_us - GW_BOX_AFTER_US;
     for (unsigned i = 0; i < 10U; i++) {
         const blackbox_entry_t frame = {.at_us = stop_us - 1000U + i,
@@ -211,7 +211,7 @@ static void test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_fro
     record("estop_line", 0);
     read_file("stop-000001-estop_line.jsonl", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":true"), text);
-    for (iw_time_us_t at_us = iw_clock_now_us() - GW_BOX_AFTER_US - 1000000U; blackbox_ring_is_whole(box.ring);) {
+    for (iw_time_us_t at_us = iwl_clock_now_us() - GW_BOX_AFTER_US - 1000000U; blackbox_ring_is_whole(box.ring);) {
         const blackbox_entry_t step = {.at_us = at_us, .kind = BLACKBOX_STEP};
         blackbox_ring_put(box.ring, &step);
     }
@@ -426,7 +426,7 @@ static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(voi
 /// What is told of the next result, into `text`.
 static void told(const char *cause, char *text, size_t size) {
     FILE *file = tmpfile();
-    gw_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = GW_LOG_INFO};
+    sock_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = SOCK_LOG_INFO};
     struct pollfd entry = {.fd = box.writer.fd, .events = POLLIN};
     if (cause != NULL) {
         const gw_box_order_t order = stopped(cause);
@@ -482,13 +482,13 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     start();
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGSTOP));
     const gw_box_order_t order = stopped("estop_line");
-    const iw_time_us_t begin_us = iw_clock_now_us();
+    const iw_time_us_t begin_us = iwl_clock_now_us();
     unsigned taken = 0;
     while (taken < 100000U && gw_box_write(&box, &order)) {
         taken++;
     }
     TEST_ASSERT_LESS_THAN(100000U, taken);
-    TEST_ASSERT_LESS_THAN(1000000U, iw_clock_now_us() - begin_us);
+    TEST_ASSERT_LESS_THAN(1000000U, iwl_clock_now_us() - begin_us);
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
 }
@@ -520,7 +520,7 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
     for (int sending = 0; sending < 2; sending++) {
         start();
         (void)stopped("");
-        const blackbox_entry_t setpoint = {.at_us = iw_clock_now_us(),
+        const blackbox_entry_t setpoint = {.at_us = iwl_clock_now_us(),
                                            .kind = BLACKBOX_FRAME,
                                            .number = 266,
                                            .a = 5,
@@ -546,11 +546,11 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
 static void test_rolling_is_recorded_and_is_no_stop(void) {
     static char text[16384];
     static const iw_codec_wheel_t told;
-    iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iw_clock_now_us() - GW_BOX_AFTER_US};
-    gw_log_t log;
+    iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iwl_clock_now_us() - GW_BOX_AFTER_US};
+    sock_log_t log;
     start();
     record("estop_line", 0);
-    gw_log_open(&log, GW_LOG_ERROR);
+    sock_log_open(&log, SOCK_LOG_ERROR);
     seen.wheel[IW_LEFT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = 1500};
     seen.wheel[IW_RIGHT] = (iw_snapshot_wheel_t){.told = &told, .speed_mm_s = -101, .heard = true};
     gw_record_rolling(&box, &log, &seen);
@@ -562,7 +562,7 @@ static void test_rolling_is_recorded_and_is_no_stop(void) {
     read_file("stop-000002-rolling.jsonl", text, sizeof text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"cause\":\"rolling\",\"side\":\"right\","), text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "use its parking brake"), text);
-    gw_log_close(&log);
+    sock_log_close(&log);
 }
 
 static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {

@@ -14,8 +14,8 @@ void setUp(void) {
 
 void tearDown(void) {}
 
-static iw_ledger_t *ledger(void) {
-    return &rig.gateway.ledger;
+static iw_assumption_store_t *assumptions(void) {
+    return &rig.gateway.assumptions;
 }
 
 static iw_force_validity_t force_validity(iw_side_t side) {
@@ -24,86 +24,86 @@ static iw_force_validity_t force_validity(iw_side_t side) {
 }
 
 static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused(void) {
-    static const iw_ledger_item_t guards[] = {IW_LEDGER_SETPOINT_TYPE,      IW_LEDGER_CURRENT_ROLE,
-                                              IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_FEEDBACK_SIGN_RIGHT,
-                                              IW_LEDGER_MOUNT_SIGN_LEFT,    IW_LEDGER_MOUNT_SIGN_RIGHT};
+    static const iw_assumption_item_t guards[] = {IW_ASSUMPTION_SETPOINT_TYPE,      IW_ASSUMPTION_CURRENT_ROLE,
+                                                  IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
+                                                  IW_ASSUMPTION_MOUNT_SIGN_LEFT,    IW_ASSUMPTION_MOUNT_SIGN_RIGHT};
     for (size_t i = 0; i < sizeof guards / sizeof guards[0]; i++) {
-        iw_ledger_contradict(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
-        TEST_ASSERT_TRUE(iw_ledger_guards_motion(guards[i]));
-        TEST_ASSERT_EQUAL_INT(guards[i], ledger()->doubt);
+        iw_assumption_contradict(assumptions(), guards[i], IW_SOURCE_OPERATOR, 0);
+        TEST_ASSERT_TRUE(iw_assumption_guards_motion(guards[i]));
+        TEST_ASSERT_EQUAL_INT(guards[i], assumptions()->doubt);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
         TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
-        iw_ledger_confirm(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
+        iw_assumption_confirm(assumptions(), guards[i], IW_SOURCE_OPERATOR, 0);
     }
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, ledger()->doubt);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions()->doubt);
     gateway_rig_arm(&rig);
 }
 
 static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
     unsigned others = 0;
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        if (!iw_ledger_guards_motion((iw_ledger_item_t)item)) {
-            iw_ledger_contradict(ledger(), (iw_ledger_item_t)item, IW_EVIDENCE_OPERATOR, 0);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        if (!iw_assumption_guards_motion((iw_assumption_item_t)item)) {
+            iw_assumption_contradict(assumptions(), (iw_assumption_item_t)item, IW_SOURCE_OPERATOR, 0);
             others++;
         }
     }
-    TEST_ASSERT_EQUAL_UINT(IW_LEDGER_ITEMS - 6U, others);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, ledger()->doubt);
+    TEST_ASSERT_EQUAL_UINT(IW_ASSUMPTION_ITEMS - 6U, others);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions()->doubt);
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
 static void test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption(void) {
-    iw_ledger_contradict(ledger(), IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_contradict(assumptions(), IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_OPERATOR, 0);
     iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
 static void test_takeover_while_an_assumption_is_contradicted_is_refused(void) {
     gateway_rig_arm(&rig);
-    iw_ledger_contradict(ledger(), IW_LEDGER_MOUNT_SIGN_RIGHT, IW_EVIDENCE_OPERATOR, 0);
+    iw_assumption_contradict(assumptions(), IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER + 1U, true));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-static void know(iw_ledger_state_t state, iw_evidence_t evidence, int32_t figure) {
-    const iw_ledger_entry_t entry = {.state = state, .evidence = evidence, .figure = figure};
-    iw_gateway_know(&rig.gateway, IW_LEDGER_MOUNT_SIGN_LEFT, &entry);
+static void know(iw_assumption_state_t state, iw_source_t source, int32_t figure) {
+    const iw_assumption_entry_t entry = {.state = state, .source = source, .figure = figure};
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_MOUNT_SIGN_LEFT, &entry);
 }
 
-static void assert_known(iw_ledger_state_t state, iw_evidence_t evidence, int32_t figure) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(ledger(), IW_LEDGER_MOUNT_SIGN_LEFT);
+static void assert_known(iw_assumption_state_t state, iw_source_t source, int32_t figure) {
+    const iw_assumption_entry_t *entry = iw_assumption_entry(assumptions(), IW_ASSUMPTION_MOUNT_SIGN_LEFT);
     TEST_ASSERT_EQUAL_INT(state, entry->state);
-    TEST_ASSERT_EQUAL_INT(evidence, entry->evidence);
+    TEST_ASSERT_EQUAL_INT(source, entry->source);
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
 }
 
 static void test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown(void) {
-    know(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
-    assert_known(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
+    know(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
+    assert_known(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
-    know(IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT, 0);
-    assert_known(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
-    know(IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 4);
-    assert_known(IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 4);
+    know(IW_ASSUMED, IW_SOURCE_DOCUMENT, 0);
+    assert_known(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
+    know(IW_CONFIRMED, IW_SOURCE_OPERATOR, 4);
+    assert_known(IW_CONFIRMED, IW_SOURCE_OPERATOR, 4);
     gateway_rig_arm(&rig);
 }
 
 /// The left wheel's force in a state of its own: what the sensor shows, what the ledger says of unit and offset.
 typedef struct {
     iw_offset_provenance_t provenance;
-    iw_unit_evidence_t evidence;
-    iw_ledger_entry_t unit;
-    iw_ledger_entry_t included;
+    iw_unit_observation_t source;
+    iw_assumption_entry_t unit;
+    iw_assumption_entry_t included;
     iw_force_validity_t expected;
 } force_case_t;
 
 #define ASSUMED                                                                                                        \
-    { IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT, 0 }
+    { IW_ASSUMED, IW_SOURCE_DOCUMENT, 0 }
 #define CONTRADICTED                                                                                                   \
-    { IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, 0 }
+    { IW_CONTRADICTED, IW_SOURCE_BUS, 0 }
 #define SETTLED                                                                                                        \
-    { IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0 }
+    { IW_CONFIRMED, IW_SOURCE_OPERATOR, 0 }
 
 static void test_force_validity_follows_sensor_and_ledger(void) {
     static const force_case_t cases[] = {
@@ -129,11 +129,11 @@ static void test_force_validity_follows_sensor_and_ledger(void) {
         force->raw_us = rig.now_us;
         force->raw = 100;
         force->provenance = cases[i].provenance;
-        force->evidence = cases[i].evidence;
-        ledger()->entry[IW_LEDGER_FORCE_UNIT_LEFT] = cases[i].unit;
-        ledger()->entry[IW_LEDGER_OFFSET_INCLUDED] = cases[i].included;
+        force->observation = cases[i].source;
+        assumptions()->entry[IW_ASSUMPTION_FORCE_UNIT_LEFT] = cases[i].unit;
+        assumptions()->entry[IW_ASSUMPTION_OFFSET_INCLUDED] = cases[i].included;
         TEST_ASSERT_EQUAL_INT(cases[i].expected, force_validity(IW_LEFT));
-        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_validity(IW_RIGHT));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_validity(IW_RIGHT));
     }
 }
 
@@ -141,9 +141,9 @@ static void test_force_validity_of_the_right_wheel_asks_for_its_own_unit(void) {
     iw_force_t *const force = &rig.gateway.force[IW_RIGHT];
     force->raw_us = rig.now_us;
     force->provenance = IW_OFFSET_WHEEL;
-    iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_BUS, 0);
+    iw_assumption_contradict(assumptions(), IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 0);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_validity(IW_RIGHT));
-    iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_BUS, 0);
+    iw_assumption_contradict(assumptions(), IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_SOURCE_BUS, 0);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_validity(IW_RIGHT));
 }
 
@@ -162,22 +162,22 @@ static void test_length_of_any_message_that_the_table_has_otherwise_contradicts_
             const uint8_t length = (uint8_t)(row->length + off);
             gateway_rig_init(&rig);
             gateway_rig_run(&rig, MS(100));
-            TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+            TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
             hear_empty(row->id, length);
-            TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
-            TEST_ASSERT_EQUAL_INT32(length, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->figure);
+            TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
+            TEST_ASSERT_EQUAL_INT32(length, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
         }
     }
 }
 
 static void test_length_once_contradicted_is_told_once(void) {
     hear_empty(IW_ID_LEFT_FORCE, 5);
-    const uint32_t changes = ledger()->changes;
+    const uint32_t changes = assumptions()->changes;
     hear_empty(IW_ID_LEFT_FORCE, 6);
     hear_empty(IW_ID_LEFT_FORCE, 1);
     gateway_rig_run(&rig, MS(100));
-    TEST_ASSERT_EQUAL_UINT32(changes, ledger()->changes);
-    TEST_ASSERT_EQUAL_INT32(5, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->figure);
+    TEST_ASSERT_EQUAL_UINT32(changes, assumptions()->changes);
+    TEST_ASSERT_EQUAL_INT32(5, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
 }
 
 static void test_length_of_frames_that_are_no_telemetry_says_nothing(void) {
@@ -185,7 +185,7 @@ static void test_length_of_frames_that_are_no_telemetry_says_nothing(void) {
     hear_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
     hear_empty(300, 1);
     hear_empty(IW_ID_LEFT_SETPOINT, 8);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
 static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void) {
@@ -195,17 +195,17 @@ static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void)
     hear_empty(IW_ID_LEFT_SPEED, IW_DLC_SPEED);
     hear_empty(IW_ID_RIGHT_POSE, IW_DLC_POSE);
     hear_empty(IW_ID_LEFT_FORCE, IW_DLC_FORCE);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
     hear_empty(IW_ID_LEFT_STATUS, IW_DLC_STATUS);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
 static void test_what_is_only_assumed_elsewhere_says_nothing(void) {
-    static const iw_ledger_entry_t assumed = {IW_LEDGER_ASSUMED, IW_EVIDENCE_OPERATOR, 0};
-    const uint32_t changes = ledger()->changes;
-    iw_gateway_know(&rig.gateway, IW_LEDGER_CURRENT_ROLE, &assumed);
-    TEST_ASSERT_EQUAL_UINT32(changes, ledger()->changes);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, iw_ledger_entry(ledger(), IW_LEDGER_CURRENT_ROLE)->state);
+    static const iw_assumption_entry_t assumed = {IW_ASSUMED, IW_SOURCE_OPERATOR, 0};
+    const uint32_t changes = assumptions()->changes;
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &assumed);
+    TEST_ASSERT_EQUAL_UINT32(changes, assumptions()->changes);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_CURRENT_ROLE)->state);
 }
 
 static void test_is_sending_from_arm_until_the_zeros_have_been_held(void) {

@@ -102,9 +102,10 @@ static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // And nothing else.
-    const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FEEDBACK_SIGN_LEFT);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);
-    TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_BUS, entry->evidence);
+    const iw_assumption_entry_t *const entry =
+        iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
+    TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry->source);
 }
 
 static void test_gateway_software_estop_names_no_wheel(void) {
@@ -187,16 +188,17 @@ static void test_gateway_force_is_measured_at_rest_up_to_rest_rpm(void) {
 
 static void test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator(void) {
     const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
-    const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FORCE_UNIT_LEFT);
+    const iw_assumption_entry_t *const entry =
+        iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT);
     iw_can_frame_t frame;
     gateway_rig_run(&rig, MS(500));
     (void)message_encode(&message, &frame);
     fake_bus_put(&rig.bus, &frame);
     hear_force(100, 0);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);
-    iw_ledger_confirm(&rig.gateway.ledger, IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_OPERATOR, 0);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
+    iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_OPERATOR, 0);
     hear_force(100, 0);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, entry->state);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry->state);
 }
 
 static void test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting(void) {

@@ -25,7 +25,7 @@ static void drive_on(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
 }
 
 static void assert_latched(iw_cause_t cause) {
@@ -41,7 +41,7 @@ static void assert_latched_with_a_ramp(void) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
     TEST_ASSERT_FALSE(stop()->at_once);
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
-    TEST_ASSERT_EQUAL_INT(rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]);
     gateway_rig_run(&rig, MS(200));
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
     gateway_rig_run(&rig, MS(100));
@@ -217,7 +217,7 @@ static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void
         (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
         assert_latched_with_a_ramp();
         TEST_ASSERT_EQUAL_UINT8((side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
-        const iw_time_us_t silent_us = stop()->at_us - rig.gateway.wheel[side].heard_us;
+        const iw_time_us_t silent_us = stop()->at_us - rig.gateway.wheel[side].received_us;
         TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
         TEST_ASSERT_EQUAL_UINT32(silent_us / 1000U, stop()->detail);
         gateway_rig_run(&rig, MS(1100));
@@ -283,8 +283,8 @@ static void test_gateway_wheel_against_its_command_latches(void) {
     assert_latched(IW_CAUSE_FEEDBACK_SIGN);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, stop()->sides);
     TEST_ASSERT_EQUAL_UINT32(120, stop()->detail);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_RIGHT].state);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_LEFT].state);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, rig.gateway.assumptions.entry[IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT].state);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, rig.gateway.assumptions.entry[IW_ASSUMPTION_FEEDBACK_SIGN_LEFT].state);
 }
 
 static void test_gateway_overspeeding_wheel_latches(void) {
@@ -393,11 +393,11 @@ static void test_gateway_backlog_after_a_late_step_is_still_of_unknown_age(void)
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.wake_us);
     gateway_rig_step(&rig);
     TEST_ASSERT_FALSE(rig.gateway.backlog);
-    TEST_ASSERT_FALSE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+    TEST_ASSERT_FALSE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_TRUE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+    TEST_ASSERT_TRUE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
 }
 
 static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {

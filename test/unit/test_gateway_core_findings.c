@@ -14,13 +14,13 @@ void tearDown(void) {
     TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
 }
 
-static const iw_ledger_entry_t *entry(iw_ledger_item_t item) {
-    return iw_ledger_entry(&rig.gateway.ledger, item);
+static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
+    return iw_assumption_entry(&rig.gateway.assumptions, item);
 }
 
-static void assert_entry(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t evidence) {
+static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source) {
     TEST_ASSERT_EQUAL_INT(state, entry(item)->state);
-    TEST_ASSERT_EQUAL_INT(evidence, entry(item)->evidence);
+    TEST_ASSERT_EQUAL_INT(source, entry(item)->source);
 }
 
 static void put(const message_t *message) {
@@ -53,60 +53,60 @@ static void start_with(iw_side_t side, int16_t raw) {
 }
 
 static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
-    assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
-    assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
-    assert_entry(IW_LEDGER_TRACK, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
-    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_TRACK, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
     rig.config.setpoint_type_set = false;
     rig.config.track_mm = 0;
     rig.config.current_role = IW_ROLE_UNSET;
     rig.config.force_unit[IW_LEFT] = IW_FORCE_DN;
     rig.config.force_unit[IW_RIGHT] = IW_FORCE_CN;
     gateway_rig_begin(&rig, false);
-    assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
-    assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
-    assert_entry(IW_LEDGER_TRACK, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
-    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_NONE);
+    assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED, IW_SOURCE_NONE);
+    assert_entry(IW_ASSUMPTION_TRACK, IW_ASSUMED, IW_SOURCE_NONE);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
 }
 
 static void test_gateway_quiet_start_confirms_the_unit_of_each_side(void) {
     start_with(IW_LEFT, 1000);
-    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
-    TEST_ASSERT_EQUAL_INT32(10000, entry(IW_LEDGER_FORCE_UNIT_LEFT)->figure);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONFIRMED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_CONFIRMED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
+    TEST_ASSERT_EQUAL_INT32(10000, entry(IW_ASSUMPTION_FORCE_UNIT_LEFT)->figure);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, rig.gateway.force[IW_LEFT].provenance);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, iw_force_validity(&rig.gateway.force[IW_LEFT], rig.now_us));
     start_with(IW_RIGHT, 100);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    TEST_ASSERT_EQUAL_INT32(1000, entry(IW_LEDGER_FORCE_UNIT_RIGHT)->figure);
-    const uint32_t changes = rig.gateway.ledger.changes;
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_CONFIRMED, IW_SOURCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(1000, entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT)->figure);
+    const uint32_t changes = rig.gateway.assumptions.changes;
     press_for(IW_RIGHT, 100, MS(500));
-    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
+    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.assumptions.changes);
 }
 
 static void test_gateway_wrong_unit_is_contradicted_and_force_invalid(void) {
     start_with(IW_LEFT, 100);
-    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONTRADICTED, IW_SOURCE_BUS);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, iw_force_validity(&rig.gateway.force[IW_LEFT], rig.now_us));
     start_with(IW_RIGHT, 1000);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_CONTRADICTED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
 static void test_gateway_removed_offset_is_contradicted(void) {
     start_with(IW_RIGHT, 0);
-    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_CONTRADICTED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
 static void test_gateway_unclear_evidence_changes_no_entry(void) {
     start_with(IW_LEFT, 500);
-    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.gateway.force[IW_LEFT].evidence);
-    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
-    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.gateway.force[IW_LEFT].observation);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
+    assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
 static void test_gateway_turning_wheel_contaminates_its_own_window_only(void) {
@@ -208,14 +208,14 @@ static void test_gateway_rebooted_wheel_opens_its_window_anew(void) {
 }
 
 static void test_gateway_status_length_is_noted(void) {
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
+    assert_entry(IW_ASSUMPTION_DLC, IW_ASSUMED, IW_SOURCE_NONE);
     gateway_rig_run(&rig, MS(50));
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    TEST_ASSERT_EQUAL_INT32(7, entry(IW_LEDGER_DLC)->figure);
+    assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(7, entry(IW_ASSUMPTION_DLC)->figure);
     fake_bus_put_empty(&rig.bus, IW_ID_RIGHT_STATUS, 8);
     gateway_rig_step(&rig);
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
-    TEST_ASSERT_EQUAL_INT32(8, entry(IW_LEDGER_DLC)->figure);
+    assert_entry(IW_ASSUMPTION_DLC, IW_CONTRADICTED, IW_SOURCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(8, entry(IW_ASSUMPTION_DLC)->figure);
 }
 
 static void test_gateway_pose_is_kept_with_its_time(void) {
@@ -233,17 +233,17 @@ static void test_gateway_pose_is_kept_with_its_time(void) {
 static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 200, -200, MS(300));
-    assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_FEEDBACK_SIGN_LEFT)->evidence);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMED, entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT)->source);
     (void)gateway_rig_cruise(&rig, 200, -200, MS(1200));
-    assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
-    assert_entry(IW_LEDGER_MOUNT_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_MOUNT_SIGN_LEFT)->evidence);
-    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_LEFT)->figure);
-    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT)->figure); // As at a positive command.
-    const uint32_t changes = rig.gateway.ledger.changes;
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONFIRMED, IW_SOURCE_BUS);
+    assert_entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_ASSUMED, entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT)->source);
+    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT)->figure);
+    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT)->figure); // As at a positive command.
+    const uint32_t changes = rig.gateway.assumptions.changes;
     (void)gateway_rig_cruise(&rig, 250, -250, MS(1500)); // Faster, and still slower than a machine may turn.
     TEST_ASSERT_EQUAL_INT32(241, rig.gateway.diverge.measured_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
+    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.assumptions.changes);
 }
 
 static void test_gateway_current_that_must_be_clamped_is_counted(void) {

@@ -200,7 +200,7 @@ static void test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet(void) {
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(10));
-    TEST_ASSERT_TRUE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+    TEST_ASSERT_TRUE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
     TEST_ASSERT_FALSE(iw_wheel_lost(&rig.gateway.wheel[IW_RIGHT], rig.now_us));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
 }

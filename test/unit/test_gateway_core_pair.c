@@ -64,7 +64,7 @@ static void test_gateway_one_wheel_too_fast_ramps_both(void) {
         turn((iw_side_t)side, 36); // 724 mm/s.
         (void)gateway_rig_cruise(&rig, 400, 400, MS(240));
         assert_diverged((iw_side_t)side, false);
-        TEST_ASSERT_EQUAL_INT(rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]);
+        TEST_ASSERT_EQUAL_INT(rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]);
         tearDown();
     }
 }

@@ -224,7 +224,7 @@ static void test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once(void) {
     iw_gateway_disconnect(&rig.gateway, rig.now_us, HOLDER);
     gateway_rig_run(&rig, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_TRUE(rig.bus.told_mm_s[IW_LEFT] < 400 && rig.bus.told_mm_s[IW_LEFT] > 250);
+    TEST_ASSERT_TRUE(rig.bus.commanded_mm_s[IW_LEFT] < 400 && rig.bus.commanded_mm_s[IW_LEFT] > 250);
 }
 
 static void test_gateway_takeover_happens_at_rest_only(void) {

@@ -22,8 +22,8 @@ static void drive_on(void) {
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_gateway_armed_sends_zero_pairs_until_the_first_drive(void) {
@@ -88,8 +88,8 @@ static void test_gateway_zeros_leave_to_whichever_wheel_can_have_one(void) {
         }
     }
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
-    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one(void) {
@@ -114,8 +114,8 @@ static void test_gateway_inverted_wheel_is_told_the_negated_speed(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_EQUAL_INT(300, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(-300, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(300, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(-300, rig.bus.commanded_mm_s[IW_RIGHT]);
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
 
@@ -125,7 +125,7 @@ static void test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negate
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
-    TEST_ASSERT_EQUAL_INT(-300, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(-300, rig.bus.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT(-150, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
     TEST_ASSERT_EQUAL_INT(150, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
@@ -146,7 +146,7 @@ static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(vo
         TEST_ASSERT_TRUE(rig.gateway.sender.sent.later > 0);
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         (void)gateway_rig_cruise(&rig, 100, 100, MS(300));
-        TEST_ASSERT_EQUAL_INT(100, rig.bus.told_mm_s[side]);
+        TEST_ASSERT_EQUAL_INT(100, rig.bus.commanded_mm_s[side]);
         tearDown();
     }
 }
@@ -181,7 +181,7 @@ static void test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop
     gateway_rig_run(&rig, MS(60));
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.envelope.stopped);
 }
 

@@ -27,7 +27,7 @@ static void set_power(bool on) {
 static void drive_on(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
     gateway_rig_run(&rig, MS(1));
 }
 
@@ -106,12 +106,12 @@ static void test_gateway_purged_frames_never_come_out(void) {
     for (uint32_t i = 0; i < rig.bus.flights; i++) {
         TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.flight[i].frame).speed_mm_s);
     }
-    rig.bus.told_mm_s[IW_LEFT] = 0;
-    rig.bus.told_mm_s[IW_RIGHT] = 0;
+    rig.bus.commanded_mm_s[IW_LEFT] = 0;
+    rig.bus.commanded_mm_s[IW_RIGHT] = 0;
     rig.bus.acknowledged = true;
     gateway_rig_run(&rig, MS(2000));
-    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_gateway_zeros_without_power_are_taken_back_when_they_end(void) {

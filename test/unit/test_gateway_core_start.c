@@ -23,8 +23,8 @@ static void drive_on(void) {
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
 static void test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched(void) {

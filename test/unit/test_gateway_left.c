@@ -85,14 +85,14 @@ static void test_left_nobody_can_be_asked_without_the_directory(void) {
 
 static void test_left_sentence_names_the_cure_of_each_kind_of_bus(void) {
     char sentence[400];
-    iw_bus_link_t link = {.presence = IW_LINK_UP, .echo_proven = true};
+    iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true};
     gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
     TEST_ASSERT_NOT_NULL(strstr(sentence, "ip link set can0 down; ip link set can0 up"));
     TEST_ASSERT_NOT_NULL(strstr(sentence, "systemctl enable --now iwheel-can-restart@can0.path"));
     link.echo_proven = false;
     gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
     TEST_ASSERT_NOT_NULL(strstr(sentence, "switch it off and on"));
-    link.presence = IW_LINK_LOCAL;
+    link.presence = IWL_LINK_LOCAL;
     gw_bus_left_sentence(&link, "unix:/run/bus", sentence, sizeof sentence);
     TEST_ASSERT_NOT_NULL(strstr(sentence, "start its hub (the simulator) again"));
 }

@@ -21,8 +21,8 @@
 #define STRANGER 65534
 
 static gateway_config_t config;
-static gw_listener_t listener;
-static gw_log_t people; ///< What is written for them.
+static sock_listener_t listener;
+static sock_log_t people; ///< What is written for them.
 static char folder[64];
 static char said[1024];
 
@@ -38,33 +38,33 @@ void setUp(void) {
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/gateway.sock", folder);
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
-    listener = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    listener = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
     memset(said, 0, sizeof said);
-    gw_log_open(&people, GW_LOG_WARNING);
-    gw_log_close(&people);
+    sock_log_open(&people, SOCK_LOG_WARNING);
+    sock_log_close(&people);
     people.fd = open(in_folder("log.txt"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
 }
 
 void tearDown(void) {
     char command[96];
-    gw_listener_close(&listener);
-    gw_log_close(&people);
+    sock_listener_close(&listener);
+    sock_log_close(&people);
     (void)snprintf(command, sizeof command, "rm -rf %s", folder);
     TEST_ASSERT_EQUAL_INT(0, system(command));
 }
 
 static int prepare(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const gw_listener_wish_t wish = {"iwheel-gateway", GW_DRIVE, config.northbound.socket, config.northbound.group,
-                                     config.northbound.mode};
-    const int result = gw_listener_prepare(&listener, &wish, err);
+    const sock_listener_config_t wanted = {"iwheel-gateway", SOCK_DRIVE, config.northbound.socket,
+                                           config.northbound.group, config.northbound.mode};
+    const int result = sock_listener_prepare(&listener, &wanted, err);
     (void)fclose(err);
     return result;
 }
 
 static int make(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_listener_open(&listener, &people, err);
+    const int result = sock_listener_open(&listener, &people, err);
     (void)fclose(err);
     return result;
 }
@@ -150,7 +150,7 @@ static void test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothin
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), said);
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("b/gateway.sock"), &status));
     TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("kept/gateway.sock"), &status));
-    gw_listener_close(&listener);
+    sock_listener_close(&listener);
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
 }
 
@@ -196,7 +196,7 @@ static void test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is
     (void)put_socket(false);
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
-    gw_listener_close(&listener);
+    sock_listener_close(&listener);
     const int fd = put_socket(true);
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
@@ -235,7 +235,7 @@ static void test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the
     TEST_ASSERT_EQUAL_INT(0, make());
     TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(said, folder), "/moved")));
     (void)put_socket(false);
-    gw_listener_close(&listener);
+    sock_listener_close(&listener);
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
 }
 

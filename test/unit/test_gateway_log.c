@@ -11,22 +11,22 @@
 #include <unistd.h>
 
 static FILE *file;
-static gw_log_t people;
+static sock_log_t people;
 static gateway_config_t config;
 static char text[8192];
 
 void setUp(void) {
     file = tmpfile();
     TEST_ASSERT_NOT_NULL(file);
-    gw_log_open(&people, GW_LOG_INFO);
-    gw_log_close(&people);
+    sock_log_open(&people, SOCK_LOG_INFO);
+    sock_log_close(&people);
     people.fd = dup(fileno(file));
     gateway_config_default(&config);
     config.core.track_mm = 540;
 }
 
 void tearDown(void) {
-    gw_log_close(&people);
+    sock_log_close(&people);
     (void)fclose(file);
 }
 
@@ -104,25 +104,25 @@ static void test_log_at_start_is_silent_of_what_is_not(void) {
 
 static void test_log_passes_a_burst_and_tells_how_many_lines_it_dropped(void) {
     for (unsigned i = 0; i < 45U; i++) {
-        gw_log(&people, GW_LOG_WARNING, "line %u", i);
+        sock_log(&people, SOCK_LOG_WARNING, "line %u", i);
     }
     people.credit_us -= 200000U; // Time for one line.
-    gw_log(&people, GW_LOG_ERROR, "last");
+    sock_log(&people, SOCK_LOG_ERROR, "last");
     assert_line("warning: line 39\n");
     TEST_ASSERT_NULL(strstr(written(), "line 40"));
     assert_line("iwheel-gateway: error: (5 lines dropped before this one) last\n");
 }
 
 static void test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain(void) {
-    gw_log(&people, GW_LOG_DEBUG, "below");
-    gw_log(&people, GW_LOG_INFO, "two\nlines \033[1m");
+    sock_log(&people, SOCK_LOG_DEBUG, "below");
+    sock_log(&people, SOCK_LOG_INFO, "two\nlines \033[1m");
     TEST_ASSERT_NULL(strstr(written(), "below"));
     TEST_ASSERT_NULL(strchr(written(), '\033'));
     TEST_ASSERT_EQUAL_PTR(strrchr(written(), '\n'), strchr(written(), '\n'));
-    gw_log_level_t level = GW_LOG_ERROR;
-    TEST_ASSERT_TRUE(gw_log_level_of("debug", &level));
-    TEST_ASSERT_EQUAL_INT(GW_LOG_DEBUG, level);
-    TEST_ASSERT_FALSE(gw_log_level_of("loud", &level));
+    sock_log_level_t level = SOCK_LOG_ERROR;
+    TEST_ASSERT_TRUE(sock_log_level_of("debug", &level));
+    TEST_ASSERT_EQUAL_INT(SOCK_LOG_DEBUG, level);
+    TEST_ASSERT_FALSE(sock_log_level_of("loud", &level));
 }
 
 int main(void) {

@@ -49,8 +49,8 @@ static void test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel(void) {
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
         world_rig_drive(&rig, 800, 800, 5000);
-        TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED,
-                              iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_SETPOINT_TYPE)->state);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIRMED,
+                              iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_SETPOINT_TYPE)->state);
     }
 }
 
@@ -84,11 +84,11 @@ static void test_gateway_radius_rest_is_a_speed_at_the_wheel(void) {
         iw_codec_wheel_t told = {.speed = {.speed_rpm = cases[i].at_rest_rpm}};
         begin(cases[i].radius_mm);
         iw_wheel_t *const wheel = &rig.gateway.wheel[IW_LEFT];
-        iw_wheel_hear(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
         TEST_ASSERT_GREATER_THAN_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
         TEST_ASSERT_LESS_OR_EQUAL_INT32(45, wheel->speed_mm_s);
         told.speed.speed_rpm++;
-        iw_wheel_hear(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
+        iw_wheel_receive(wheel, rig.now_us, IW_CODEC_SPEED, &told, true);
         TEST_ASSERT_EQUAL_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
         TEST_ASSERT_GREATER_THAN_INT32(45, wheel->speed_mm_s);
     }

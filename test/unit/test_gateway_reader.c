@@ -281,11 +281,11 @@ static gw_box_t box;
 static void wait_for_answer(gw_child_news_t wanted) {
     struct pollfd entry = {.fd = box.reader.fd, .events = POLLIN};
     TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
-    TEST_ASSERT_EQUAL(wanted, gw_box_hear(&box));
+    TEST_ASSERT_EQUAL(wanted, gw_box_receive(&box));
 }
 
 static void open_box(uint16_t seconds) {
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = seconds, .directory = directory}));
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_config_t){.blackbox_s = seconds, .directory = directory}));
 }
 
 static void test_refusal_after_a_longer_answer_ends_where_it_should(void) {
@@ -317,7 +317,7 @@ static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
         TEST_ASSERT_LESS_THAN(100000U, asked);
     }
     TEST_ASSERT_GREATER_THAN(64U, asked); // One of each client at the least.
-    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_hear(&box));
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_receive(&box));
     TEST_ASSERT_EQUAL(0, kill(box.reader.pid, SIGKILL));
     wait_for_answer(GW_CHILD_ENDED);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question)); // Too soon.
@@ -332,7 +332,7 @@ static void test_without_recordings_there_is_no_process(void) {
     open_box(0);
     TEST_ASSERT_EQUAL(-1, box.reader.fd);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question));
-    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_hear(&box));
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_receive(&box));
     gw_box_close(&box);
 }
 

@@ -399,10 +399,10 @@ static int open_and_tend(void) {
     const pid_t process = fork();
     char byte = '\0';
     if (process == 0) {
-        const bool alone = !gw_bus_lock_tend(&second.lock, 0);
+        const bool alone = !gw_bus_lock_poll(&second.lock, 0);
         (void)!write(told[1], "", 1);
         (void)!read(go[0], &byte, 1);
-        const bool gives_way = gw_bus_lock_tend(&second.lock, GW_BUS_LOCK_LOOK_US);
+        const bool gives_way = gw_bus_lock_poll(&second.lock, GW_BUS_LOCK_LOOK_US);
         const gw_holder_t holder = (alone && gives_way) ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
         (void)!write(told[1], &holder, sizeof holder);
         _exit(0);
@@ -424,7 +424,7 @@ static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_u
     TEST_ASSERT_EQUAL_INT(sizeof holder, read(told[0], &holder, sizeof holder));
     TEST_ASSERT_EQUAL_INT(0, holder.uid);
     TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
-    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_tend(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
+    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
     for (size_t i = 0; i < 2U; i++) {
         (void)close(go[i]);
         (void)close(told[i]);

@@ -16,26 +16,26 @@
 #define TAG      7U
 #define ROOM     4
 
-static gw_wakeup_t wakeup;
+static sock_wakeup_t wakeup;
 static bool asks_only; // What a long wait asks the kernel for, without waiting.
 static struct timespec asked_for;
 static int event_fd;
 
 void setUp(void) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = TAG}};
-    TEST_ASSERT_EQUAL_INT(0, gw_wakeup_open(&wakeup));
+    TEST_ASSERT_EQUAL_INT(0, sock_wakeup_open(&wakeup));
     event_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     TEST_ASSERT_EQUAL_INT(0, epoll_ctl(wakeup.fd, EPOLL_CTL_ADD, event_fd, &interest));
 }
 
 void tearDown(void) {
-    gw_wakeup_close(&wakeup);
+    sock_wakeup_close(&wakeup);
     (void)close(event_fd);
 }
 
 static int wait_until(iw_time_us_t until_us) {
     struct epoll_event events[ROOM];
-    const int count = gw_wakeup_wait(&wakeup, events, ROOM, 0U, until_us);
+    const int count = sock_wakeup_wait(&wakeup, events, ROOM, 0U, until_us);
     if (count == 1) {
         TEST_ASSERT_EQUAL_UINT64(TAG, events[0].data.u64);
     }
@@ -43,7 +43,7 @@ static int wait_until(iw_time_us_t until_us) {
 }
 
 static iw_time_us_t in_us(iw_time_us_t span_us) {
-    return iw_clock_now_us() + span_us;
+    return iwl_clock_now_us() + span_us;
 }
 
 /// The C library's, which waits; here the last wait only says for how long.
@@ -61,14 +61,14 @@ int ppoll(struct pollfd *watched, nfds_t count, const struct timespec *span, con
 static void check_wakes_at_its_time_and_not_before(void) {
     const iw_time_us_t due_us = in_us(SOON_US);
     TEST_ASSERT_EQUAL_INT(0, wait_until(due_us));
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iw_clock_now_us());
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iwl_clock_now_us());
 }
 
 static void check_time_that_was_read_before_is_not_read_again(void) {
     struct epoll_event events[ROOM];
     const iw_time_us_t due_us = in_us(SOON_US);
-    TEST_ASSERT_EQUAL_INT(0, gw_wakeup_wait(&wakeup, events, ROOM, LATER_US, LATER_US + SOON_US));
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iw_clock_now_us());
+    TEST_ASSERT_EQUAL_INT(0, sock_wakeup_wait(&wakeup, events, ROOM, LATER_US, LATER_US + SOON_US));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iwl_clock_now_us());
 }
 
 static void check_time_that_is_past_only_looks(void) {

@@ -87,15 +87,15 @@ static void test_help_names_each_word_that_may_follow(void) {
             choices++;
         }
     }
-    TEST_ASSERT_GREATER_THAN(IW_LEDGER_ITEMS + IWN_TOPICS, choices);
+    TEST_ASSERT_GREATER_THAN(IW_ASSUMPTION_ITEMS + IWN_TOPICS, choices);
 }
 
 static void test_help_of_confirm_lists_the_items_and_no_other(void) {
     char expected[512] = "\nITEM  ";
     char found[512] = "";
-    for (unsigned i = 0; i < IW_LEDGER_ITEMS; i++) {
+    for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {
         (void)snprintf(&expected[strlen(expected)], sizeof expected - strlen(expected), "%s%s", (i > 0U) ? ", " : "",
-                       iwn_ledger_item_name((iw_ledger_item_t)i));
+                       iwn_assumption_item_name((iw_assumption_item_t)i));
     }
     // Lines that go on are indented.
     size_t used = 0;

@@ -8,8 +8,8 @@
 
 static inspect_findings_t findings;
 static inspect_heard_t heard;
-static const iw_bus_link_t local = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
-static const inspect_wish_t wish = {
+static const iwl_bus_link_t local = {.presence = IWL_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
+static const inspect_config_t config = {
     .name = "can0", .bitrate_hz = 1000000, .sample_point_permille = 625, .refuses = true};
 
 void setUp(void) {
@@ -49,7 +49,7 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
 
 static void test_healthy_bus_finds_nothing_to_mend(void) {
     hear_healthy();
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
     expect("right_wheel", INSPECT_OK, "pose 25.0/s", "");
     expect("load", INSPECT_OK, "6.0 %", "");
@@ -61,7 +61,7 @@ static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(voi
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
     }
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("right_wheel", INSPECT_FAIL, "right wheel: not heard for 2000 ms", "power, cable");
     TEST_ASSERT_NULL(find("rates"));
     expect("left_wheel", INSPECT_OK, "left wheel", "");
@@ -70,7 +70,7 @@ static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(voi
 static void test_rate_off_by_more_than_a_tenth_warns_with_both_numbers(void) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("rates", INSPECT_WARN, "left speed 256 (0x100): 118.0 a second; the document has 250.0", "termination");
     TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
 }
@@ -79,35 +79,35 @@ static void test_rate_within_a_tenth_or_two_frames_is_right(void) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
     heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 447U;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NOT_NULL(find("rates"));
 }
 
 static void test_message_that_never_comes_is_named(void) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
 }
 
 static void test_offsets_may_be_missing_after_the_first_minute(void) {
     hear_healthy();
     TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
 }
 
 static void test_setpoints_of_others_fail_unless_a_gateway_judges_them(void) {
-    inspect_wish_t beside_gateway = wish;
+    inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_RIGHT_SETPOINT)] = 3U;
     inspect_bus(&local, &heard, &beside_gateway, &findings);
     TEST_ASSERT_NULL(find("second_master"));
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
 }
 
@@ -118,7 +118,7 @@ static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
     inspect_heard_take(&heard, &frame);
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
     inspect_heard_take(&heard, &frame);
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0",
            "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
     for (uint32_t id = 1; id <= 20U; id++) {
@@ -126,7 +126,7 @@ static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
         inspect_heard_take(&heard, &frame);
     }
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("unknown_ids", INSPECT_WARN, "23 frames", "");
     TEST_ASSERT_NOT_NULL(strstr(find("unknown_ids")->text, " ..."));
 }
@@ -147,37 +147,37 @@ static void test_damaged_frames_are_counted_apart(void) {
 static void test_full_bus_warns(void) {
     hear_healthy();
     heard.bits = 1100000U;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("load", INSPECT_WARN, "55.0 %", "lower ids");
 }
 
 static void test_bus_that_never_lived_says_nothing_of_wheels(void) {
-    iw_bus_link_t link = {.presence = IW_LINK_UP};
-    inspect_bus(&link, &heard, &wish, &findings);
+    iwl_bus_link_t link = {.presence = IWL_LINK_UP};
+    inspect_bus(&link, &heard, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
     TEST_ASSERT_NULL(find("left_wheel"));
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
 }
 
 static void test_error_passive_bus_warns(void) {
     hear_healthy();
     heard.worst = IW_BUS_PASSIVE;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
 }
 
 static void test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP};
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP};
     heard.was_up = true; // Before it went off, or before its first error frame came.
     heard.worst = IW_BUS_OFF;
     heard.last = IW_BUS_OFF;
-    inspect_bus(&link, &heard, &wish, &findings);
+    inspect_bus(&link, &heard, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
     TEST_ASSERT_NULL(find("left_wheel"));
     inspect_begin(&findings);
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "iwheel-sim busoff off");
     TEST_ASSERT_NULL(find("left_wheel"));
 }
@@ -185,7 +185,7 @@ static void test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because
 static void test_bus_off_that_is_over_warns_and_the_wheels_are_judged(void) {
     hear_healthy();
     heard.worst = IW_BUS_OFF;
-    inspect_bus(&local, &heard, &wish, &findings);
+    inspect_bus(&local, &heard, &config, &findings);
     expect("bus_state", INSPECT_WARN, "it was bus-off", "termination");
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
@@ -206,24 +206,24 @@ static void test_what_a_machine_cannot_have_gets_the_verdict_asked_for(void) {
 }
 
 static void test_right_link_has_nothing_to_mend(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP,
-                                .echo_proven = true,
-                                .bitrate_hz = 1000000,
-                                .sample_point_permille = 625,
-                                .restart_ms = 100,
-                                .queue_length = 4};
-    inspect_link(&link, &wish, &findings);
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
+                                 .echo_proven = true,
+                                 .bitrate_hz = 1000000,
+                                 .sample_point_permille = 625,
+                                 .restart_ms = 100,
+                                 .queue_length = 4};
+    inspect_link(&link, &config, &findings);
     TEST_ASSERT_EQUAL_UINT(2U, findings.count);
     expect("bit_timing", INSPECT_OK, "1000000 bit/s, sample point 62.5 %", "");
 }
 
 static void test_each_fault_of_the_link_has_its_command(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP,
-                                .is_mute = true,
-                                .bitrate_hz = 500000,
-                                .sample_point_permille = 875,
-                                .queue_length = 10};
-    inspect_link(&link, &wish, &findings);
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
+                                 .is_mute = true,
+                                 .bitrate_hz = 500000,
+                                 .sample_point_permille = 875,
+                                 .queue_length = 10};
+    inspect_link(&link, &config, &findings);
     expect("mode", INSPECT_FAIL, "listen-only", "type can listen-only off");
     expect("bit_timing", INSPECT_FAIL, "500000 bit/s, sample point 87.5 %; wanted 1000000 bit/s, 62.5 %",
            "type can bitrate 1000000 sample-point 0.625 restart-ms 100; ip link set can0 txqueuelen 4");
@@ -233,47 +233,47 @@ static void test_each_fault_of_the_link_has_its_command(void) {
 }
 
 static void test_room_for_frames_that_is_granted_is_told(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP, .room_bytes = 2U * IW_LINK_ROOM_BYTES};
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 2U * IWL_LINK_ROOM_BYTES};
     inspect_room(&link, &findings);
     expect("room", INSPECT_OK, "4096 of 4096 KiB granted, 512 ms of a full bus", "");
 }
 
 static void test_room_for_frames_that_is_not_granted_has_its_command(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP, .room_bytes = 425984U};
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 425984U};
     inspect_room(&link, &findings);
     expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; when others",
            "sudo sysctl net.core.rmem_max=4194304");
 }
 
 static void test_room_for_frames_that_is_not_known_is_not_judged(void) {
-    const iw_bus_link_t hub = {.presence = IW_LINK_LOCAL, .room_bytes = 425984U};
-    const iw_bus_link_t unknown = {.presence = IW_LINK_UP};
+    const iwl_bus_link_t hub = {.presence = IWL_LINK_LOCAL, .room_bytes = 425984U};
+    const iwl_bus_link_t unknown = {.presence = IWL_LINK_UP};
     inspect_room(&hub, &findings);
     inspect_room(&unknown, &findings);
     TEST_ASSERT_EQUAL_UINT(0U, findings.count);
 }
 
 static void test_wrong_timing_only_warns_where_it_is_configured_so(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
-    inspect_wish_t lenient = wish;
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
+    inspect_config_t lenient = config;
     lenient.refuses = false;
     inspect_link(&link, &lenient, &findings);
     expect("bit_timing", INSPECT_WARN, "500000", "bitrate 1000000");
 }
 
 static void test_absent_and_foreign_interfaces_are_told_apart(void) {
-    iw_bus_link_t link = {.presence = IW_LINK_ABSENT};
-    inspect_link(&link, &wish, &findings);
+    iwl_bus_link_t link = {.presence = IWL_LINK_ABSENT};
+    inspect_link(&link, &config, &findings);
     expect("interface", INSPECT_FAIL, "no such interface", "ip -brief link show type can");
     TEST_ASSERT_EQUAL_UINT(1U, findings.count);
     inspect_begin(&findings);
-    link.presence = IW_LINK_NOT_CAN;
-    inspect_link(&link, &wish, &findings);
+    link.presence = IWL_LINK_NOT_CAN;
+    inspect_link(&link, &config, &findings);
     expect("interface", INSPECT_FAIL, "not a CAN interface", "ip -brief");
     inspect_begin(&findings);
-    link.presence = IW_LINK_DOWN;
+    link.presence = IWL_LINK_DOWN;
     link.is_virtual = true;
-    inspect_link(&link, &wish, &findings);
+    inspect_link(&link, &config, &findings);
     expect("interface", INSPECT_FAIL, "is down", "ip link set can0 up");
 }
 

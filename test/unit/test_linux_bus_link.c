@@ -13,51 +13,51 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-static iw_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
-    const iw_bus_link_t link = {
-        .presence = IW_LINK_UP, .bitrate_hz = bitrate_hz, .sample_point_permille = sample_point_permille};
-    return iw_timing_judge(&link, IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE);
+static iwl_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
+    const iwl_bus_link_t link = {
+        .presence = IWL_LINK_UP, .bitrate_hz = bitrate_hz, .sample_point_permille = sample_point_permille};
+    return iwl_timing_judge(&link, IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE);
 }
 
 static void test_timing_bands_around_the_wanted_sample_point(void) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const int off = (permille > 625) ? permille - 625 : 625 - permille;
-        const iw_timing_t expected = (off <= 5) ? IW_TIMING_RIGHT : (off <= 25) ? IW_TIMING_NEAR : IW_TIMING_WRONG;
+        const iwl_timing_t expected = (off <= 5) ? IWL_TIMING_RIGHT : (off <= 25) ? IWL_TIMING_NEAR : IWL_TIMING_WRONG;
         TEST_ASSERT_EQUAL_MESSAGE(expected, judge(1000000, permille), "sample point");
     }
 }
 
 static void test_timing_another_bit_rate_is_wrong_whatever_the_sample_point(void) {
-    TEST_ASSERT_EQUAL(IW_TIMING_WRONG, judge(500000, 625));
-    TEST_ASSERT_EQUAL(IW_TIMING_WRONG, judge(999999, 625));
-    TEST_ASSERT_EQUAL(IW_TIMING_WRONG, judge(500000, 0));
+    TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 625));
+    TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(999999, 625));
+    TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 0));
 }
 
 static void test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts(void) {
-    TEST_ASSERT_EQUAL(IW_TIMING_UNKNOWN, judge(1000000, 0));
-    TEST_ASSERT_EQUAL(IW_TIMING_UNKNOWN, judge(0, 625));
-    TEST_ASSERT_EQUAL(IW_TIMING_UNKNOWN, judge(0, 0));
-    TEST_ASSERT_EQUAL(IW_TIMING_WRONG, judge(0, 750));
+    TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(1000000, 0));
+    TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 625));
+    TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 0));
+    TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(0, 750));
 }
 
 static void test_timing_of_a_virtual_link_does_not_exist(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP, .is_virtual = true, .bitrate_hz = 5};
-    TEST_ASSERT_EQUAL(IW_TIMING_VIRTUAL, iw_timing_judge(&link, 1000000, 625));
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .is_virtual = true, .bitrate_hz = 5};
+    TEST_ASSERT_EQUAL(IWL_TIMING_VIRTUAL, iwl_timing_judge(&link, 1000000, 625));
 }
 
 static void test_same_looks_at_everything_the_interface_tells_and_nothing_else(void) {
-    const iw_bus_link_t link = {.presence = IW_LINK_UP, .bitrate_hz = 1, .queue_length = 2};
-    iw_bus_link_t other = link;
-    other.purge = IW_LINK_PURGE_DONE;
+    const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .bitrate_hz = 1, .queue_length = 2};
+    iwl_bus_link_t other = link;
+    other.purge = IWL_LINK_PURGE_DONE;
     other.changes = 9;
     other.lost = 9;
     other.load_permille = 9;
-    TEST_ASSERT_TRUE(iw_bus_link_is_same(&link, &other));
+    TEST_ASSERT_TRUE(iwl_bus_link_is_same(&link, &other));
 #define DIFFERS(field, value)                                                                                          \
     other = link;                                                                                                      \
     other.field = (value);                                                                                             \
-    TEST_ASSERT_FALSE_MESSAGE(iw_bus_link_is_same(&link, &other), #field)
-    DIFFERS(presence, IW_LINK_DOWN);
+    TEST_ASSERT_FALSE_MESSAGE(iwl_bus_link_is_same(&link, &other), #field)
+    DIFFERS(presence, IWL_LINK_DOWN);
     DIFFERS(is_virtual, true);
     DIFFERS(echo_proven, true);
     DIFFERS(is_mute, true);
@@ -75,8 +75,8 @@ static void test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_not
     TEST_ASSERT_NOT_NULL(file);
     const bool known = fgets(told, sizeof told, file) != NULL;
     (void)fclose(file);
-    TEST_ASSERT_EQUAL_INT(known ? told[0] - '0' : -1, iw_netdev_carrier("lo"));
-    TEST_ASSERT_EQUAL_INT(-1, iw_netdev_carrier("no-such-one"));
+    TEST_ASSERT_EQUAL_INT(known ? told[0] - '0' : -1, iwl_netdev_carrier("lo"));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_netdev_carrier("no-such-one"));
 }
 
 int main(void) {

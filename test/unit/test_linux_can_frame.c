@@ -11,12 +11,12 @@
 #include <sys/socket.h>
 
 static const uint32_t ids[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
-static struct can_filter ours[IW_SOCKETCAN_IDS];
-static struct can_filter others[IW_SOCKETCAN_IDS];
+static struct can_filter ours[IWL_SOCKETCAN_IDS];
+static struct can_filter others[IWL_SOCKETCAN_IDS];
 
 void setUp(void) {
-    iw_socketcan_filters(IW_SOCKETCAN_OURS, ours);
-    iw_socketcan_filters(IW_SOCKETCAN_OTHERS, others);
+    iwl_socketcan_filters(IWL_SOCKETCAN_OURS, ours);
+    iwl_socketcan_filters(IWL_SOCKETCAN_OTHERS, others);
 }
 
 void tearDown(void) {}
@@ -30,7 +30,7 @@ static bool passes(const struct can_filter *filter, canid_t can_id) {
 
 static bool is_ours(canid_t can_id) {
     bool any = false;
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
+    for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         any = any || passes(&ours[i], can_id);
     }
     return any;
@@ -38,7 +38,7 @@ static bool is_ours(canid_t can_id) {
 
 static bool is_others(canid_t can_id) {
     bool all = true; // Joined.
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
+    for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         all = all && passes(&others[i], can_id);
     }
     return all;
@@ -71,7 +71,7 @@ static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
 }
 
 static void test_filters_do_not_ask_for_error_frames(void) {
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
+    for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
         TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
     }
@@ -80,7 +80,7 @@ static void test_filters_do_not_ask_for_error_frames(void) {
 static iw_can_frame_t translate(canid_t can_id, uint8_t length, int flags) {
     struct can_frame raw = {.can_id = can_id, .len = length};
     memset(raw.data, 0x5A, sizeof raw.data);
-    return iw_socketcan_translate(&raw, flags);
+    return iwl_socketcan_translate(&raw, flags);
 }
 
 static void test_translate_keeps_format_number_and_data(void) {
@@ -111,49 +111,49 @@ static void test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemet
     TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&short_fd, told));
 }
 
-static iw_can_error_t error_of(canid_t classes, uint8_t controller) {
+static iwl_can_error_t error_of(canid_t classes, uint8_t controller) {
     struct can_frame raw = {.can_id = CAN_ERR_FLAG | classes, .len = CAN_ERR_DLC};
     memset(raw.data, 0xFF, sizeof raw.data);
     raw.data[1] = controller;
-    return iw_can_error_of(&raw);
+    return iwl_can_error_of(&raw);
 }
 
 static void test_error_frames_tell_the_state(void) {
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_BUS_OFF, error_of(CAN_ERR_BUSOFF, 0));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED, 0));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_WARNING));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF, error_of(CAN_ERR_BUSOFF, 0));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED, 0));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_WARNING));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
 }
 
 static void test_error_frames_the_gravest_news_comes_first(void) {
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_BUS_OFF,
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF,
                       error_of(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
 }
 
 static void test_error_frames_that_are_about_something_else_change_no_state(void) {
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_LOSTARB, 0xFF));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_PROT | CAN_ERR_ACK | CAN_ERR_BUSERROR, 0xFF));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, 0));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
-    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_LOSTARB, 0xFF));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_PROT | CAN_ERR_ACK | CAN_ERR_BUSERROR, 0xFF));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, 0));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
+    TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW));
 }
 
 static void test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration(void) {
-    TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iw_can_error_mask());
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iwl_can_error_mask());
 }
 
 static void test_bits_of_frames(void) {
     struct can_frame raw = {.can_id = 266, .len = 5};
-    TEST_ASSERT_EQUAL_UINT32(47 + 40, iw_socketcan_bits(&raw));
+    TEST_ASSERT_EQUAL_UINT32(47 + 40, iwl_socketcan_bits(&raw));
     raw.can_id = 266U | CAN_RTR_FLAG;
-    TEST_ASSERT_EQUAL_UINT32(47, iw_socketcan_bits(&raw));
+    TEST_ASSERT_EQUAL_UINT32(47, iwl_socketcan_bits(&raw));
     raw = (struct can_frame){.can_id = CAN_EFF_FLAG, .len = 8};
-    TEST_ASSERT_EQUAL_UINT32(67 + 64, iw_socketcan_bits(&raw));
+    TEST_ASSERT_EQUAL_UINT32(67 + 64, iwl_socketcan_bits(&raw));
 }
 
 int main(void) {

@@ -26,7 +26,7 @@ static struct can_frame on_bus[IW_SIDES];
 static int calls;    // Of sendmmsg.
 static bool unknown; // CAN, to this kernel.
 static int before;   // The errno that a call of before has left.
-static iw_socketcan_socket_t bus;
+static iwl_socketcan_socket_t bus;
 
 int socket(int domain, int type, int protocol) {
     TEST_ASSERT_EQUAL_INT(PF_CAN, domain);
@@ -98,11 +98,11 @@ void setUp(void) {
     memset(on_bus, 0xA5, sizeof on_bus);
     taken = IW_SIDES;
     length = sizeof(struct can_frame);
-    iw_socketcan_socket_init(&bus);
+    iwl_socketcan_socket_init(&bus);
 }
 
 void tearDown(void) {
-    iw_socketcan_socket_close(&bus);
+    iwl_socketcan_socket_close(&bus);
 }
 
 static const iw_can_frame_t pair[IW_SIDES] = {
@@ -122,8 +122,8 @@ static bool was_asked(int level, int name, int value) {
 static void test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost(void) {
     bus.lost = 7;
     bus.count = 5;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
-    TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, (int)iw_can_error_mask()));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
+    TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_ERR_FILTER, (int)iwl_can_error_mask()));
     TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1));
     TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1));
     TEST_ASSERT_TRUE(was_asked(SOL_SOCKET, SO_RXQ_OVFL, 1));
@@ -133,7 +133,7 @@ static void test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost(voi
 }
 
 static void test_can_socket_of_others_joins_its_filters_and_wants_no_errors(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OTHERS));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
     TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1));
     TEST_ASSERT_FALSE(was_asked(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1));
 }
@@ -143,63 +143,63 @@ static void test_can_socket_without_what_it_needs_is_not_opened(void) {
     for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
         count = 0;
         refused = needed[i];
-        TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+        TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
         TEST_ASSERT_EQUAL_INT(-1, bus.fd);
     }
     count = 0;
     refused = CAN_RAW_JOIN_FILTERS;
-    TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OTHERS));
+    TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
 }
 
 static void test_can_socket_tells_frames_nothing_and_an_interface_that_went(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     before = ENODEV;
-    come = (int)IW_SOCKETCAN_BATCH;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_fill(&bus));
-    TEST_ASSERT_EQUAL_UINT32(IW_SOCKETCAN_BATCH, bus.count);
+    come = (int)IWL_SOCKETCAN_BATCH;
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_fill(&bus));
+    TEST_ASSERT_EQUAL_UINT32(IWL_SOCKETCAN_BATCH, bus.count);
     TEST_ASSERT_FALSE(bus.drained);
     come = 0;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_fill(&bus));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_fill(&bus));
     TEST_ASSERT_TRUE(bus.drained);
     come = -EAGAIN;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_fill(&bus));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_fill(&bus));
     come = -ENETDOWN;
-    TEST_ASSERT_EQUAL_INT(ENETDOWN, iw_socketcan_socket_fill(&bus));
+    TEST_ASSERT_EQUAL_INT(ENETDOWN, iwl_socketcan_socket_fill(&bus));
 }
 
 static void test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     come = 3;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_drop(&bus));
-    TEST_ASSERT_TRUE(iw_socketcan_socket_is_empty(&bus));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_drop(&bus));
+    TEST_ASSERT_TRUE(iwl_socketcan_socket_is_empty(&bus));
     TEST_ASSERT_EQUAL_UINT32(0, bus.count);
     TEST_ASSERT_FALSE(bus.drained);
     come = -ENODEV;
-    TEST_ASSERT_EQUAL_INT(ENODEV, iw_socketcan_socket_drop(&bus));
+    TEST_ASSERT_EQUAL_INT(ENODEV, iwl_socketcan_socket_drop(&bus));
 }
 
 static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
-    TEST_ASSERT_EQUAL_INT(1, iw_socketcan_socket_send(&bus, pair, 1));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, 1));
     static const int for_now[] = {EAGAIN, ENOBUFS, EINTR};
     for (size_t i = 0; i < sizeof for_now / sizeof for_now[0]; i++) {
         taken = -for_now[i];
-        TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_send(&bus, pair, 1));
-        TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+        TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_send(&bus, pair, 1));
+        TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     }
     taken = -ENETDOWN;
-    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     taken = 0; // No frame. What a call of before left says nothing.
     before = EAGAIN;
-    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     taken = 1; // Less than a frame: no frame.
     length = sizeof(struct can_frame) - 1U;
-    TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
 }
 
 static void test_can_socket_pair_leaves_in_one_call_left_first(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
-    TEST_ASSERT_EQUAL_INT(2, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     TEST_ASSERT_EQUAL_INT(1, calls);
     for (size_t side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_HEX32(pair[side].id, on_bus[side].can_id);
@@ -209,23 +209,23 @@ static void test_can_socket_pair_leaves_in_one_call_left_first(void) {
 }
 
 static void test_can_socket_of_a_pair_that_leaves_in_half_reports_one(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     taken = 1;
     before = ENOBUFS;
-    TEST_ASSERT_EQUAL_INT(1, iw_socketcan_socket_send(&bus, pair, IW_SIDES));
+    TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     TEST_ASSERT_EQUAL_INT(1, calls); // The second frame is not tried again.
 }
 
 static void test_can_socket_call_never_brings_more_frames_than_wheels(void) {
     iw_can_frame_t many[IW_SIDES + 1U] = {{.id = 1}, {.id = 2}, {.id = 3}};
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
-    TEST_ASSERT_EQUAL_INT(2, iw_socketcan_socket_send(&bus, many, IW_SIDES + 1U));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, many, IW_SIDES + 1U));
 }
 
 static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) {
     unknown = true;
     memset(&bus, 0xA5, sizeof bus);
-    const int error = iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS);
+    const int error = iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS);
     unknown = false;
     TEST_ASSERT_EQUAL_INT(EAFNOSUPPORT, error);
     TEST_ASSERT_EQUAL_INT(-1, bus.fd);
@@ -233,10 +233,10 @@ static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) 
 }
 
 static void test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one(void) {
-    iw_socketcan_socket_use(&bus, 77, true);
+    iwl_socketcan_socket_use(&bus, 77, true);
     TEST_ASSERT_EQUAL_INT(77, bus.fd);
     TEST_ASSERT_TRUE(bus.is_hub);
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_FALSE(bus.is_hub);
 }
 

@@ -29,46 +29,46 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void test_clock_of_the_loop_is_monotonic_in_microseconds(void) {
-    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_now_us());
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_now_us());
     wall.tv_sec -= 3600;
     boot.tv_sec += 60;
-    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_now_us());
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_now_us());
     iw_time_us_t suspended_us = 0;
-    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_read(&suspended_us));
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_read(&suspended_us));
 }
 
 static void test_clock_tells_sleep_that_the_loop_does_not_count(void) {
     iw_time_us_t suspended_us = 1;
-    (void)iw_clock_read(&suspended_us);
+    (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
     boot.tv_sec += 2;
-    (void)iw_clock_read(&suspended_us);
+    (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_EQUAL_UINT64(2000000, suspended_us);
-    TEST_ASSERT_EQUAL_UINT64(2000000, iw_clock_suspended_us());
+    TEST_ASSERT_EQUAL_UINT64(2000000, iwl_clock_suspended_us());
     wall.tv_sec += 3600;
-    TEST_ASSERT_EQUAL_UINT64(2000000, iw_clock_suspended_us());
+    TEST_ASSERT_EQUAL_UINT64(2000000, iwl_clock_suspended_us());
 }
 
 static void test_clock_time_between_the_two_looks_is_never_taken_for_sleep(void) {
     iw_time_us_t suspended_us = 1;
     passes_ns = 40000000;
-    (void)iw_clock_read(&suspended_us);
+    (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
     boot.tv_sec += 2;
-    (void)iw_clock_read(&suspended_us);
+    (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_TRUE(suspended_us <= 2000000U);
 }
 
 static void test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known(void) {
-    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us(), iw_clock_awake_us(0));
+    TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(0));
     boot.tv_sec += 2;
     wall.tv_sec += 3600;
-    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us() + 2000000U, iw_clock_awake_us(0));
-    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us(), iw_clock_awake_us(2000000U));
+    TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us() + 2000000U, iwl_clock_awake_us(0));
+    TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(2000000U));
 }
 
 static void test_clock_of_the_wall_is_for_people_only(void) {
-    TEST_ASSERT_EQUAL_INT64(1700000000987654, iw_clock_wall_us());
+    TEST_ASSERT_EQUAL_INT64(1700000000987654, iwl_clock_wall_us());
 }
 
 int main(void) {

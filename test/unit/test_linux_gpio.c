@@ -10,25 +10,25 @@
 #define MS       1000U
 #define START_US UINT64_C(5000000)
 
-static iw_gpio_address_t address;
-static iw_gpio_release_t release;
+static iwl_gpio_address_t address;
+static iwl_gpio_release_t release;
 static iw_time_us_t now_us;
 
 void setUp(void) {
     memset(&address, 0xA5, sizeof address);
     memset(&release, 0xA5, sizeof release);
-    iw_gpio_release_init(&release, 5U * MS);
+    iwl_gpio_release_init(&release, 5U * MS);
     now_us = START_US;
 }
 
 void tearDown(void) {}
 
 static void test_address_by_chip_and_offset(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("gpiochip0:4", &address));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("gpiochip0:4", &address));
     TEST_ASSERT_TRUE(address.by_offset);
     TEST_ASSERT_EQUAL_STRING("gpiochip0", address.name);
     TEST_ASSERT_EQUAL_UINT(4, address.offset);
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("gpiochip12:65535", &address));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("gpiochip12:65535", &address));
     TEST_ASSERT_EQUAL_STRING("gpiochip12", address.name);
     TEST_ASSERT_EQUAL_UINT(65535, address.offset);
 }
@@ -36,7 +36,7 @@ static void test_address_by_chip_and_offset(void) {
 static void test_address_by_name(void) {
     static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_gpio_address_parse(names[i], &address), names[i]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_gpio_address_parse(names[i], &address), names[i]);
         TEST_ASSERT_FALSE_MESSAGE(address.by_offset, names[i]);
         TEST_ASSERT_EQUAL_STRING(names[i], address.name);
     }
@@ -56,37 +56,37 @@ static void test_address_that_is_none_is_refused_and_changes_nothing(void) {
                                         "gpiochip0:4:5",
                                         "gpiochip99999999999999999999:1"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(EINVAL, iw_gpio_address_parse(wrong[i], &address), wrong[i]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(EINVAL, iwl_gpio_address_parse(wrong[i], &address), wrong[i]);
     }
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_address_parse("a-line-name-of-thirty-two-letters", &address));
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-thirty-two-letters", &address));
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, &address, sizeof address);
 }
 
 static void test_address_the_longest_name_fits(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
     TEST_ASSERT_EQUAL_size_t(31, strlen(address.name));
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
 }
 
 static void look(uint32_t after_us, bool active, bool edge) {
     now_us += after_us;
-    iw_gpio_release_see(&release, now_us, active, edge);
+    iwl_gpio_release_see(&release, now_us, active, edge);
 }
 
 static bool pressed(void) {
-    return iw_gpio_release_take_pressed(&release, now_us);
+    return iwl_gpio_release_take_pressed(&release, now_us);
 }
 
 static void test_release_a_line_that_is_inactive_from_the_start_is_released_at_once(void) {
     look(0, false, false);
     TEST_ASSERT_FALSE(pressed());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
 static void test_release_a_press_counts_at_once(void) {
     look(0, true, false);
     TEST_ASSERT_TRUE(pressed());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
     setUp();
     look(0, true, true);
     TEST_ASSERT_TRUE(pressed());
@@ -97,12 +97,12 @@ static void test_release_counts_when_it_has_lasted(void) {
     (void)pressed();
     look(1000U * MS, false, true);
     TEST_ASSERT_TRUE(pressed());
-    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iw_gpio_release_next_us(&release, now_us));
+    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iwl_gpio_release_next_us(&release, now_us));
     look(5U * MS - 1U, false, false);
     TEST_ASSERT_TRUE(pressed());
     look(1U, false, false);
     TEST_ASSERT_FALSE(pressed());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
 static void test_release_is_put_off_by_every_bounce(void) {
@@ -153,13 +153,13 @@ static void test_release_a_level_seen_and_gone_again_is_told_without_any_edge(vo
 }
 
 static void test_release_without_debounce_follows_the_level(void) {
-    iw_gpio_release_init(&release, 0);
+    iwl_gpio_release_init(&release, 0);
     look(0, true, true);
     TEST_ASSERT_TRUE(pressed());
     look(1U, false, true);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
 int main(void) {

@@ -21,64 +21,64 @@ static struct {
     int open_error;
     int opened;
     int fd;
-    iw_estop_seen_t expected;
+    iwl_estop_seen_t expected;
 } wire;
 
-static iw_backend_store_t store;
+static iwl_backend_store_t store;
 static iw_time_us_t now_us;
 
-int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+int iwl_gpio_line_see(const iwl_gpio_address_t *address, iwl_estop_seen_t *out_seen) {
     (void)address;
-    *out_seen = (iw_estop_seen_t){.chip = "label", .line = "name"};
+    *out_seen = (iwl_estop_seen_t){.chip = "label", .line = "name"};
     return 0;
 }
 
-int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+int iwl_gpio_line_open(iwl_gpio_line_t *self, const iwl_gpio_address_t *address) {
     wire.expected = address->expected;
-    *self = (iw_gpio_line_t){.fd = -1};
+    *self = (iwl_gpio_line_t){.fd = -1};
     wire.opened++;
     if (wire.open_error != 0) {
         return wire.open_error;
     }
     wire.fd = self->fd = eventfd(0, EFD_NONBLOCK);
-    self->seen = (iw_estop_seen_t){.chip = "label", .line = "name"};
+    self->seen = (iwl_estop_seen_t){.chip = "label", .line = "name"};
     return 0;
 }
 
-void iw_gpio_line_close(iw_gpio_line_t *self) {
+void iwl_gpio_line_close(iwl_gpio_line_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
     }
-    *self = (iw_gpio_line_t){.fd = -1};
+    *self = (iwl_gpio_line_t){.fd = -1};
 }
 
-int iw_gpio_line_level(const iw_gpio_line_t *self) {
+int iwl_gpio_line_level(const iwl_gpio_line_t *self) {
     (void)self;
     return wire.level;
 }
 
-int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
+int iwl_gpio_line_take_edges(iwl_gpio_line_t *self) {
     const int edges = wire.edges;
     (void)self;
     wire.edges = (edges > 0) ? 0 : edges;
     return edges;
 }
 
-static void tend(unsigned after_ms) {
+static void poll_after(unsigned after_ms) {
     now_us += (iw_time_us_t)after_ms * MS;
-    iw_gpio_estop_ops->tend(&store, now_us);
+    iwl_gpio_estop_ops->poll(&store, now_us);
 }
 
 /// With a wait before that has told of edges if there are any.
 static int pressed(void) {
-    return iw_gpio_estop_ops->pressed(&store, wire.edges == 0);
+    return iwl_gpio_estop_ops->pressed(&store, wire.edges == 0);
 }
 
 static void begin(bool active_high) {
-    const iw_estop_wish_t wish = {.name = "ESTOP", .active_high = active_high, .debounce_ms = 5};
+    const iwl_estop_config_t config = {.name = "ESTOP", .active_high = active_high, .debounce_ms = 5};
     wire.level = active_high ? 0 : 1;
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
-    tend(0);
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->open(&store, &config));
+    poll_after(0);
 }
 
 void setUp(void) {
@@ -88,23 +88,23 @@ void setUp(void) {
 }
 
 void tearDown(void) {
-    iw_gpio_estop_ops->close(&store);
+    iwl_gpio_estop_ops->close(&store);
 }
 
 static void test_estop_line_low_is_pressed_and_high_is_released(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 0;
     wire.edges = 1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, pressed());
-    tend(100);
+    poll_after(100);
     TEST_ASSERT_EQUAL_INT(1, pressed());
     wire.level = 1;
     wire.edges = 1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, pressed());
-    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iw_gpio_estop_ops->next_us(&store));
-    tend(5);
+    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iwl_gpio_estop_ops->next_us(&store));
+    poll_after(5);
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
@@ -114,65 +114,65 @@ static void test_estop_line_active_high_is_the_other_way_round(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 1;
     wire.edges = 1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, pressed());
 }
 
 static void test_estop_level_is_looked_at_although_the_wait_has_told_nothing(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 0;
-    tend(1);
-    TEST_ASSERT_EQUAL_INT(1, iw_gpio_estop_ops->pressed(&store, true));
+    poll_after(1);
+    TEST_ASSERT_EQUAL_INT(1, iwl_gpio_estop_ops->pressed(&store, true));
 }
 
 static void test_estop_pulse_of_which_only_the_edges_are_left_is_a_press(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = 2;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, pressed());
-    tend(5);
+    poll_after(5);
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
 static void test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges(void) {
     wire.level = -1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
-    TEST_ASSERT_EQUAL_INT(ENODEV, iw_gpio_estop_ops->trouble(&store));
+    TEST_ASSERT_EQUAL_INT(ENODEV, iwl_gpio_estop_ops->trouble(&store));
     wire.level = 1;
-    tend(200);
+    poll_after(200);
     (void)pressed();
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = -1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
 static void test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once(void) {
     wire.level = -1;
-    tend(1);
+    poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
     TEST_ASSERT_EQUAL_INT(-1, pressed());
     wire.level = 1;
-    tend(200);
+    poll_after(200);
     TEST_ASSERT_EQUAL_INT(0, pressed());
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->trouble(&store));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->trouble(&store));
 }
 
 static void test_estop_chip_that_is_gone_is_tried_again_once_in_a_while(void) {
     wire.level = -1;
-    tend(1);
+    poll_after(1);
     (void)pressed();
     wire.open_error = ENOENT;
     wire.opened = 0;
     for (unsigned ms = 0; ms < 1000U; ms++) {
-        tend(1);
+        poll_after(1);
         TEST_ASSERT_EQUAL_INT(-1, pressed());
-        TEST_ASSERT_TRUE(iw_gpio_estop_ops->next_us(&store) > now_us);
-        TEST_ASSERT_TRUE(iw_gpio_estop_ops->next_us(&store) <= now_us + 200U * MS);
+        TEST_ASSERT_TRUE(iwl_gpio_estop_ops->next_us(&store) > now_us);
+        TEST_ASSERT_TRUE(iwl_gpio_estop_ops->next_us(&store) <= now_us + 200U * MS);
     }
     TEST_ASSERT_EQUAL_INT(5, wire.opened);
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_estop_ops->trouble(&store));
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_estop_ops->trouble(&store));
 }
 
 static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can(void) {
@@ -180,11 +180,11 @@ static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_c
     wire.open_error = EBUSY;
     begin(false);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
-    TEST_ASSERT_EQUAL_INT(EBUSY, iw_gpio_estop_ops->trouble(&store));
+    TEST_ASSERT_EQUAL_INT(EBUSY, iwl_gpio_estop_ops->trouble(&store));
     wire.open_error = 0;
-    tend(200);
+    poll_after(200);
     TEST_ASSERT_EQUAL_INT(0, pressed());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_estop_ops->next_us(&store));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_estop_ops->next_us(&store));
 }
 
 static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
@@ -192,19 +192,19 @@ static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
     wire.open_error = EREMCHG;
     begin(false);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
-    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_estop_ops->trouble(&store));
-    tend(1000);
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_estop_ops->trouble(&store));
+    poll_after(1000);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
 static void test_estop_line_has_names_as_long_as_it_can_be_read(void) {
-    const iw_estop_seen_t *seen = iw_gpio_estop_ops->seen(&store);
+    const iwl_estop_seen_t *seen = iwl_gpio_estop_ops->seen(&store);
     TEST_ASSERT_NOT_NULL(seen);
     TEST_ASSERT_EQUAL_STRING("label", seen->chip);
     TEST_ASSERT_EQUAL_STRING("name", seen->line);
     wire.level = -1;
     TEST_ASSERT_EQUAL_INT(-1, pressed());
-    TEST_ASSERT_NULL(iw_gpio_estop_ops->seen(&store));
+    TEST_ASSERT_NULL(iwl_gpio_estop_ops->seen(&store));
 }
 
 static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
@@ -212,45 +212,45 @@ static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
     static const struct {
         const char *chip;
         const char *chip_line;
-        iw_estop_seen_t expected;
+        iwl_estop_seen_t expected;
     } cases[] = {{NULL, NULL, {.chip = "", .line = ""}},
                  {"any", "any", {.chip = "", .line = ""}},
                  {"pinctrl", "any", {.chip = "pinctrl", .line = ""}},
                  {"any", "GPIO4", {.chip = "", .line = "GPIO4"}}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const iw_estop_wish_t wish = {.name = "ESTOP", .chip = cases[i].chip, .chip_line = cases[i].chip_line};
+        const iwl_estop_config_t config = {.name = "ESTOP", .chip = cases[i].chip, .chip_line = cases[i].chip_line};
         tearDown();
-        TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
+        TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->open(&store, &config));
         TEST_ASSERT_EQUAL_STRING(cases[i].expected.chip, wire.expected.chip);
         TEST_ASSERT_EQUAL_STRING(cases[i].expected.line, wire.expected.line);
     }
     tearDown();
-    iw_estop_wish_t wish = {.name = "ESTOP", .chip = longest};
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
+    iwl_estop_config_t config = {.name = "ESTOP", .chip = longest};
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->open(&store, &config));
     TEST_ASSERT_EQUAL_STRING(longest, wire.expected.chip);
     tearDown();
-    wish.chip = "01234567890123456789012345678901";
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_estop_ops->open(&store, &wish));
+    config.chip = "01234567890123456789012345678901";
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_estop_ops->open(&store, &config));
     begin(false);
 }
 
 static void test_estop_that_is_no_line_is_called_nothing(void) {
-    iw_estop_seen_t seen;
-    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_estop_see("unix:/tmp/button", &seen));
-    TEST_ASSERT_EQUAL_INT(EINVAL, iw_estop_see("gpiochip:4", &seen));
-    TEST_ASSERT_EQUAL_INT(0, iw_estop_see("gpiochip0:4", &seen));
+    iwl_estop_seen_t seen;
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iwl_estop_see("unix:/tmp/button", &seen));
+    TEST_ASSERT_EQUAL_INT(EINVAL, iwl_estop_see("gpiochip:4", &seen));
+    TEST_ASSERT_EQUAL_INT(0, iwl_estop_see("gpiochip0:4", &seen));
     TEST_ASSERT_EQUAL_STRING("label", seen.chip);
 }
 
 static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
     const uint64_t one = 1;
-    struct pollfd wait = {.fd = iw_gpio_estop_ops->watch_fd(&store), .events = POLLIN};
+    struct pollfd wait = {.fd = iwl_gpio_estop_ops->watch_fd(&store), .events = POLLIN};
     TEST_ASSERT_EQUAL_INT(0, poll(&wait, 1, 0));
     wire.level = -1;
-    tend(1);
+    poll_after(1);
     (void)pressed();
     wire.level = 1;
-    tend(200);
+    poll_after(200);
     TEST_ASSERT_EQUAL_INT((int)sizeof one, (int)write(wire.fd, &one, sizeof one));
     TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
 }
@@ -260,9 +260,9 @@ static void test_estop_without_a_descriptor_for_waiting_is_refused(void) {
     tearDown();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
     const struct rlimit none = {.rlim_cur = 0, .rlim_max = before.rlim_max};
-    const iw_estop_wish_t wish = {.name = "ESTOP"};
+    const iwl_estop_config_t config = {.name = "ESTOP"};
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
-    const int error = iw_gpio_estop_ops->open(&store, &wish);
+    const int error = iwl_gpio_estop_ops->open(&store, &config);
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_INT(EMFILE, error);
     begin(false);

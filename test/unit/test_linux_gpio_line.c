@@ -11,9 +11,9 @@
 
 fake_gpio_t fake_gpio;
 
-static const iw_gpio_address_t by_name = {.name = FAKE_GPIO_NAME};
-static const iw_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = FAKE_GPIO_OFFSET, .by_offset = true};
-static iw_gpio_line_t line;
+static const iwl_gpio_address_t by_name = {.name = FAKE_GPIO_NAME};
+static const iwl_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = FAKE_GPIO_OFFSET, .by_offset = true};
+static iwl_gpio_line_t line;
 
 const char *fake_gpio_name(bool own, unsigned offset) {
     const bool twin = (fake_gpio.twin == 1 && own && offset == 30U) || (fake_gpio.twin == 2 && !own && offset == 0U);
@@ -45,11 +45,11 @@ int fake_gpio_take(unsigned room) {
 void setUp(void) {
     memset(&fake_gpio, 0, sizeof fake_gpio);
     memset(&line, 0xA5, sizeof line);
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_name));
 }
 
 void tearDown(void) {
-    iw_gpio_line_close(&line);
+    iwl_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
 }
@@ -66,66 +66,66 @@ static void test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait(vo
 }
 
 static void test_line_by_chip_and_offset_is_that_line(void) {
-    iw_gpio_line_close(&line);
+    iwl_gpio_line_close(&line);
     fake_gpio.offset = 0;
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_offset));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_offset));
     TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
     TEST_ASSERT_EQUAL_INT(1, fake_gpio.open);
 }
 
 static void test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read(void) {
     fake_gpio.level = 1;
-    TEST_ASSERT_EQUAL_INT(1, iw_gpio_line_level(&line));
+    TEST_ASSERT_EQUAL_INT(1, iwl_gpio_line_level(&line));
     fake_gpio.level = 0;
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_level(&line));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_level(&line));
     fake_gpio.level = -1;
-    TEST_ASSERT_TRUE(iw_gpio_line_level(&line) < 0);
+    TEST_ASSERT_TRUE(iwl_gpio_line_level(&line) < 0);
 }
 
 static void test_edges_are_all_taken_and_counted(void) {
     static const int numbers[] = {0, 1, 2, 15, 16, 17, 33};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         fake_gpio.edges = numbers[i];
-        TEST_ASSERT_EQUAL_INT(numbers[i], iw_gpio_line_take_edges(&line));
+        TEST_ASSERT_EQUAL_INT(numbers[i], iwl_gpio_line_take_edges(&line));
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.edges);
     }
 }
 
 static void test_edges_without_end_take_a_bounded_time(void) {
     fake_gpio.edges = 1000000;
-    TEST_ASSERT_GREATER_OR_EQUAL_INT(IW_GPIO_EDGES_MAX, iw_gpio_line_take_edges(&line));
-    TEST_ASSERT_LESS_OR_EQUAL_INT(IW_GPIO_EDGES_MAX, fake_gpio.reads);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, iwl_gpio_line_take_edges(&line));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, fake_gpio.reads);
 }
 
 static void test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none(void) {
     fake_gpio.edges_error = ENODEV;
-    TEST_ASSERT_TRUE(iw_gpio_line_take_edges(&line) < 0);
+    TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0);
     fake_gpio.edges = 3;
-    TEST_ASSERT_TRUE(iw_gpio_line_take_edges(&line) < 0); // Whatever there was before.
+    TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0); // Whatever there was before.
     fake_gpio.edges_error = EINTR;
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_take_edges(&line));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_take_edges(&line));
     fake_gpio.edges = 5;
     fake_gpio.edges_error = -1;
-    TEST_ASSERT_EQUAL_INT(5, iw_gpio_line_take_edges(&line));
+    TEST_ASSERT_EQUAL_INT(5, iwl_gpio_line_take_edges(&line));
 }
 
 static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) {
-    iw_gpio_line_close(&line);
+    iwl_gpio_line_close(&line);
     fake_gpio.busy_error = EBUSY;
-    TEST_ASSERT_EQUAL_INT(EBUSY, iw_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(EBUSY, iwl_gpio_line_open(&line, &by_name));
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     fake_gpio.busy_error = 0;
     fake_gpio.chip_error = EACCES;
-    TEST_ASSERT_EQUAL_INT(EACCES, iw_gpio_line_open(&line, &by_name));
-    TEST_ASSERT_EQUAL_INT(EACCES, iw_gpio_line_open(&line, &by_offset));
+    TEST_ASSERT_EQUAL_INT(EACCES, iwl_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(EACCES, iwl_gpio_line_open(&line, &by_offset));
     fake_gpio.chip_error = 0;
-    const iw_gpio_address_t nobody = {.name = "NOBODY"};
-    const iw_gpio_address_t nowhere = {.name = "gpiochip9", .offset = FAKE_GPIO_OFFSET, .by_offset = true};
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nobody));
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nowhere));
-    const iw_gpio_address_t no_such = {.name = FAKE_GPIO_CHIP, .offset = 99, .by_offset = true};
-    const int error = iw_gpio_line_open(&line, &no_such);
+    const iwl_gpio_address_t nobody = {.name = "NOBODY"};
+    const iwl_gpio_address_t nowhere = {.name = "gpiochip9", .offset = FAKE_GPIO_OFFSET, .by_offset = true};
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &nobody));
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &nowhere));
+    const iwl_gpio_address_t no_such = {.name = FAKE_GPIO_CHIP, .offset = 99, .by_offset = true};
+    const int error = iwl_gpio_line_open(&line, &no_such);
     TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "as the library says it");
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
@@ -133,18 +133,18 @@ static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) 
 
 static void test_line_name_that_exists_twice_is_refused(void) {
     for (int twin = 1; twin <= 2; twin++) {
-        iw_gpio_line_close(&line);
+        iwl_gpio_line_close(&line);
         fake_gpio.twin = twin;
-        TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iw_gpio_line_open(&line, &by_name));
+        TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iwl_gpio_line_open(&line, &by_name));
         TEST_ASSERT_EQUAL_INT(-1, line.fd);
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
-        TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_offset));
+        TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_offset));
     }
 }
 
 static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) {
     static const struct {
-        iw_estop_seen_t expected;
+        iwl_estop_seen_t expected;
         int error;
     } cases[] = {{{.chip = "", .line = ""}, 0},
                  {{.chip = FAKE_GPIO_LABEL, .line = ""}, 0},
@@ -154,12 +154,12 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
                  {{.chip = FAKE_GPIO_LABEL, .line = "OTHER"}, EREMCHG},
                  {{.chip = "pinctrl-fak", .line = ""}, EREMCHG},
                  {{.chip = "pinctrl-fake2", .line = ""}, EREMCHG}};
-    const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
+    const iwl_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U * sizeof cases / sizeof cases[0]; i++) {
-        iw_gpio_address_t address = *addresses[i % 2U];
+        iwl_gpio_address_t address = *addresses[i % 2U];
         address.expected = cases[i / 2U].expected;
-        iw_gpio_line_close(&line);
-        TEST_ASSERT_EQUAL_INT(cases[i / 2U].error, iw_gpio_line_open(&line, &address));
+        iwl_gpio_line_close(&line);
+        TEST_ASSERT_EQUAL_INT(cases[i / 2U].error, iwl_gpio_line_open(&line, &address));
         TEST_ASSERT_EQUAL_STRING((cases[i / 2U].error == 0) ? FAKE_GPIO_LABEL : "", line.seen.chip);
         TEST_ASSERT_EQUAL_STRING((cases[i / 2U].error == 0) ? FAKE_GPIO_NAME : "", line.seen.line);
         TEST_ASSERT_EQUAL_INT((cases[i / 2U].error == 0) ? 1 : 0, fake_gpio.open);
@@ -168,24 +168,24 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
 }
 
 static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
-    iw_gpio_address_t address = by_offset;
-    address.expected = (iw_estop_seen_t){.chip = FAKE_GPIO_LABEL};
-    iw_gpio_line_close(&line);
+    iwl_gpio_address_t address = by_offset;
+    address.expected = (iwl_estop_seen_t){.chip = FAKE_GPIO_LABEL};
+    iwl_gpio_line_close(&line);
     fake_gpio.label = "raspberrypi-exp-gpio"; // Has the number of the other one now.
-    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_line_open(&line, &address));
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
-    address.expected = (iw_estop_seen_t){.line = FAKE_GPIO_NAME};
+    address.expected = (iwl_estop_seen_t){.line = FAKE_GPIO_NAME};
     fake_gpio.unnamed = true;
-    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_line_open(&line, &address));
 }
 
 static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
-    const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
+    const iwl_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U; i++) {
-        iw_estop_seen_t seen = {.chip = "x", .line = "y"};
-        iw_gpio_line_close(&line);
+        iwl_estop_seen_t seen = {.chip = "x", .line = "y"};
+        iwl_gpio_line_close(&line);
         fake_gpio.busy_error = EBUSY; // Somebody else has it.
-        TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_see(addresses[i], &seen));
+        TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_see(addresses[i], &seen));
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_LABEL, seen.chip);
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_NAME, seen.line);
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_CHIP, seen.node);
@@ -193,23 +193,23 @@ static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
     }
-    iw_estop_seen_t seen;
+    iwl_estop_seen_t seen;
     fake_gpio.unnamed = true;
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_see(&by_offset, &seen));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_see(&by_offset, &seen));
     TEST_ASSERT_EQUAL_STRING("", seen.line);
     fake_gpio.unnamed = false;
     fake_gpio.twin = 2;
-    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iw_gpio_line_see(&by_name, &seen));
-    const iw_gpio_address_t nobody = {.name = "NOBODY"};
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_see(&nobody, &seen));
+    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iwl_gpio_line_see(&by_name, &seen));
+    const iwl_gpio_address_t nobody = {.name = "NOBODY"};
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_see(&nobody, &seen));
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
 }
 
 static void test_line_that_is_closed_is_given_back(void) {
-    iw_gpio_line_close(&line);
+    iwl_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
-    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_name));
 }
 
 int main(void) {

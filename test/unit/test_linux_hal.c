@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <unity.h>
 
-static iw_linux_hal_t hal;
+static iwl_hal_t hal;
 static bool was_quiet;
 static int answer;
 static int answer2;
@@ -35,11 +35,11 @@ static int fake_fd(const void *self) {
     return (self == &hal.estop2) ? 20 : 10;
 }
 
-static void bus_tend(iw_bus_t *self) {
+static void bus_tend(iwl_bus_t *self) {
     (void)self;
 }
 
-static const iw_bus_kind_t bus_kind = {.close = bus_tend, .tend = bus_tend};
+static const iwl_bus_kind_t bus_kind = {.close = bus_tend, .poll = bus_tend};
 static unsigned tended;
 static unsigned closed;
 
@@ -52,24 +52,24 @@ static void fake_close(void *self) {
     closed += (self == &hal.estop2) ? 10U : 1U;
 }
 
-static const iw_estop_ops_t fake_ops = {.close = fake_close,
-                                        .watch_fd = fake_fd,
-                                        .tend = fake_tend,
-                                        .pressed = fake_pressed,
-                                        .next_us = fake_next_us,
-                                        .trouble = fake_trouble,
-                                        .present = true};
+static const iwl_estop_ops_t fake_ops = {.close = fake_close,
+                                         .watch_fd = fake_fd,
+                                         .poll = fake_tend,
+                                         .pressed = fake_pressed,
+                                         .next_us = fake_next_us,
+                                         .trouble = fake_trouble,
+                                         .present = true};
 
 void setUp(void) {
-    hal = (iw_linux_hal_t){.estop_ops = &fake_ops, .estop_last = -1};
-    ((iw_bus_t *)(void *)&hal.bus)->kind = &bus_kind;
+    hal = (iwl_hal_t){.estop_ops = &fake_ops, .estop_last = -1};
+    ((iwl_bus_t *)(void *)&hal.bus)->kind = &bus_kind;
     answer = 0;
 }
 
 void tearDown(void) {}
 
 static int look(void) {
-    return iw_linux_hal_pressed(&hal);
+    return iwl_hal_pressed(&hal);
 }
 
 static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {
@@ -78,20 +78,20 @@ static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {
 }
 
 static void test_estop_that_was_not_told_of_has_no_edges(void) {
-    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
+    iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     TEST_ASSERT_TRUE(was_quiet);
 }
 
 static void test_estop_that_was_told_of_is_read_whole(void) {
-    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
-    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, true});
+    iwl_hal_waited(&hal, (iwl_reported_t){false, false});
+    iwl_hal_waited(&hal, (iwl_reported_t){false, true});
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
 static void test_wait_counts_for_one_look(void) {
-    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
+    iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
@@ -104,12 +104,12 @@ static void test_last_answer_is_kept(void) {
 }
 
 static void test_next_time_is_the_sooner_of_bus_and_estop(void) {
-    iw_bus_t *bus = (iw_bus_t *)(void *)&hal.bus;
+    iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 200;
     estop_due_us = 100;
-    TEST_ASSERT_EQUAL_UINT64(100, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(100, iwl_hal_next_us(&hal));
     estop_due_us = 300;
-    TEST_ASSERT_EQUAL_UINT64(200, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(200, iwl_hal_next_us(&hal));
 }
 
 static void set_up_two(void) {
@@ -121,34 +121,34 @@ static void set_up_two(void) {
     reads = 0;
 }
 
-int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
+int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen);
 
 /// "A" and "a" are one line; "B" is another of its chip, "C" one of another chip; nobody has "D".
-int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen) {
     if (name[0] == 'D') {
         return ENOENT;
     }
-    *out_seen = (iw_estop_seen_t){.offset = (name[0] == 'B') ? 5U : 4U};
+    *out_seen = (iwl_estop_seen_t){.offset = (name[0] == 'B') ? 5U : 4U};
     (void)snprintf(out_seen->node, sizeof out_seen->node, "gpiochip%c", (name[0] == 'C') ? '1' : '0');
     return 0;
 }
 
 static int open_with(const char *first, const char *second) {
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
-    const iw_estop_wish_t wish = {.name = first, .name2 = second, .discrepancy_ms = 200};
-    const int error = iw_linux_hal_open(&other, "unix:/nowhere/bus", &wish, &culprit);
+    static iwl_hal_t other;
+    const char *cause = NULL;
+    const iwl_estop_config_t config = {.name = first, .name2 = second, .discrepancy_ms = 200};
+    const int error = iwl_hal_open(&other, "unix:/nowhere/bus", &config, &cause);
     if (error == 0) {
         TEST_ASSERT_TRUE(other.two_contacts);
-        iw_linux_hal_close(&other);
+        iwl_hal_close(&other);
     } else {
-        TEST_ASSERT_EQUAL_STRING(second, culprit);
+        TEST_ASSERT_EQUAL_STRING(second, cause);
     }
     return error;
 }
 
 static void test_one_line_under_two_names_is_no_second_contact(void) {
-    if (iw_gpio_estop_ops == NULL) {
+    if (iwl_gpio_estop_ops == NULL) {
         TEST_IGNORE_MESSAGE("without libgpiod");
     }
     TEST_ASSERT_EQUAL_INT(ENOTUNIQ, open_with("A", "a"));
@@ -162,17 +162,17 @@ static void test_one_line_under_two_names_is_no_second_contact(void) {
 
 static void test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first(void) {
     static const char too_long[] = "01234567890123456789012345678901";
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
-    if (iw_gpio_estop_ops == NULL) {
+    static iwl_hal_t other;
+    const char *cause = NULL;
+    if (iwl_gpio_estop_ops == NULL) {
         TEST_IGNORE_MESSAGE("without libgpiod");
     }
-    const iw_estop_wish_t chip = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2 = too_long};
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, "unix:/nowhere/bus", &chip, &culprit));
-    TEST_ASSERT_EQUAL_STRING("B", culprit);
-    const iw_estop_wish_t line = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2_line = too_long};
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, "unix:/nowhere/bus", &line, &culprit));
-    TEST_ASSERT_EQUAL_STRING("B", culprit);
+    const iwl_estop_config_t chip = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2 = too_long};
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_hal_open(&other, "unix:/nowhere/bus", &chip, &cause));
+    TEST_ASSERT_EQUAL_STRING("B", cause);
+    const iwl_estop_config_t line = {.name = "A", .name2 = "B", .discrepancy_ms = 200, .chip2_line = too_long};
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_hal_open(&other, "unix:/nowhere/bus", &line, &cause));
+    TEST_ASSERT_EQUAL_STRING("B", cause);
 }
 
 static void test_second_contact_is_read_whatever_the_first_says(void) {
@@ -196,52 +196,52 @@ static void test_contacts_are_judged_at_the_time_of_the_round(void) {
     set_up_two();
     answer2 = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
-    iw_linux_hal_tend(&hal, 1200001U);
+    iwl_hal_poll(&hal, 1200001U);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, look());
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hal.estop_last);
 }
 
 static void test_each_contact_is_watched_tended_and_told_of(void) {
-    TEST_ASSERT_EQUAL_INT(10, iw_linux_hal_estop_fd(&hal));
-    TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop2_fd(&hal));
-    TEST_ASSERT_EQUAL_INT(1, iw_linux_hal_estop_trouble(&hal, 0));
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_estop_trouble(&hal, 1));
+    TEST_ASSERT_EQUAL_INT(10, iwl_hal_estop_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_hal_estop2_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
+    TEST_ASSERT_EQUAL_INT(0, iwl_hal_estop_trouble(&hal, 1));
     tended = 0;
-    iw_linux_hal_tend(&hal, 1);
+    iwl_hal_poll(&hal, 1);
     TEST_ASSERT_EQUAL_UINT(1, tended);
     set_up_two();
-    iw_linux_hal_tend(&hal, 2);
+    iwl_hal_poll(&hal, 2);
     TEST_ASSERT_EQUAL_UINT(12, tended);
-    TEST_ASSERT_EQUAL_INT(10, iw_linux_hal_estop_fd(&hal));
-    TEST_ASSERT_EQUAL_INT(20, iw_linux_hal_estop2_fd(&hal));
-    TEST_ASSERT_EQUAL_INT(1, iw_linux_hal_estop_trouble(&hal, 0));
-    TEST_ASSERT_EQUAL_INT(2, iw_linux_hal_estop_trouble(&hal, 1));
+    TEST_ASSERT_EQUAL_INT(10, iwl_hal_estop_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(20, iwl_hal_estop2_fd(&hal));
+    TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
+    TEST_ASSERT_EQUAL_INT(2, iwl_hal_estop_trouble(&hal, 1));
 }
 
 static void test_each_contact_is_closed(void) {
     closed = 0;
-    iw_linux_hal_close(&hal);
+    iwl_hal_close(&hal);
     TEST_ASSERT_EQUAL_UINT(1, closed);
     set_up_two();
-    iw_linux_hal_close(&hal);
+    iwl_hal_close(&hal);
     TEST_ASSERT_EQUAL_UINT(12, closed);
 }
 
 static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(void) {
-    iw_bus_t *bus = (iw_bus_t *)(void *)&hal.bus;
+    iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 5000000;
     estop_due_us = 4000000;
     estop2_due_us = 3000000;
-    TEST_ASSERT_EQUAL_UINT64(4000000, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(4000000, iwl_hal_next_us(&hal));
     set_up_two();
-    TEST_ASSERT_EQUAL_UINT64(3000000, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(3000000, iwl_hal_next_us(&hal));
     answer2 = 1;
     (void)look();
-    TEST_ASSERT_EQUAL_UINT64(1200001, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(1200001, iwl_hal_next_us(&hal));
     estop_due_us = 1100000;
-    TEST_ASSERT_EQUAL_UINT64(1100000, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(1100000, iwl_hal_next_us(&hal));
     bus->look_us = 1000000;
-    TEST_ASSERT_EQUAL_UINT64(1000000, iw_linux_hal_next_us(&hal));
+    TEST_ASSERT_EQUAL_UINT64(1000000, iwl_hal_next_us(&hal));
 }
 
 int main(void) {

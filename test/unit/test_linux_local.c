@@ -20,7 +20,7 @@
 static char folder[] = "/tmp/iwheel-linux-XXXXXX";
 static char bus_name[64];
 static char estop_name[64];
-static iw_linux_hal_t hal;
+static iwl_hal_t hal;
 static int bus_listener;
 static int estop_listener;
 static int hub;
@@ -42,15 +42,15 @@ static void press(const char *levels) {
 }
 
 static int estop(void) {
-    return iw_linux_hal_pressed(&hal);
+    return iwl_hal_pressed(&hal);
 }
 
 static iw_bus_state_t bus(void) {
-    return iw_bus_state(&hal.bus);
+    return iwl_bus_state(&hal.bus);
 }
 
 static int receive(iw_can_frame_t *out_frame) {
-    return iw_bus_receive(&hal.bus, out_frame);
+    return iwl_bus_receive(&hal.bus, out_frame);
 }
 
 static void tell(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
@@ -66,21 +66,21 @@ static bool wakes(int fd) {
 }
 
 void setUp(void) {
-    const char *culprit = NULL;
+    const char *cause = NULL;
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us = 1000000;
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&hal, bus_name, &(iw_estop_wish_t){.name = estop_name}, &culprit));
+    TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&hal, bus_name, &(iwl_estop_config_t){.name = estop_name}, &cause));
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(-1, estop());
     estop_listener = listen_at(estop_name, SOCK_STREAM); // Only now: the port would wait for its first word at start.
-    iw_linux_hal_tend(&hal, now_us);
+    iwl_hal_poll(&hal, now_us);
     button = accept(estop_listener, NULL, NULL);
     TEST_ASSERT_TRUE(button >= 0);
 }
 
 void tearDown(void) {
-    iw_linux_hal_close(&hal);
+    iwl_hal_close(&hal);
     (void)close(hub);
     (void)close(button);
     (void)close(bus_listener);
@@ -91,7 +91,7 @@ static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
+    TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
     TEST_ASSERT_EQUAL_UINT8(5, raw.len);
@@ -100,13 +100,13 @@ static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
     tell(266, 5, 1, 9);
     tell(266, 5, 0, 9);
-    TEST_ASSERT_TRUE(wakes(iw_linux_hal_bus_fd(&hal)));
+    TEST_ASSERT_TRUE(wakes(iwl_hal_bus_fd(&hal)));
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, heard.kind);
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, heard.kind);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
-    TEST_ASSERT_FALSE(wakes(iw_linux_hal_bus_fd(&hal)));
+    TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
 }
 
 static void test_local_every_frame_of_several_batches_comes_in_order(void) {
@@ -156,7 +156,7 @@ static void test_local_hub_gone_and_back_before_anybody_asked_is_reported_once(v
     (void)close(hub);
     TEST_ASSERT_EQUAL_INT(1, receive(&heard)); // What came before the end still counts.
     TEST_ASSERT_TRUE(receive(&heard) < 0);
-    iw_linux_hal_tend(&hal, now_us); // Back at once.
+    iwl_hal_poll(&hal, now_us); // Back at once.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
@@ -171,8 +171,8 @@ static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
     }
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     (void)close(hub);
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) < 0);
-    iw_linux_hal_tend(&hal, now_us); // Back at once.
+    TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
+    iwl_hal_poll(&hal, now_us); // Back at once.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
@@ -187,21 +187,21 @@ static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_
     TEST_ASSERT_TRUE(receive(&heard) < 0);
     unsigned attempts = 0;
     for (unsigned i = 0; i < 1000; i++) { // A second, asked every millisecond.
-        const iw_time_us_t before_us = iw_linux_hal_next_us(&hal);
-        iw_linux_hal_tend(&hal, now_us);
-        attempts += (iw_linux_hal_next_us(&hal) != before_us) ? 1U : 0U;
-        TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) > now_us);
-        TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) <= now_us + 200000U);
+        const iw_time_us_t before_us = iwl_hal_next_us(&hal);
+        iwl_hal_poll(&hal, now_us);
+        attempts += (iwl_hal_next_us(&hal) != before_us) ? 1U : 0U;
+        TEST_ASSERT_TRUE(iwl_hal_next_us(&hal) > now_us);
+        TEST_ASSERT_TRUE(iwl_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
-        TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) < 0);
+        TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
         TEST_ASSERT_TRUE(receive(&heard) < 0);
         now_us += 1000;
     }
     TEST_ASSERT_TRUE(attempts >= 5 && attempts <= 10);
-    TEST_ASSERT_FALSE(wakes(iw_linux_hal_bus_fd(&hal)));
+    TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us += 200000;
-    iw_linux_hal_tend(&hal, now_us);
+    iwl_hal_poll(&hal, now_us);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
@@ -260,7 +260,7 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     unsigned sent = 0;
     int result = 1;
     while (result > 0) {
-        result = iw_bus_send(&hal.bus, &frame, 1);
+        result = iwl_bus_send(&hal.bus, &frame, 1);
         sent += (result > 0) ? 1U : 0U;
         TEST_ASSERT_LESS_THAN_UINT(100000, sent);
     }
@@ -272,29 +272,29 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, iw_linux_hal_link(&hal)->purge);
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&hal.bus));
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, iw_linux_hal_link(&hal)->purge);
-    const uint32_t changes = iw_linux_hal_link(&hal)->changes;
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&hal.bus)); // There is nothing to leave.
-    TEST_ASSERT_EQUAL_UINT32(changes, iw_linux_hal_link(&hal)->changes);
+    TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_NONE, iwl_hal_link(&hal)->purge);
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus));
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, iwl_hal_link(&hal)->purge);
+    const uint32_t changes = iwl_hal_link(&hal)->changes;
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus)); // There is nothing to leave.
+    TEST_ASSERT_EQUAL_UINT32(changes, iwl_hal_link(&hal)->changes);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0)); // The end: the hub drops what it holds.
     (void)close(hub);
-    iw_linux_hal_tend(&hal, now_us);
+    iwl_hal_poll(&hal, now_us);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of before.
-    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame, 1) > 0);
+    TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
 static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
     TEST_ASSERT_EQUAL_INT(-1, estop());
     press("0");
-    TEST_ASSERT_TRUE(wakes(iw_linux_hal_estop_fd(&hal)));
+    TEST_ASSERT_TRUE(wakes(iwl_hal_estop_fd(&hal)));
     TEST_ASSERT_EQUAL_INT(0, estop());
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
@@ -329,7 +329,7 @@ static void test_estop_connection_lost_and_back_released_was_unreadable_once(voi
     TEST_ASSERT_EQUAL_INT(0, estop());
     (void)close(button);
     TEST_ASSERT_EQUAL_INT(-1, estop());
-    iw_linux_hal_tend(&hal, now_us);
+    iwl_hal_poll(&hal, now_us);
     button = accept(estop_listener, NULL, NULL);
     TEST_ASSERT_TRUE(button >= 0);
     TEST_ASSERT_EQUAL_INT(-1, estop());
@@ -339,31 +339,31 @@ static void test_estop_connection_lost_and_back_released_was_unreadable_once(voi
 }
 
 static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void) {
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
+    static iwl_hal_t other;
+    const char *cause = NULL;
     const int before = dup(0);
     (void)close(before);
-    const iw_estop_wish_t none = {.name = "none"};
-    const iw_estop_wish_t no_line = {.name = "gpiochip0:x"};
-    const iw_estop_wish_t no_path = {.name = "unix:"};
-    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, "can_of_16_letters", &none, &culprit));
-    TEST_ASSERT_EQUAL_STRING("can_of_16_letters", culprit);
-    TEST_ASSERT_NOT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, &no_line, &culprit));
-    TEST_ASSERT_EQUAL_STRING("gpiochip0:x", culprit);
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_linux_hal_open(&other, bus_name, &no_path, &culprit));
-    TEST_ASSERT_EQUAL_STRING("unix:", culprit);
+    const iwl_estop_config_t none = {.name = "none"};
+    const iwl_estop_config_t no_line = {.name = "gpiochip0:x"};
+    const iwl_estop_config_t no_path = {.name = "unix:"};
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iwl_hal_open(&other, "can_of_16_letters", &none, &cause));
+    TEST_ASSERT_EQUAL_STRING("can_of_16_letters", cause);
+    TEST_ASSERT_NOT_EQUAL_INT(0, iwl_hal_open(&other, bus_name, &no_line, &cause));
+    TEST_ASSERT_EQUAL_STRING("gpiochip0:x", cause);
+    TEST_ASSERT_EQUAL_INT(ENOENT, iwl_hal_open(&other, bus_name, &no_path, &cause));
+    TEST_ASSERT_EQUAL_STRING("unix:", cause);
     char longest[200] = "unix:";
     memset(&longest[5], 'x', 150);
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, longest, &none, &culprit));
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_hal_open(&other, longest, &none, &cause));
     const int after = dup(0);
     (void)close(after);
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
 static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
-    static iw_linux_hal_t other;
+    static iwl_hal_t other;
     static char second_name[200];
-    const char *culprit = NULL;
+    const char *cause = NULL;
     const int before = dup(0);
     (void)close(before);
     (void)snprintf(second_name, sizeof second_name, "%s2", estop_name);
@@ -379,14 +379,14 @@ static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
                 {estop_name, NULL, 0},
                 {estop_name, second_name, 0}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        const iw_estop_wish_t wish = {.name = rows[i].first, .name2 = rows[i].second, .discrepancy_ms = 200};
-        TEST_ASSERT_EQUAL_INT(rows[i].error, iw_linux_hal_open(&other, bus_name, &wish, &culprit));
+        const iwl_estop_config_t config = {.name = rows[i].first, .name2 = rows[i].second, .discrepancy_ms = 200};
+        TEST_ASSERT_EQUAL_INT(rows[i].error, iwl_hal_open(&other, bus_name, &config, &cause));
         if (rows[i].error != 0) {
-            TEST_ASSERT_EQUAL_STRING(rows[i].second, culprit);
+            TEST_ASSERT_EQUAL_STRING(rows[i].second, cause);
         } else {
             TEST_ASSERT_EQUAL(rows[i].second == second_name, other.two_contacts);
             TEST_ASSERT_EQUAL_UINT32(200000U, other.pair.limit_us);
-            iw_linux_hal_close(&other);
+            iwl_hal_close(&other);
         }
     }
     const int after = dup(0);
@@ -395,13 +395,13 @@ static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
 }
 
 static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, &(iw_estop_wish_t){.name = "none"}, &culprit));
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_pressed(&other));
-    TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop_fd(&other));
+    static iwl_hal_t other;
+    const char *cause = NULL;
+    TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&other, bus_name, &(iwl_estop_config_t){.name = "none"}, &cause));
+    TEST_ASSERT_EQUAL_INT(0, iwl_hal_pressed(&other));
+    TEST_ASSERT_EQUAL_INT(-1, iwl_hal_estop_fd(&other));
     TEST_ASSERT_FALSE(other.estop_ops->present);
-    iw_linux_hal_close(&other);
+    iwl_hal_close(&other);
 }
 
 static void lose_hub(void) {
@@ -413,15 +413,15 @@ static void lose_hub(void) {
 static void assert_waits_longer_and_longer(void) {
     static const unsigned gaps_ms[] = {20, 40, 80, 160, 200, 200};
     for (size_t i = 0; i < sizeof gaps_ms / sizeof gaps_ms[0]; i++) {
-        iw_bus_tend(&hal.bus, now_us);
-        TEST_ASSERT_EQUAL_UINT64(now_us + gaps_ms[i] * 1000U, iw_bus_next_us(&hal.bus));
-        now_us = iw_bus_next_us(&hal.bus);
+        iwl_bus_poll(&hal.bus, now_us);
+        TEST_ASSERT_EQUAL_UINT64(now_us + gaps_ms[i] * 1000U, iwl_bus_next_us(&hal.bus));
+        now_us = iwl_bus_next_us(&hal.bus);
     }
 }
 
 static void come_back(void) {
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
-    iw_bus_tend(&hal.bus, now_us);
+    iwl_bus_poll(&hal.bus, now_us);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
 }
@@ -436,14 +436,14 @@ static void test_local_hub_that_stays_away_is_tried_less_and_less_often_each_tim
 }
 
 static void test_local_hub_that_was_never_there_is_tried_as_one_that_went(void) {
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
+    static iwl_hal_t other;
+    const char *cause = NULL;
     char name[96];
     (void)snprintf(name, sizeof name, "%s.nobody", bus_name);
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, name, &(iw_estop_wish_t){.name = "none"}, &culprit));
-    iw_bus_tend(&other.bus, now_us);
-    TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, iw_bus_next_us(&other.bus));
-    iw_linux_hal_close(&other);
+    TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&other, name, &(iwl_estop_config_t){.name = "none"}, &cause));
+    iwl_bus_poll(&other.bus, now_us);
+    TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, iwl_bus_next_us(&other.bus));
+    iwl_hal_close(&other);
 }
 
 static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
@@ -451,7 +451,7 @@ static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
     for (unsigned ms = 0; ms < 5U; ms++) {
-        iw_bus_tend(&hal.bus, now_us += 1000U);
+        iwl_bus_poll(&hal.bus, now_us += 1000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     }
     (void)close(bus_listener);
@@ -462,28 +462,28 @@ static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
 }
 
 static void test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time(void) {
-    static iw_linux_hal_t other;
-    const char *culprit = NULL;
+    static iwl_hal_t other;
+    const char *cause = NULL;
     struct rlimit before;
     lose_hub();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
     const struct rlimit none = {.rlim_cur = 0, .rlim_max = before.rlim_max};
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
-    const int error = iw_linux_hal_open(&other, bus_name, &(iw_estop_wish_t){.name = "none"}, &culprit);
-    iw_bus_tend(&hal.bus, now_us);
-    const iw_time_us_t next_us = iw_bus_next_us(&hal.bus);
+    const int error = iwl_hal_open(&other, bus_name, &(iwl_estop_config_t){.name = "none"}, &cause);
+    iwl_bus_poll(&hal.bus, now_us);
+    const iw_time_us_t next_us = iwl_bus_next_us(&hal.bus);
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_INT(EMFILE, error);
     TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, next_us);
     now_us = next_us;
-    iw_bus_tend(&hal.bus, now_us);
+    iwl_bus_poll(&hal.bus, now_us);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
 static void test_local_bus_has_no_timing_and_an_echo_that_proves(void) {
-    const iw_bus_link_t *link = iw_linux_hal_link(&hal);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_LOCAL, link->presence);
+    const iwl_bus_link_t *link = iwl_hal_link(&hal);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_LOCAL, link->presence);
     TEST_ASSERT_TRUE(link->is_virtual);
     TEST_ASSERT_TRUE(link->echo_proven);
 }

@@ -21,7 +21,7 @@
 static _Alignas(struct nlmsghdr) uint8_t buffer[4096];
 static struct nlmsghdr *message;
 static struct ifinfomsg *interface;
-static iw_netlink_reading_t reading;
+static iwl_netlink_reading_t reading;
 
 /// The kernel behind the socket; shared with the process that restarts a link.
 typedef struct {
@@ -134,16 +134,16 @@ void tearDown(void) {}
 static void parse_state(uint32_t state, iw_bus_state_t expected) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.state = state});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_EQUAL(expected, reading.state);
 }
 
 static void test_controller_tells_all_it_is_asked_for(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625, .restart_ms = 100});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_EQUAL_INT(7, reading.index);
-    TEST_ASSERT_EQUAL(IW_LINK_UP, reading.link.presence);
+    TEST_ASSERT_EQUAL(IWL_LINK_UP, reading.link.presence);
     TEST_ASSERT_FALSE(reading.link.is_virtual);
     TEST_ASSERT_TRUE(reading.link.echo_proven);
     TEST_ASSERT_FALSE(reading.link.is_mute);
@@ -166,15 +166,15 @@ static void test_controller_states(void) {
 static void test_controller_modes_that_make_the_echo_a_lie_or_sending_impossible(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.mode = CAN_CTRLMODE_LOOPBACK});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.mode = CAN_CTRLMODE_PRESUME_ACK});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.mode = CAN_CTRLMODE_LISTENONLY | CAN_CTRLMODE_BERR_REPORTING});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_TRUE(reading.link.echo_proven);
     TEST_ASSERT_TRUE(reading.link.is_mute);
 }
@@ -182,15 +182,15 @@ static void test_controller_modes_that_make_the_echo_a_lie_or_sending_impossible
 static void test_controller_without_the_echo_flag_proves_nothing(void) {
     begin(IFF_UP);
     add_controller(&(controller_t){.bitrate = 1000000});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
 static void test_interface_that_is_down_has_no_state_of_its_own(void) {
     begin(IFF_ECHO);
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
-    TEST_ASSERT_EQUAL(IW_LINK_DOWN, reading.link.presence);
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
+    TEST_ASSERT_EQUAL(IWL_LINK_DOWN, reading.link.presence);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, reading.state);
 }
 
@@ -199,7 +199,7 @@ static void test_virtual_interface_has_no_timing_and_is_active_while_up(void) {
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "vcan");
     mnl_attr_nest_end(message, info);
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_TRUE(reading.link.is_virtual);
     TEST_ASSERT_FALSE(reading.link.echo_proven);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, reading.state);
@@ -210,8 +210,8 @@ static void test_interface_of_another_type_is_no_can_interface_whatever_it_tells
     begin(IFF_UP | IFF_ECHO);
     interface->ifi_type = ARPHRD_ETHER;
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
-    TEST_ASSERT_EQUAL(IW_LINK_NOT_CAN, reading.link.presence);
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
+    TEST_ASSERT_EQUAL(IWL_LINK_NOT_CAN, reading.link.presence);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, reading.state);
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
@@ -225,7 +225,7 @@ static void test_values_that_are_too_short_are_not_reported(void) {
     mnl_attr_put_u32(message, IFLA_CAN_BITTIMING, 500000);
     mnl_attr_nest_end(message, data);
     mnl_attr_nest_end(message, info);
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_EQUAL_UINT32(0, reading.link.bitrate_hz);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, reading.state);
 }
@@ -235,17 +235,17 @@ static void test_a_kind_that_only_begins_like_a_controller_is_none(void) {
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "canary");
     mnl_attr_nest_end(message, info);
-    TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_TRUE(reading.link.is_virtual);
 }
 
 static void test_messages_that_are_none_are_refused(void) {
     begin(IFF_UP);
     message->nlmsg_type = RTM_NEWADDR;
-    TEST_ASSERT_FALSE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
     begin(IFF_UP);
     message->nlmsg_len = (uint32_t)NLMSG_HDRLEN + 4U;
-    TEST_ASSERT_FALSE(iw_netlink_parse(message, &reading));
+    TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
 }
 
 static void test_attributes_cut_short_anywhere_are_survived(void) {
@@ -254,45 +254,45 @@ static void test_attributes_cut_short_anywhere_are_survived(void) {
     const uint32_t whole = message->nlmsg_len;
     for (uint32_t length = (uint32_t)NLMSG_HDRLEN + (uint32_t)sizeof *interface; length < whole; length++) {
         message->nlmsg_len = length;
-        TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
+        TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
         TEST_ASSERT_EQUAL_INT(7, reading.index);
     }
 }
 
 static void test_socket_is_bound_to_no_group_and_closed_once(void) {
-    iw_netlink_t netlink;
-    TEST_ASSERT_EQUAL_INT(0, iw_netlink_open(&netlink));
+    iwl_netlink_t netlink;
+    TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     TEST_ASSERT_EQUAL_UINT(0, kernel->groups);
     TEST_ASSERT_EQUAL_INT(MNL_SOCKET_AUTOPID, kernel->port);
-    iw_netlink_close(&netlink);
-    iw_netlink_close(&netlink);
+    iwl_netlink_close(&netlink);
+    iwl_netlink_close(&netlink);
     TEST_ASSERT_EQUAL_UINT(1, kernel->closed);
     kernel->bind_fails = true;
-    TEST_ASSERT_EQUAL_INT(EADDRINUSE, iw_netlink_open(&netlink));
+    TEST_ASSERT_EQUAL_INT(EADDRINUSE, iwl_netlink_open(&netlink));
     TEST_ASSERT_EQUAL_UINT(2, kernel->opened);
     TEST_ASSERT_EQUAL_UINT(2, kernel->closed);
 }
 
 static void test_request_has_the_answer_that_is_to_it(void) {
-    iw_netlink_t netlink;
-    TEST_ASSERT_EQUAL_INT(0, iw_netlink_open(&netlink));
+    iwl_netlink_t netlink;
+    TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     kernel->answer[0] = EPERM;
     kernel->stale = true;
-    TEST_ASSERT_EQUAL_INT(EPERM, iw_netlink_set_up(&netlink, 3, true));
-    TEST_ASSERT_EQUAL_INT(0, iw_netlink_set_up(&netlink, 3, false));
+    TEST_ASSERT_EQUAL_INT(EPERM, iwl_netlink_set_up(&netlink, 3, true));
+    TEST_ASSERT_EQUAL_INT(0, iwl_netlink_set_up(&netlink, 3, false));
     TEST_ASSERT_EQUAL_UINT(IFF_UP, kernel->flags[0]);
     TEST_ASSERT_EQUAL_UINT(0, kernel->flags[1]);
-    iw_netlink_close(&netlink);
+    iwl_netlink_close(&netlink);
 }
 
 /// Waits for the process that restarts a link; what it ended with.
 static int restarted(void) {
     pid_t process;
-    int result = IW_NETLINK_RESTART_RUNNING;
-    TEST_ASSERT_EQUAL_INT(0, iw_netlink_restart_start(3, &process));
+    int result = IWL_NETLINK_RESTART_RUNNING;
+    TEST_ASSERT_EQUAL_INT(0, iwl_netlink_restart_start(3, &process));
     siginfo_t ended;
     TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
-    result = iw_netlink_restart_poll(process);
+    result = iwl_netlink_restart_poll(process);
     return result;
 }
 
@@ -322,8 +322,8 @@ static void test_restart_that_was_killed_has_failed(void) {
         (void)raise(SIGKILL);
     }
     TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
-    TEST_ASSERT_EQUAL_INT(EIO, iw_netlink_restart_poll(process));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_netlink_restart_poll(process), "somebody else has taken its status");
+    TEST_ASSERT_EQUAL_INT(EIO, iwl_netlink_restart_poll(process));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_netlink_restart_poll(process), "somebody else has taken its status");
 }
 
 int main(void) {

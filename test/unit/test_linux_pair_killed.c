@@ -25,12 +25,12 @@ void tearDown(void) {}
 
 /// Until it is killed. After each burst it waits until all of it was received, so that no pair leaves in half for want of room.
 static _Noreturn void send_pairs(int fd) {
-    static iw_socketcan_socket_t bus;
+    static iwl_socketcan_socket_t bus;
     char go;
-    iw_socketcan_socket_use(&bus, fd, true);
+    iwl_socketcan_socket_use(&bus, fd, true);
     do {
         for (unsigned i = 0; i < BURST; i++) {
-            if (iw_socketcan_socket_send(&bus, pair, IW_SIDES) != (int)IW_SIDES) {
+            if (iwl_socketcan_socket_send(&bus, pair, IW_SIDES) != (int)IW_SIDES) {
                 _exit(1);
             }
         }

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 static const iw_can_frame_t setpoint = {.id = 266, .dlc = 5};
-static iw_backend_store_t store;
+static iwl_backend_store_t store;
 static iw_time_us_t now_us;
 static bool no_can; ///< This kernel.
 
@@ -30,21 +30,21 @@ int socket(int domain, int type, int protocol) {
     return dup(STDERR_FILENO);
 }
 
-static void tend(void) {
-    iw_bus_tend(&store, now_us);
+static void poll(void) {
+    iwl_bus_poll(&store, now_us);
 }
 
 static void wait_ms(unsigned ms) {
     now_us += (iw_time_us_t)ms * IW_US_PER_MS;
-    tend();
+    poll();
 }
 
 static iw_bus_state_t state(void) {
-    return iw_bus_state(&store);
+    return iwl_bus_state(&store);
 }
 
 static int receive(iw_can_frame_t *out_frame) {
-    return iw_bus_receive(&store, out_frame);
+    return iwl_bus_receive(&store, out_frame);
 }
 
 /// Takes all there is; the number of frames.
@@ -58,23 +58,23 @@ static unsigned drain(void) {
 }
 
 static int send_setpoint(void) {
-    return iw_bus_send(&store, &setpoint, 1);
+    return iwl_bus_send(&store, &setpoint, 1);
 }
 
-static const iw_bus_link_t *link_now(void) {
-    return iw_bus_link(&store);
+static const iwl_bus_link_t *link_now(void) {
+    return iwl_bus_link(&store);
 }
 
 void setUp(void) {
     now_us = 5000000;
     fake_interface_init();
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
-    tend();
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "can0"));
+    poll();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
 void tearDown(void) {
-    iw_bus_close(&store);
+    iwl_bus_close(&store);
 }
 
 static void test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once(void) {
@@ -99,7 +99,7 @@ static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_fol
 }
 
 static void test_nothing_is_sent_between_a_bus_off_and_its_being_told(void) {
-    for (unsigned i = 0; i < IW_SOCKETCAN_BATCH; i++) {
+    for (unsigned i = 0; i < IWL_SOCKETCAN_BATCH; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
@@ -123,9 +123,9 @@ static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
     wait_ms(20);
-    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iw_bus_next_us(&store), "heard");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "heard");
     wait_ms(200);
-    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iw_bus_next_us(&store), "seen");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iwl_bus_next_us(&store), "seen");
     for (unsigned i = 0; i < 100U; i++) {
         wait_ms(20);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
@@ -134,7 +134,7 @@ static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     wait_ms(200);
     (void)state();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_bus_next_us(&store));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_bus_next_us(&store));
 }
 
 static void test_bus_off_that_was_forged_is_told_once_and_checked_at_once(void) {
@@ -176,13 +176,13 @@ static void test_passive_lasts_until_active_and_active_does_not_end_bus_off(void
 static void test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again(void) {
     iw_can_frame_t frame;
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
     TEST_ASSERT_TRUE(receive(&frame) < 0);
-    fake_interface.presence = IW_LINK_UP;
+    fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
     fake_interface_put(&fake_interface.ours, 288, 4, MSG_CONFIRM);
     wait_ms(1);
@@ -192,12 +192,12 @@ static void test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_
 
 static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old(void) {
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
-    fake_interface.presence = IW_LINK_UP;
+    fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
     fake_interface.late = 40;
-    tend();
+    poll();
     TEST_ASSERT_EQUAL_UINT(0, drain());
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     TEST_ASSERT_EQUAL_UINT(1, drain());
@@ -205,7 +205,7 @@ static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_
 
 static void test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody(void) {
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
@@ -240,11 +240,11 @@ static void test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_onc
 
 static void test_interface_that_was_deleted_and_made_again_gets_new_sockets(void) {
     fake_interface.ours.error = ENODEV;
-    fake_interface.presence = IW_LINK_ABSENT;
+    fake_interface.presence = IWL_LINK_ABSENT;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
-    fake_interface.presence = IW_LINK_UP;
+    fake_interface.presence = IWL_LINK_UP;
     fake_interface.index = 4;
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.opened);
@@ -288,12 +288,12 @@ static void test_netlink_that_does_not_answer_leaves_an_interface_that_is_up(voi
 
 static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period(void) {
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
-    tend();
-    TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iw_bus_next_us(&store));
+    poll();
+    TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iwl_bus_next_us(&store));
     const unsigned before = fake_interface.readings;
-    fake_interface.presence = IW_LINK_UP;
+    fake_interface.presence = IWL_LINK_UP;
     wait_ms(199);
     TEST_ASSERT_EQUAL_UINT(before, fake_interface.readings);
     wait_ms(1);
@@ -302,7 +302,7 @@ static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its
 
 static void test_interface_that_stays_down_is_no_news(void) {
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
     wait_ms(200);
     const uint32_t changes = link_now()->changes;
@@ -320,14 +320,14 @@ static unsigned descriptors(void) {
 }
 
 static void assert_not_opened(int error) {
-    TEST_ASSERT_EQUAL_INT(error, iw_bus_open(&store, "can0"));
+    TEST_ASSERT_EQUAL_INT(error, iwl_bus_open(&store, "can0"));
     no_can = false;
     fake_interface.open_error = 0;
     fake_interface.events_dead = false;
 }
 
 static void test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open(void) {
-    iw_bus_close(&store);
+    iwl_bus_close(&store);
     const unsigned before = descriptors();
     no_can = true;
     assert_not_opened(EAFNOSUPPORT);
@@ -338,25 +338,25 @@ static void test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open(void)
     TEST_ASSERT_EQUAL_UINT(before, descriptors());
     setUp();
     TEST_ASSERT_GREATER_THAN_UINT(before, descriptors());
-    iw_bus_close(&store);
+    iwl_bus_close(&store);
     TEST_ASSERT_EQUAL_UINT(before, descriptors());
     setUp();
 }
 
 static void test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing(void) {
-    iw_bus_close(&store);
-    fake_interface.presence = IW_LINK_DOWN;
+    iwl_bus_close(&store);
+    fake_interface.presence = IWL_LINK_DOWN;
     fake_interface.netlink_fails = true;
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
-    TEST_ASSERT_EQUAL_INT(IW_LINK_DOWN, link_now()->presence);
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "can0"));
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_DOWN, link_now()->presence);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
 }
 
 static void test_interface_without_sockets_is_down_until_it_has_some(void) {
     iw_can_frame_t frame;
-    iw_bus_close(&store);
+    iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "can0"));
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     TEST_ASSERT_EQUAL_INT(-1, receive(&frame));
@@ -373,23 +373,23 @@ static void test_full_queue_is_no_loss(void) {
 }
 
 static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&store));
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&store));
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
     TEST_ASSERT_EQUAL_INT(3, fake_interface.restarted);
     const uint32_t changes = link_now()->changes;
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, link_now()->purge);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_NONE, link_now()->purge);
     fake_interface.restart_result = 0;
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, link_now()->purge);
     TEST_ASSERT_TRUE(link_now()->changes != changes);
-    (void)iw_bus_purge(&store);
+    (void)iwl_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
 }
 
 static void test_purge_is_remembered_over_a_reading_that_brings_something_else(void) {
-    (void)iw_bus_purge(&store);
+    (void)iwl_bus_purge(&store);
     fake_interface.restart_result = 0;
     wait_ms(1);
     fake_interface.ours.error = ENETDOWN;
@@ -397,7 +397,7 @@ static void test_purge_is_remembered_over_a_reading_that_brings_something_else(v
     fake_interface.link.restart_ms = 77;
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT32(77, link_now()->restart_ms);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, link_now()->purge);
 }
 
 static void test_load_counts_the_frames_of_ours_and_of_others(void) {
@@ -422,20 +422,20 @@ static void test_load_counts_the_frames_of_ours_and_of_others(void) {
 }
 
 static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
-    (void)iw_bus_purge(&store);
+    (void)iwl_bus_purge(&store);
     fake_interface.restart_result = EPERM;
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NOT_ALLOWED, link_now()->purge);
-    (void)iw_bus_purge(&store);
+    TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_NOT_ALLOWED, link_now()->purge);
+    (void)iwl_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
 }
 
 static void test_purge_where_the_echo_proves_nothing_leaves_the_link_alone(void) {
-    iw_bus_close(&store);
+    iwl_bus_close(&store);
     fake_interface_init();
     fake_interface.link.echo_proven = false;
-    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "vcan0"));
-    (void)iw_bus_purge(&store);
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_open(&store, "vcan0"));
+    (void)iwl_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.restarts);
 }
 
@@ -508,21 +508,21 @@ static void test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_ag
 
 static void test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus(void) {
     fake_interface.news = true;
-    iw_bus_waited(&store, false);
+    iwl_bus_waited(&store, false);
     wait_ms(1);
     TEST_ASSERT_TRUE(fake_interface.news);
-    iw_bus_waited(&store, true);
+    iwl_bus_waited(&store, true);
     wait_ms(1);
     TEST_ASSERT_FALSE(fake_interface.news);
 }
 
 static void test_interface_that_is_back_is_found_whatever_the_wait_has_told(void) {
     fake_interface.ours.error = ENETDOWN;
-    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
-    fake_interface.presence = IW_LINK_UP;
+    fake_interface.presence = IWL_LINK_UP;
     fake_interface.news = true;
-    iw_bus_waited(&store, false);
+    iwl_bus_waited(&store, false);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss, once.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());

@@ -17,11 +17,11 @@ static FILE *out;
 static char *told;
 static size_t told_size;
 
-static void begin(history_wish_t wish) {
+static void begin(history_config_t config) {
     out = open_memstream(&told, &told_size);
-    wish.since_us = (wish.since_us > 0) ? wish.since_us : EVENING_US;
-    wish.until_us = (wish.until_us > 0) ? wish.until_us : EVENING_US + 3600 * SECOND_US;
-    TEST_ASSERT_TRUE(history_open(&history, &wish, out));
+    config.since_us = (config.since_us > 0) ? config.since_us : EVENING_US;
+    config.until_us = (config.until_us > 0) ? config.until_us : EVENING_US + 3600 * SECOND_US;
+    TEST_ASSERT_TRUE(history_open(&history, &config, out));
     history.has_info = true;
 }
 
@@ -59,7 +59,7 @@ static void other(const char *name, const char *payload) {
 }
 
 static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 61, 62);
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
     history_sum(&history, "n1");
@@ -68,7 +68,7 @@ static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(voi
 }
 
 static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 2, 2, 2, 2);
     stop("a", 1, 1, 1, 3);
@@ -82,7 +82,7 @@ static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_brid
 }
 
 static void test_history_gap_in_numbers_is_told_before_the_event_behind_it(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 2, 2, 2);
     const char *note = strstr(text(), "-- 3 events before this one are not in the stream");
@@ -93,7 +93,7 @@ static void test_history_gap_in_numbers_is_told_before_the_event_behind_it(void)
 }
 
 static void test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 7, 1, 1);
     stop("a", 2, 10, 2, 2);
     TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 stops before this one are not in the stream"));
@@ -104,7 +104,7 @@ static void test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_coun
 }
 
 static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     other("fault",
           "{\"id\":\"a-4\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
@@ -114,7 +114,7 @@ static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_n
 }
 
 static void test_history_event_that_comes_late_is_no_double_and_no_gap(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 5, 2, 2);
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
@@ -144,7 +144,7 @@ static void info(const char *boot, int stop_number, int when_s, int last, int wa
 }
 
 static void test_history_gap_at_the_end_shows_by_info(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     stop("a", 4, 4, 1, 1);
     history_end(&history);
@@ -157,19 +157,19 @@ static void test_history_gap_at_the_end_shows_by_info(void) {
 }
 
 static void test_history_gap_of_a_machine_without_any_event_shows_by_info(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     history_end(&history);
     TEST_ASSERT_EQUAL_UINT64(1, history.unheard);
     tearDown();
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     info("a", 7, -30, 12, 0, 0);
     history_end(&history);
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.unheard, "its last stop was before the span");
 }
 
 static void test_history_end_without_a_gap_says_nothing(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     info("a", 4, 1, 6, 2, 0);
     stop("a", 4, 4, 1, 1);
     const size_t before = strlen(text());
@@ -178,7 +178,7 @@ static void test_history_end_without_a_gap_says_nothing(void) {
 }
 
 static void test_history_whose_end_is_not_checked_says_so(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     history.has_info = false;
     history_end(&history);
     history_sum(&history, "n1");
@@ -186,20 +186,20 @@ static void test_history_whose_end_is_not_checked_says_so(void) {
 }
 
 static void test_history_gap_has_its_cause(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     info("a", 4, 1, 9, 0, 5);
     stop("a", 1, 1, 1, 1);
     stop("a", 9, 2, 2, 2);
     TEST_ASSERT_NOT_NULL(strstr(text(), "its full spool dropped 5 events"));
     tearDown();
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 9, 2, 2, 2);
     TEST_ASSERT_NOT_NULL(strstr(text(), "dropped from its full spool, or confirmed by the broker and not stored"));
 }
 
 static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(void) {
-    begin((history_wish_t){.all = true});
+    begin((history_config_t){.all = true});
     stop("a", 1, 1, 1, 1);
     other("fault",
           "{\"id\":\"b-2\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
@@ -208,7 +208,7 @@ static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(
 }
 
 static void test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     stop("a", 1, 1, -100, -90);
     stop("a", 2, 2, 3599, 9000);
     stop("a", 3, 3, -1000000, 10);
@@ -222,7 +222,7 @@ static void test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing(vo
 }
 
 static void test_history_missed_stop_is_told_at_its_own_time_and_as_told_late(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
                   "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
     TEST_ASSERT_NOT_NULL(
@@ -230,7 +230,7 @@ static void test_history_missed_stop_is_told_at_its_own_time_and_as_told_late(vo
 }
 
 static void test_history_json_nests_the_message_and_ends_with_the_sum(void) {
-    begin((history_wish_t){.json = true});
+    begin((history_config_t){.json = true});
     stop("a", 1, 1, 1, 2);
     stop("b", 4, 4, 2, 3);
     history_sum(&history, "n1");
@@ -243,7 +243,7 @@ static void test_history_json_nests_the_message_and_ends_with_the_sum(void) {
 }
 
 static void test_history_garbage_is_counted_and_moves_no_terminal(void) {
-    begin((history_wish_t){.all = true});
+    begin((history_config_t){.all = true});
     other("stop", "{");
     other("stop", "[]");
     other("stop", "");
@@ -257,7 +257,7 @@ static void test_history_garbage_is_counted_and_moves_no_terminal(void) {
 }
 
 static void test_history_ends_when_nobody_reads_it(void) {
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     FILE *full = fopen("/dev/full", "w");
     TEST_ASSERT_NOT_NULL(full);
     (void)setvbuf(full, NULL, _IONBF, 0);
@@ -271,7 +271,7 @@ static void test_history_ends_when_nobody_reads_it(void) {
 
 static void test_times_are_read_as_people_write_them_and_nothing_else(void) {
     int64_t us = 0;
-    begin((history_wish_t){0});
+    begin((history_config_t){0});
     static const char *const good[] = {"2026-11-21T22:00:00", "2026-11-21 22:00", "2026-11-21T22:00",
                                        "2026-11-21T22:00Z"};
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {

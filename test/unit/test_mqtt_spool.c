@@ -295,7 +295,7 @@ static void test_spool_disk_full_at_every_byte_loses_nothing_and_recovers(void) 
         mqtt_spool_confirm(&spool, 1);
         (void)setrlimit(RLIMIT_FSIZE, &before);
         expect(2, 6);
-        mqtt_spool_tend(&spool);
+        mqtt_spool_poll(&spool);
         TEST_ASSERT_FALSE(spool.behind);
         reopen();
         expect(2, 6);

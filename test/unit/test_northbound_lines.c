@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A connection of the northbound socket: bytes in, lines out.
-#include "sockets/client.h"
 #include "sockets/log.h"
+#include "sockets/sock_client.h"
 
 #include "unity.h"
 
@@ -10,9 +10,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-static gw_client_t client;
+static sock_client_t client;
 static int peer;
-static char big[GW_REPLY_MAX];
+static char big[SOCK_REPLY_MAX];
 
 void setUp(void) {
     int pair[2];
@@ -32,21 +32,21 @@ void tearDown(void) {
 
 static void say(const char *text) {
     TEST_ASSERT_EQUAL_INT((int)strlen(text), (int)send(peer, text, strlen(text), MSG_NOSIGNAL));
-    gw_client_read(&client);
+    sock_client_read(&client);
 }
 
 static void expect_line(const char *text) {
     size_t length = 0;
-    const char *line = gw_client_line(&client, &length);
+    const char *line = sock_client_line(&client, &length);
     TEST_ASSERT_NOT_NULL(line);
     TEST_ASSERT_EQUAL_UINT(strlen(text), length);
     TEST_ASSERT_EQUAL_INT(0, memcmp(text, line, length));
-    gw_client_drop_line(&client, length);
+    sock_client_drop_line(&client, length);
 }
 
 static void expect_no_line(void) {
     size_t length = 0;
-    TEST_ASSERT_NULL(gw_client_line(&client, &length));
+    TEST_ASSERT_NULL(sock_client_line(&client, &length));
 }
 
 /// Everything that the other side can read now.
@@ -54,7 +54,7 @@ static size_t drain(char *text, size_t size) {
     size_t total = 0;
     ssize_t count = 1;
     while (count > 0) {
-        gw_client_flush(&client);
+        sock_client_flush(&client);
         count = recv(peer, (text == NULL) ? big : &text[total], (text == NULL) ? sizeof big : size - total, 0);
         total += (count > 0) ? (size_t)count : 0U;
     }
@@ -86,43 +86,43 @@ static void test_client_several_lines_in_one_read_come_in_order_and_half_a_line_
 static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
     say("stop");
     (void)shutdown(peer, SHUT_WR);
-    gw_client_read(&client);
-    TEST_ASSERT_EQUAL_INT(GW_ENDED, client.phase);
+    sock_client_read(&client);
+    TEST_ASSERT_EQUAL_INT(SOCK_ENDED, client.phase);
     expect_no_line();
 }
 
 static void test_client_line_of_4096_bytes_fits_and_4097_are_too_long(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX, (int)send(peer, big, IWN_LINE_MAX, 0));
-    gw_client_read(&client);
-    TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
+    sock_client_read(&client);
+    TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
     say("\n");
-    TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
-    gw_client_drop_line(&client, IWN_LINE_MAX);
+    TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
+    sock_client_drop_line(&client, IWN_LINE_MAX);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
     TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX + 1, (int)send(peer, big, IWN_LINE_MAX + 1U, 0));
-    gw_client_read(&client);
-    TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
+    sock_client_read(&client);
+    TEST_ASSERT_TRUE(sock_client_line_too_long(&client));
 }
 
 static void test_client_reply_goes_out_whole(void) {
     char text[64] = "";
-    gw_client_reply(&client, "hello\n", 6);
-    TEST_ASSERT_FALSE(gw_client_flushed(&client));
+    sock_client_reply(&client, "hello\n", 6);
+    TEST_ASSERT_FALSE(sock_client_flushed(&client));
     TEST_ASSERT_EQUAL_UINT(6, drain(text, sizeof text));
     TEST_ASSERT_EQUAL_STRING("hello\n", text);
-    TEST_ASSERT_TRUE(gw_client_flushed(&client));
+    TEST_ASSERT_TRUE(sock_client_flushed(&client));
 }
 
 static void test_client_that_does_not_read_loses_events_and_is_told_how_many(void) {
     unsigned sent = 0;
     while (client.lost < 5U) { // Socket full, then our half full.
-        gw_client_event(&client, big, 1000);
-        gw_client_flush(&client);
+        sock_client_event(&client, big, 1000);
+        sock_client_flush(&client);
         TEST_ASSERT_LESS_THAN_UINT(10000, sent++);
     }
-    TEST_ASSERT_FALSE(gw_client_is_broken(&client));
+    TEST_ASSERT_FALSE(sock_client_is_broken(&client));
     (void)drain(NULL, 0);
-    gw_client_event(&client, "after\n", 6);
+    sock_client_event(&client, "after\n", 6);
     char text[128] = "";
     (void)drain(text, sizeof text);
     TEST_ASSERT_EQUAL_STRING("{\"event\":\"lost\",\"count\":5}\nafter\n", text);
@@ -131,41 +131,41 @@ static void test_client_that_does_not_read_loses_events_and_is_told_how_many(voi
 
 static void test_client_room_for_the_longest_reply_is_kept_free_of_events(void) {
     while (client.lost == 0U) {
-        gw_client_event(&client, big, 1000);
+        sock_client_event(&client, big, 1000);
     }
-    gw_client_reply(&client, big, GW_REPLY_MAX);
-    TEST_ASSERT_FALSE(gw_client_is_broken(&client));
-    gw_client_reply(&client, big, GW_REPLY_MAX);
-    TEST_ASSERT_TRUE(gw_client_is_broken(&client));
+    sock_client_reply(&client, big, SOCK_REPLY_MAX);
+    TEST_ASSERT_FALSE(sock_client_is_broken(&client));
+    sock_client_reply(&client, big, SOCK_REPLY_MAX);
+    TEST_ASSERT_TRUE(sock_client_is_broken(&client));
 }
 
 static void test_client_event_to_one_that_is_leaving_is_dropped(void) {
-    gw_client_finish(&client, 1000);
-    gw_client_event(&client, "x\n", 2);
-    TEST_ASSERT_TRUE(gw_client_flushed(&client));
-    TEST_ASSERT_EQUAL_UINT64(1000U + GW_CLOSING_US, client.close_us);
-    gw_client_finish(&client, 5000); // Only the first time counts.
-    TEST_ASSERT_EQUAL_UINT64(1000U + GW_CLOSING_US, client.close_us);
+    sock_client_finish(&client, 1000);
+    sock_client_event(&client, "x\n", 2);
+    TEST_ASSERT_TRUE(sock_client_flushed(&client));
+    TEST_ASSERT_EQUAL_UINT64(1000U + SOCK_CLOSING_US, client.close_us);
+    sock_client_finish(&client, 5000); // Only the first time counts.
+    TEST_ASSERT_EQUAL_UINT64(1000U + SOCK_CLOSING_US, client.close_us);
 }
 
 static void test_client_gone_is_noticed_when_written_to(void) {
     (void)close(peer);
-    gw_client_reply(&client, "x\n", 2);
-    gw_client_flush(&client);
-    TEST_ASSERT_TRUE(gw_client_is_broken(&client));
+    sock_client_reply(&client, "x\n", 2);
+    sock_client_flush(&client);
+    TEST_ASSERT_TRUE(sock_client_is_broken(&client));
     peer = -1;
 }
 
 static void test_log_line_is_plain_whatever_stands_in_it(void) {
     char line[256] = "";
     int ends[2];
-    gw_log_t log;
+    sock_log_t log;
     const int before = dup(STDERR_FILENO);
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     TEST_ASSERT_EQUAL_INT(STDERR_FILENO, dup2(ends[1], STDERR_FILENO));
-    gw_log_open(&log, GW_LOG_INFO);
-    gw_log(&log, GW_LOG_INFO, "from %s", "\x1b[2J\n\xC2\x9B\xE2\x80\xAE\x9B\xC3\xA9");
-    gw_log_close(&log);
+    sock_log_open(&log, SOCK_LOG_INFO);
+    sock_log(&log, SOCK_LOG_INFO, "from %s", "\x1b[2J\n\xC2\x9B\xE2\x80\xAE\x9B\xC3\xA9");
+    sock_log_close(&log);
     (void)dup2(before, STDERR_FILENO);
     (void)close(before);
     (void)close(ends[1]);
@@ -177,35 +177,35 @@ static void test_log_line_is_plain_whatever_stands_in_it(void) {
 static void test_client_request_right_after_calm_was_sent_now(void) {
     say("{}\n");
     client.caught_up_us = 1000000;
-    TEST_ASSERT_EQUAL_UINT64(1025000, gw_client_sent_us(&client, 1025000, 0));
-    TEST_ASSERT_EQUAL_UINT64(1000000, gw_client_sent_us(&client, 1025001, 0));
-    TEST_ASSERT_EQUAL_UINT64(1000000, gw_client_sent_us(&client, 1000001, 1000001));
+    TEST_ASSERT_EQUAL_UINT64(1025000, sock_client_sent_us(&client, 1025000, 0));
+    TEST_ASSERT_EQUAL_UINT64(1000000, sock_client_sent_us(&client, 1025001, 0));
+    TEST_ASSERT_EQUAL_UINT64(1000000, sock_client_sent_us(&client, 1000001, 1000001));
 }
 
 static void test_client_with_a_line_left_is_not_caught_up(void) {
     say("{}\n{}\n");
-    gw_client_note_caught_up(&client, 5);
+    sock_client_note_caught_up(&client, 5);
     expect_line("{}");
-    gw_client_note_caught_up(&client, 6);
+    sock_client_note_caught_up(&client, 6);
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
     expect_line("{}");
-    gw_client_note_caught_up(&client, 7);
+    sock_client_note_caught_up(&client, 7);
     TEST_ASSERT_EQUAL_UINT64(7, client.caught_up_us);
 }
 
 static void test_client_caught_up_later_is_not_forgotten_for_an_earlier_time(void) {
-    gw_client_check_caught_up(&client, 9);
-    gw_client_note_caught_up(&client, 8);
+    sock_client_check_caught_up(&client, 9);
+    sock_client_note_caught_up(&client, 8);
     TEST_ASSERT_EQUAL_UINT64(9, client.caught_up_us);
 }
 
 static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_INT(3, (int)send(peer, "{}\n", 3, MSG_NOSIGNAL));
-    gw_client_check_caught_up(&client, 5);
+    sock_client_check_caught_up(&client, 5);
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
-    gw_client_read(&client);
+    sock_client_read(&client);
     expect_line("{}");
-    gw_client_check_caught_up(&client, 6);
+    sock_client_check_caught_up(&client, 6);
     TEST_ASSERT_EQUAL_UINT64(6, client.caught_up_us);
 }
 
@@ -213,8 +213,8 @@ static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
     }
-    gw_client_read(&client);
-    gw_client_note_caught_up(&client, 5);
+    sock_client_read(&client);
+    sock_client_note_caught_up(&client, 5);
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
 }
 
@@ -223,15 +223,15 @@ static void test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ende
     while (client.in_length < room) {
         const size_t part = (room - client.in_length < sizeof big) ? room - client.in_length : sizeof big;
         TEST_ASSERT_EQUAL_INT((int)part, (int)send(peer, big, part, MSG_NOSIGNAL));
-        gw_client_read(&client);
+        sock_client_read(&client);
     }
     TEST_ASSERT_EQUAL_INT(1, (int)send(peer, "x", 1, MSG_NOSIGNAL));
-    gw_client_read(&client);
-    TEST_ASSERT_NOT_EQUAL_INT(GW_ENDED, client.phase);
-    TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
+    sock_client_read(&client);
+    TEST_ASSERT_NOT_EQUAL_INT(SOCK_ENDED, client.phase);
+    TEST_ASSERT_TRUE(sock_client_line_too_long(&client));
     client.in_length = 0;
-    client.phase = GW_CLOSING;
-    gw_client_read(&client);
+    client.phase = SOCK_CLOSING;
+    sock_client_read(&client);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
 }
 

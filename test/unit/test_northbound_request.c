@@ -93,7 +93,7 @@ static void test_request_id_of_another_kind_is_refused(void) {
 
 static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(void) {
     accepted("{\"cmd\":\"confirm\",\"item\":\"wheel_radius\",\"value\":192}", IWN_CMD_CONFIRM);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_WHEEL_RADIUS, request.item);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_WHEEL_RADIUS, request.item);
     TEST_ASSERT_EQUAL_STRING("192", request.value);
     accepted("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"10/3\"}", IWN_CMD_CONFIRM);
     TEST_ASSERT_EQUAL_STRING("10/3", request.value);
@@ -104,7 +104,7 @@ static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(vo
     TEST_ASSERT_EQUAL_STRING("", request.how);
     accepted("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":540,\"how\":\"bringup: 3 full turns\"}",
              IWN_CMD_CONFIRM);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_TRACK, request.item);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_TRACK, request.item);
     TEST_ASSERT_EQUAL_STRING("bringup: 3 full turns", request.how);
     refused(IWN_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"how\":\"\"}");
     refused(IWN_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"how\":\"a\\nb\"}");

@@ -113,8 +113,8 @@ static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
     for (unsigned error = 0; error < IWN_ERRORS; error++) {
         TEST_ASSERT_TRUE(strcmp("unknown", iwn_error_name((iwn_error_t)error)) != 0);
     }
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        TEST_ASSERT_TRUE(strcmp("unknown", iwn_ledger_item_name((iw_ledger_item_t)item)) != 0);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", iwn_assumption_item_name((iw_assumption_item_t)item)) != 0);
     }
     TEST_ASSERT_EQUAL_STRING("offset_doubted", iwn_force_validity_name(IW_FORCE_OFFSET_DOUBTED));
     TEST_ASSERT_EQUAL_STRING("unreadable", iwn_estop_name(-1, true));

@@ -162,7 +162,7 @@ static void test_snapshot_is_read_and_unknown_stays_unknown(void) {
 
 static void test_ledger_gives_measures_and_what_is_contradicted(void) {
     const iwc_message_t message = snapshot();
-    ros_facts_read_ledger(&message, &facts.machine);
+    ros_facts_read_assumptions(&message, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
     TEST_ASSERT_EQUAL_INT64(600, facts.machine.track_mm);
     TEST_ASSERT_TRUE(facts.machine.measures.radius_confirmed);
@@ -178,7 +178,7 @@ static void test_track_that_is_not_configured_is_none(void) {
     static const char unset[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"value\":\"192\"},\"track\":{\"value\":null}}}";
     const iwc_message_t seen = {.text = unset, .length = sizeof unset - 1U, .is_event = true};
-    ros_facts_read_ledger(&seen, &facts.machine);
+    ros_facts_read_assumptions(&seen, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(192, facts.machine.radius_mm);
     TEST_ASSERT_EQUAL_INT64(0, facts.machine.track_mm);
 }
@@ -198,14 +198,14 @@ static void test_configuration_stands_for_the_values_that_a_board_has_not(void) 
     TEST_ASSERT_TRUE(ros_facts_lack_values(&seen));
     TEST_ASSERT_FALSE(ros_facts_lack_values(&whole));
     ros_facts_read_config(&reply, &facts.machine);
-    ros_facts_read_ledger(&seen, &facts.machine);
+    ros_facts_read_assumptions(&seen, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(150, facts.machine.radius_mm);
     TEST_ASSERT_EQUAL_INT64(610, facts.machine.track_mm);
     TEST_ASSERT_TRUE(facts.machine.setpoint_current && facts.machine.measures.track_confirmed);
     expect_near(1e-9, 2.0 * M_PI * 0.15 / 60.0 / 2.5, facts.machine.measures.tick_m);
     const iwc_message_t cut = {.text = config, .length = 60};
     ros_facts_read_config(&cut, &facts.machine); // A reply that is none: what is known stays.
-    ros_facts_read_ledger(&whole, &facts.machine);
+    ros_facts_read_assumptions(&whole, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
 }
 
@@ -280,7 +280,7 @@ static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
     facts.machine.now.right.heard = false;
     expect(ROS_TELLS_RIGHT, ROS_ERROR, "power and cable");
     (void)snprintf(facts.machine.contradicted, sizeof facts.machine.contradicted, "track: no");
-    expect(ROS_TELLS_LEDGER, ROS_ERROR, "track: no");
+    expect(ROS_REPORTS_ASSUMPTIONS, ROS_ERROR, "track: no");
 }
 
 static void test_diagnosis_commands_tell_what_keeps_them_from_driving(void) {

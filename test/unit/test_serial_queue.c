@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What waits between a client and a board: in order, bounded, replaced by what is newer, never sent late.
-#include "queue.h"
+#include "serial_queue.h"
 
 #include "unity.h"
 

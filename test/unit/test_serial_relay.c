@@ -36,24 +36,24 @@ static bool (*script)(void); // Called before each wait; true: the relay ends.
 
 // ---- instead of the port, the clock and the wait ------------------------------------------------------------------
 
-iw_time_us_t iw_clock_now_us(void) {
+iw_time_us_t iwl_clock_now_us(void) {
     return now_us;
 }
 
-iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us) {
+iw_time_us_t iwl_clock_awake_us(iw_time_us_t suspended_us) {
     return now_us - suspended_us;
 }
 
-iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
+iw_time_us_t iwl_clock_read(iw_time_us_t *out_suspended_us) {
     *out_suspended_us = 0;
     return now_us;
 }
 
-iw_time_us_t iw_clock_suspended_us(void) {
+iw_time_us_t iwl_clock_suspended_us(void) {
     return 0;
 }
 
-int64_t iw_clock_wall_us(void) {
+int64_t iwl_clock_wall_us(void) {
     return (int64_t)now_us;
 }
 
@@ -102,17 +102,17 @@ bool serial_port_has_baud(uint32_t baud) {
     return baud > 0U;
 }
 
-int gw_wakeup_open(gw_wakeup_t *self) {
+int sock_wakeup_open(sock_wakeup_t *self) {
     self->fd = epoll_create1(EPOLL_CLOEXEC);
     return 0;
 }
 
-void gw_wakeup_close(gw_wakeup_t *self) {
+void sock_wakeup_close(sock_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t read_us,
-                   iw_time_us_t until_us) {
+int sock_wakeup_wait(const sock_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t read_us,
+                     iw_time_us_t until_us) {
     (void)read_us;
     (void)until_us;
     now_us += STEP_MS * 1000U;
@@ -120,10 +120,10 @@ int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room
     step++;
     int count = epoll_wait(self->fd, events, room - 2, 0);
     if (to_relay_length > 0U) {
-        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
     }
     if (ends) {
-        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_SIGNAL}};
+        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = SOCK_TAG_SIGNAL}};
     }
     return count;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
 #include "daemon.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -24,14 +24,14 @@ static int peer[CROWD];
 static char drained[1U << 20];
 
 static void begin_core(void) {
-    const iw_estop_wish_t estop = {.name = "none"};
-    const char *culprit = "";
+    const iwl_estop_config_t estop = {.name = "none"};
+    const char *cause = "";
     gateway_config_default(&daemon_->config);
     gw_daemon_compose(daemon_);
-    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon_->box, &(gw_box_wish_t){.blackbox_s = 0}));
-    TEST_ASSERT_EQUAL_INT_MESSAGE(
-        0, iw_linux_hal_open(&daemon_->wheels.hal, "unix:/nonexistent/iwheel-bus", &estop, &culprit), culprit);
-    daemon_->wheels.now_us = iw_clock_now_us();
+    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon_->box, &(gw_box_config_t){.blackbox_s = 0}));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_hal_open(&daemon_->wheels.hal, "unix:/nonexistent/iwheel-bus", &estop, &cause),
+                                  cause);
+    daemon_->wheels.now_us = iwl_clock_now_us();
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK,
                           gw_wheels_begin(&daemon_->wheels, &daemon_->config.core, daemon_->box.ring, false));
 }
@@ -39,13 +39,13 @@ static void begin_core(void) {
 static void connect_crowd(void) {
     for (unsigned i = 0; i < CROWD; i++) {
         int pair[2];
-        gw_client_t *client = &daemon_->clients.client[i];
+        sock_client_t *client = &daemon_->clients.client[i];
         TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair));
         client->id = i + 1U;
         client->fd = pair[0];
         peer[i] = pair[1];
-        daemon_->clients.count[GW_DRIVE]++;
-        daemon_->clients.open[GW_DRIVE] |= UINT64_C(1) << i;
+        daemon_->clients.count[SOCK_DRIVE]++;
+        daemon_->clients.open[SOCK_DRIVE] |= UINT64_C(1) << i;
     }
 }
 
@@ -62,7 +62,7 @@ static void all_ask(void) {
 void setUp(void) {
     daemon_ = (gw_daemon_t *)calloc(1, sizeof *daemon_);
     daemon_->clients.epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    gw_log_open(&daemon_->log, GW_LOG_ERROR);
+    sock_log_open(&daemon_->log, SOCK_LOG_ERROR);
     begin_core();
     connect_crowd();
     all_ask();
@@ -74,9 +74,9 @@ void tearDown(void) {
         (void)close(peer[i]);
     }
     gw_box_close(&daemon_->box);
-    iw_linux_hal_close(&daemon_->wheels.hal);
+    iwl_hal_close(&daemon_->wheels.hal);
     (void)close(daemon_->clients.epoll_fd);
-    gw_log_close(&daemon_->log);
+    sock_log_close(&daemon_->log);
     free(daemon_);
 }
 
@@ -93,16 +93,16 @@ static unsigned served(void) {
 }
 
 static void test_round_serves_no_crowd_at_once_and_says_that_somebody_waits(void) {
-    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+    sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_GREATER_THAN_UINT(0, served());
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
-    TEST_ASSERT_TRUE(gw_service_is_busy(&daemon_->clients));
+    TEST_ASSERT_TRUE(sock_service_is_busy(&daemon_->clients));
 }
 
 static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn(void) {
     unsigned before = 0;
     for (unsigned rounds = 0; served() < CROWD; rounds++) {
-        gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+        sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
         TEST_ASSERT_GREATER_THAN_UINT(before, served());
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
         for (unsigned i = 0; i < served(); i++) {
@@ -110,19 +110,19 @@ static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn
         }
         before = served();
     }
-    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+    sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_FALSE(daemon_->clients.some_wait);
 }
 
 static void test_round_begins_with_the_holder_of_the_lease(void) {
-    gw_service_clients(&daemon_->clients, CROWD);
+    sock_service_clients(&daemon_->clients, CROWD);
     TEST_ASSERT_TRUE(is_served(CROWD - 1U));
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
 }
 
 static void test_round_a_client_that_was_not_reached_is_not_caught_up(void) {
-    daemon_->clients.now_us = iw_clock_now_us();
-    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+    daemon_->clients.now_us = iwl_clock_now_us();
+    sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_FALSE(is_served(CROWD - 1U));
     TEST_ASSERT_EQUAL_UINT64(0, daemon_->clients.client[CROWD - 1U].caught_up_us);
     TEST_ASSERT_EQUAL_UINT64(daemon_->clients.now_us, daemon_->clients.client[0].caught_up_us);
@@ -130,10 +130,10 @@ static void test_round_a_client_that_was_not_reached_is_not_caught_up(void) {
 
 static void test_round_of_sending_reaches_everybody_in_turn(void) {
     while (served() < CROWD) {
-        gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+        sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     }
     for (unsigned rounds = 0; rounds == 0U || daemon_->clients.lines_wait; rounds++) {
-        gw_service_flush(&daemon_->clients, IW_CLIENT_NONE);
+        sock_service_flush(&daemon_->clients, IW_CLIENT_NONE);
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
     }
     for (unsigned i = 0; i < CROWD; i++) {
@@ -143,19 +143,19 @@ static void test_round_of_sending_reaches_everybody_in_turn(void) {
 
 /// What waits is moved to the front again and again.
 static void test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time(void) {
-    gw_client_t *client = &daemon_->clients.client[0];
+    sock_client_t *client = &daemon_->clients.client[0];
     char line[64];
     char expected[sizeof line];
     size_t length = 0;
     unsigned told = 0;
     unsigned read_back = 0;
     while (read_back < 20000U) {
-        while (client->out_end - client->out_start < GW_OUT_SIZE - sizeof line) {
+        while (client->out_end - client->out_start < SOCK_OUT_SIZE - sizeof line) {
             (void)snprintf(line, sizeof line, "{\"line\":%u,\"and\":\"something to fill it\"}\n", told++);
-            gw_client_reply(client, line, strlen(line));
+            sock_client_reply(client, line, strlen(line));
         }
-        TEST_ASSERT_FALSE(gw_client_is_broken(client));
-        gw_client_flush(client);
+        TEST_ASSERT_FALSE(sock_client_is_broken(client));
+        sock_client_flush(client);
         const ssize_t count = recv(peer[0], &drained[length], 4999U, MSG_DONTWAIT);
         TEST_ASSERT_GREATER_THAN_INT(0, (int)count);
         length += (size_t)count;

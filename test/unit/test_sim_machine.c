@@ -102,7 +102,7 @@ static void test_machine_late_wheel_holds_no_more_than_it_can(void) {
     iw_codec_setpoint_t const setpoint = {100, 2000, 1U};
     pair.wheel[IW_LEFT].late_us = 400U * MS;
     for (uint32_t i = 0U; i < SIM_WHEEL_LATE_MAX + 10U; i++) {
-        sim_wheel_hear(&pair.wheel[IW_LEFT], BOOTED + i, &setpoint);
+        sim_wheel_receive(&pair.wheel[IW_LEFT], BOOTED + i, &setpoint);
     }
     TEST_ASSERT_EQUAL_UINT32(SIM_WHEEL_LATE_MAX, pair.wheel[IW_LEFT].late_count);
 }

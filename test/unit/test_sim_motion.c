@@ -27,7 +27,7 @@ static void restart(void) {
 
 static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
     iw_codec_setpoint_t const setpoint = {speed_mm_s, current_mA, 1U};
-    return sim_motion_hear(&motion, now_us, &setpoint);
+    return sim_motion_receive(&motion, now_us, &setpoint);
 }
 
 /// Tells the same every 20 ms for `ms`; the time reached.
@@ -185,11 +185,11 @@ static void test_motion_type_set_ignores_other_types(void) {
     config.accepted_type = 7;
     restart();
     iw_codec_setpoint_t setpoint = {500, 2000, 6U};
-    TEST_ASSERT_FALSE(sim_motion_hear(&motion, START_US, &setpoint));
+    TEST_ASSERT_FALSE(sim_motion_receive(&motion, START_US, &setpoint));
     TEST_ASSERT_FALSE(motion.driven);
     TEST_ASSERT_EQUAL_UINT32(0U, motion.setpoints);
     setpoint.type = 7U;
-    TEST_ASSERT_TRUE(sim_motion_hear(&motion, START_US, &setpoint));
+    TEST_ASSERT_TRUE(sim_motion_receive(&motion, START_US, &setpoint));
     TEST_ASSERT_TRUE(motion.driven);
 }
 

@@ -181,7 +181,7 @@ static void test_pair_ignores_frames_that_are_no_setpoint_of_the_table(void) {
         {.id = 513U, .dlc = 2U},
     };
     for (size_t i = 0U; i < sizeof strange / sizeof strange[0]; i++) {
-        sim_pair_hear(&pair, BOOTED, &strange[i]);
+        sim_pair_receive(&pair, BOOTED, &strange[i]);
     }
     TEST_ASSERT_EQUAL_MEMORY(&before, &pair, sizeof pair);
 }

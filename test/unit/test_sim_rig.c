@@ -43,7 +43,7 @@ static void take_until(iw_time_us_t until_us) {
     sim_sent_t sent;
     while (sim_pair_step(&pair, until_us, &sent)) {
         note(&sent);
-        sim_pair_hear(&pair, sent.due_us, &sent.frame);
+        sim_pair_receive(&pair, sent.due_us, &sent.frame);
     }
 }
 
@@ -54,7 +54,7 @@ void rig_run(iw_time_us_t from_us, iw_time_us_t until_us) {
             iw_codec_setpoint_t const setpoint = {command_mm_s[side], 2000, 1U};
             iw_can_frame_t frame;
             (void)iw_codec_encode_setpoint((iw_side_t)side, &setpoint, IW_DLC_SETPOINT, &frame);
-            sim_pair_hear(&pair, now_us, &frame);
+            sim_pair_receive(&pair, now_us, &frame);
         }
     }
     take_until(until_us);

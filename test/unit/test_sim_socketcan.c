@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which commands the simulator refuses when it is a node on a CAN interface.
-#include "socketcan.h"
+#include "sim_socketcan.h"
 
 #include "unity.h"
 

@@ -63,7 +63,7 @@ static iw_time_us_t drive(uint8_t port, iw_time_us_t from_us, iw_time_us_t until
     return now_us;
 }
 
-static int16_t told_mm_s(uint32_t index) {
+static int16_t commanded_mm_s(uint32_t index) {
     return (int16_t)((history[index].frame.data[1] << 8) | history[index].frame.data[2]);
 }
 
@@ -138,7 +138,7 @@ static void test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_retur
     run_until(back_us + 500U * MS);
     TEST_ASSERT_EQUAL_UINT32(SIM_QUEUE_DEFAULT, count);
     for (uint32_t i = 0U; i < count; i++) {
-        TEST_ASSERT_EQUAL_INT16(1000, told_mm_s(i));
+        TEST_ASSERT_EQUAL_INT16(1000, commanded_mm_s(i));
     }
     TEST_ASSERT_GREATER_THAN_INT32(100000, world.pair.wheel[IW_LEFT].motion.speed_um_s);
     TEST_ASSERT_GREATER_THAN_UINT32(900U, world.dropped);
@@ -224,7 +224,7 @@ static void test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obe
     run_until(START_US + 2U * SECOND);
     TEST_ASSERT_UINT32_WITHIN(2U, 100U, count);
     TEST_ASSERT_EQUAL_UINT8(SIM_PORT_FOREIGN, history[0].port);
-    TEST_ASSERT_EQUAL_INT16(400, told_mm_s(0U));
+    TEST_ASSERT_EQUAL_INT16(400, commanded_mm_s(0U));
     TEST_ASSERT_INT32_WITHIN(1000, 400000, world.pair.wheel[IW_LEFT].motion.speed_um_s);
     world.foreign.due_us = IW_NEVER;
     count = 0U;

@@ -54,7 +54,7 @@ static void assert_wheel(const iw_snapshot_wheel_t *seen, iw_side_t side, iw_tim
     TEST_ASSERT_EQUAL_INT32(wheel->speed_mm_s, seen->speed_mm_s);
     TEST_ASSERT_EQUAL_UINT32(wheel->um_s_per_rpm, seen->um_s_per_rpm);
     TEST_ASSERT_EQUAL_UINT32(wheel->reboots, seen->reboots);
-    TEST_ASSERT_EQUAL_INT(iw_wheel_heard(wheel, now_us), seen->heard);
+    TEST_ASSERT_EQUAL_INT(iw_wheel_online(wheel, now_us), seen->heard);
     TEST_ASSERT_EQUAL_INT(iw_wheel_rest_us(wheel, now_us) >= rig.config.rest_ms * 1000U, seen->at_rest);
 }
 
@@ -92,9 +92,9 @@ static void assert_rest(const iw_snapshot_t *seen) {
     const iw_pair_t applied = iw_setpoint_applied(&gateway->setpoint);
     TEST_ASSERT_EQUAL_PTR(&gateway->config, seen->config);
     TEST_ASSERT_EQUAL_PTR(&gateway->counters, seen->counters);
-    TEST_ASSERT_EQUAL_PTR(gateway->ledger.entry, seen->assumed);
-    TEST_ASSERT_EQUAL_UINT32(gateway->ledger.changes, seen->assumed_changes);
-    TEST_ASSERT_EQUAL_INT(gateway->ledger.doubt, seen->doubt);
+    TEST_ASSERT_EQUAL_PTR(gateway->assumptions.entry, seen->assumed);
+    TEST_ASSERT_EQUAL_UINT32(gateway->assumptions.changes, seen->assumed_changes);
+    TEST_ASSERT_EQUAL_INT(gateway->assumptions.doubt, seen->doubt);
     TEST_ASSERT_EQUAL_UINT64(gateway->pose_us, seen->pose_us);
     TEST_ASSERT_EQUAL_UINT64(iw_confirmation_waiting_us(&gateway->sender.confirmation), seen->waiting_us);
     TEST_ASSERT_EQUAL_UINT64(iw_confirmation_proven_us(&gateway->sender.confirmation), seen->confirmed_us);
@@ -155,13 +155,13 @@ static void test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus
     for (size_t side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].speed_us);
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].status_us);
-        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_snapshot_force_validity(&seen, (iw_side_t)side));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_snapshot_force_validity(&seen, (iw_side_t)side));
         TEST_ASSERT_FALSE(seen.wheel[side].heard || seen.wheel[side].at_rest);
     }
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, seen.state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, seen.demand);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, seen.bus);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, seen.doubt);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, seen.doubt);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.pose_us);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.stale_us);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.waiting_us);
@@ -200,7 +200,7 @@ static void test_snapshot_listening_shows_what_each_wheel_told_and_when(void) {
                      seen.wheel[IW_RIGHT].ticks * seen.wheel[IW_RIGHT].nm_per_tick < 0);
     TEST_ASSERT_TRUE(seen.wheel[IW_LEFT].at_rest);
     TEST_ASSERT_FALSE(seen.wheel[IW_RIGHT].at_rest);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_snapshot_force_validity(&seen, (iw_side_t)IW_LEFT));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_snapshot_force_validity(&seen, (iw_side_t)IW_LEFT));
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, iw_snapshot_force_validity(&seen, (iw_side_t)IW_RIGHT));
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, seen.bus);
 }
@@ -210,7 +210,7 @@ static void test_snapshot_heard_and_at_rest_are_those_of_the_look(void) {
     const iw_time_us_t rest_us = rig.gateway.wheel[IW_LEFT].rest_since_us + MS(rig.config.rest_ms);
     TEST_ASSERT_FALSE(look_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
     TEST_ASSERT_TRUE(look_at(rest_us).wheel[IW_LEFT].at_rest);
-    const iw_time_us_t lost_us = rig.gateway.wheel[IW_LEFT].heard_us + MS(rig.config.wheel_silent_ms);
+    const iw_time_us_t lost_us = rig.gateway.wheel[IW_LEFT].received_us + MS(rig.config.wheel_silent_ms);
     TEST_ASSERT_TRUE(look_at(lost_us - 1U).wheel[IW_LEFT].heard);
     TEST_ASSERT_FALSE(look_at(lost_us).wheel[IW_LEFT].heard);
 }
@@ -322,16 +322,16 @@ static void test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew
 }
 
 static void test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still(void) {
-    const iw_ledger_entry_t wrong = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
+    const iw_assumption_entry_t wrong = {IW_CONTRADICTED, IW_SOURCE_OPERATOR, 0};
     const uint32_t changes = look().assumed_changes;
-    iw_gateway_know(&rig.gateway, IW_LEDGER_GEAR_RATIO, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, look().doubt);
-    iw_gateway_know(&rig.gateway, IW_LEDGER_MOUNT_SIGN_LEFT, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_MOUNT_SIGN_LEFT, look().doubt);
-    iw_gateway_know(&rig.gateway, IW_LEDGER_CURRENT_ROLE, &wrong);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CURRENT_ROLE, look().doubt);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, look().doubt);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_MOUNT_SIGN_LEFT, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_MOUNT_SIGN_LEFT, look().doubt);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_CURRENT_ROLE, look().doubt);
     TEST_ASSERT_EQUAL_UINT32(changes + 3U, look().assumed_changes);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, look().assumed[IW_LEDGER_GEAR_RATIO].state);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, look().assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
 static void test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind(void) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the web bridge lets in, and what it reads of a request.
 #include "driver.h"
-#include "judge.h"
+#include "web_judge.h"
 
 #include "unity.h"
 

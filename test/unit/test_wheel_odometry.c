@@ -26,12 +26,12 @@ void tearDown(void) {}
 static void hear_ticks(int32_t ticks) {
     const message_t message = {IW_CODEC_STATUS, wheel.side, {.status = {ticks, 255, 30, 20}}};
     now_us += MS(40);
-    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
+    iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
 static void hear_speed(int16_t rpm) {
     const message_t message = {IW_CODEC_SPEED, wheel.side, {.speed = {.speed_rpm = rpm, .acceleration_raw = -1}}};
-    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
+    iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
 /// From one reading to another, so long after it.
@@ -146,11 +146,11 @@ static void test_wheel_small_jump_is_believed_whatever_the_time(void) {
     const message_t first = {IW_CODEC_STATUS, IW_LEFT, {.status = {0, 0, 0, 0}}};
     const message_t second = {IW_CODEC_STATUS, IW_LEFT, {.status = {30, 0, 0, 0}}};
     const message_t third = {IW_CODEC_STATUS, IW_LEFT, {.status = {61, 0, 0, 0}}};
-    iw_wheel_hear(&wheel, now_us, first.kind, &first.as, true);
-    iw_wheel_hear(&wheel, now_us, second.kind, &second.as, true);
+    iw_wheel_receive(&wheel, now_us, first.kind, &first.as, true);
+    iw_wheel_receive(&wheel, now_us, second.kind, &second.as, true);
     TEST_ASSERT_EQUAL_INT64(30, wheel.ticks);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
-    iw_wheel_hear(&wheel, now_us, third.kind, &third.as, true);
+    iw_wheel_receive(&wheel, now_us, third.kind, &third.as, true);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
 }
 

@@ -27,7 +27,7 @@ void tearDown(void) {}
 
 static void hear_as(int16_t rpm, bool fresh) {
     const message_t message = {IW_CODEC_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
-    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, fresh);
+    iw_wheel_receive(&wheel, now_us, message.kind, &message.as, fresh);
 }
 
 static void hear(int16_t rpm) {
@@ -36,14 +36,14 @@ static void hear(int16_t rpm) {
 
 static void hear_status(int32_t ticks) {
     const message_t message = {IW_CODEC_STATUS, IW_LEFT, {.status = {ticks, 240, 30, 20}}};
-    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
+    iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
 static void hear_other(iw_codec_kind_t kind) {
     message_t message;
     memset(&message, 0, sizeof message);
     message.kind = kind;
-    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
+    iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
 /// Speed frames every 4 ms for so long.
@@ -61,7 +61,7 @@ static bool rests(iw_time_us_t at_us, uint32_t for_us) {
 }
 
 static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_FALSE(rests(now_us, 0));
     TEST_ASSERT_TRUE(wheel.speed_us == IW_NEVER);
@@ -73,8 +73,8 @@ static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
 
 static void test_wheel_never_heard_is_not_heard_when_time_has_just_begun(void) {
     iw_wheel_init(&wheel, &config, IW_LEFT, 0);
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, 0));
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, 1000));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 0));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 1000));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, 1000));
 }
 
@@ -84,10 +84,10 @@ static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
         config.wheel_silent_ms = limits_ms[i];
         begin();
         hear(5);
-        TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us));
-        TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us + MS(limits_ms[i]) - 1U));
+        TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us));
+        TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + MS(limits_ms[i]) - 1U));
         TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i]) - 1U));
-        TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us + MS(limits_ms[i])));
+        TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us + MS(limits_ms[i])));
         TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i])));
         TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i]) + 4294967296ULL));
     }
@@ -101,12 +101,12 @@ static void test_wheel_is_kept_alive_by_speed_frames_only(void) {
         hear_other(others[n % 4U]);
     }
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
 }
 
 static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
     hear_as(7, false);
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_EQUAL_INT(140, wheel.speed_mm_s);
     TEST_ASSERT_TRUE(wheel.speed_us == now_us);
@@ -115,7 +115,7 @@ static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
     hear_as(0, false);
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + 1U));
     hear(0);
-    TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us + 1U));
+    TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + 1U));
 }
 
 static void test_wheel_silence_during_our_stall_is_excused_once(void) {
@@ -123,7 +123,7 @@ static void test_wheel_silence_during_our_stall_is_excused_once(void) {
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
-    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + SILENT_US - 1U));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
     iw_wheel_excuse(&wheel, now_us + MS(40));

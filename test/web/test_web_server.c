@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The key of the page that drives: how long it is valid. The server runs without HTTP and without a gateway.
-#include "server.h"
+#include "web_server.h"
 
 #include "unity.h"
 

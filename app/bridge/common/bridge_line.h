@@ -6,8 +6,8 @@
 ///       +--- refused, no hello, closed, drop-+
 ///
 /// The owner decides when to connect again. One thread.
-#ifndef IW_BRIDGE_LINE_H
-#define IW_BRIDGE_LINE_H
+#ifndef BRIDGE_LINE_H
+#define BRIDGE_LINE_H
 
 #include "iwheel_client/client.h"
 

@@ -7,11 +7,11 @@
 /// The log reports an absent gateway once, when the link becomes AWAY. Connection and greeting are states of the line (bridge_line.h).
 ///
 /// Questions go over the connection that watches: at most BRIDGE_LINE_MAX of them have no reply, the others wait here in their order.
-/// Stops go over a connection of their own (stop.h) and never behind a question. No call waits. No question is sent twice.
-#ifndef IW_BRIDGE_LINK_H
-#define IW_BRIDGE_LINK_H
+/// Stops go over a connection of their own (bridge_stop.h) and never behind a question. No call waits. No question is sent twice.
+#ifndef BRIDGE_LINK_H
+#define BRIDGE_LINK_H
 
-#include "stop.h"
+#include "bridge_stop.h"
 
 /// A question without reply after this time is answered with NULL, also if it was not sent yet.
 #define BRIDGE_ANSWER_US 1000000U

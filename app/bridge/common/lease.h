@@ -8,8 +8,8 @@
 /// There are two places: the holder's and that of a person who asks. No other person has a drive connection. The gateway decides who holds
 /// the lease: to it two people are two clients, so the second gets `busy` with the name of the first, and `takeover` moves the lease at
 /// standstill only. Names are labels for messages; the key is the right, and it goes only to the person who armed.
-#ifndef IW_BRIDGE_LEASE_H
-#define IW_BRIDGE_LEASE_H
+#ifndef BRIDGE_LEASE_H
+#define BRIDGE_LEASE_H
 
 #include "bridge_line.h"
 #include "secret.h"

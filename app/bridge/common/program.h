@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The command line of a bridge, alike for all: `-c FILE`, `--check`, `--print-config`, `--version`, `--help`, and what it has of its own.
-#ifndef IW_BRIDGE_PROGRAM_H
-#define IW_BRIDGE_PROGRAM_H
+#ifndef BRIDGE_PROGRAM_H
+#define BRIDGE_PROGRAM_H
 
 #include "config/settings.h"
 

@@ -4,8 +4,8 @@
 /// A socket receives from other machines if it is a listening TCP socket, a UDP socket with a port and without a peer, or a raw socket; if
 /// its address is not a loopback address; and if it is not bound to the interface `lo`. Only the sockets that are open now are read: call it
 /// after the start of every library that opens some.
-#ifndef IW_BRIDGE_REACH_H
-#define IW_BRIDGE_REACH_H
+#ifndef BRIDGE_REACH_H
+#define BRIDGE_REACH_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Secrets of 128 random bits, written as 32 lower-case hexadecimal digits.
-#ifndef IW_BRIDGE_SECRET_H
-#define IW_BRIDGE_SECRET_H
+#ifndef BRIDGE_SECRET_H
+#define BRIDGE_SECRET_H
 
 #include <stdbool.h>
 

@@ -8,8 +8,8 @@
 ///
 /// CONNECTING asks for names and shakes hands, which may wait: a thread of its own does that, and touches nothing else. Clean sessions:
 /// the broker keeps nothing for this machine while it is away, so no command comes late from there.
-#ifndef IW_MQTT_BROKER_H
-#define IW_MQTT_BROKER_H
+#ifndef MQTT_BROKER_H
+#define MQTT_BROKER_H
 
 #include "mqtt_settings.h"
 #include "peer.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The files with which a program shows at a broker who it is.
-#ifndef IW_MQTT_CREDENTIALS_H
-#define IW_MQTT_CREDENTIALS_H
+#ifndef MQTT_CREDENTIALS_H
+#define MQTT_CREDENTIALS_H
 
 #include "mqtt_settings.h"
 

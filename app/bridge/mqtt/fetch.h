@@ -9,8 +9,8 @@
 /// with its CRC-32, and each file as a whole with what the machine says of it.
 ///
 /// Pure: no I/O, no clock, no heap. What comes is judged before it is read.
-#ifndef IW_MQTT_FETCH_H
-#define IW_MQTT_FETCH_H
+#ifndef MQTT_FETCH_H
+#define MQTT_FETCH_H
 
 #include "mqtt_command.h"
 #include "mqtt_settings.h"

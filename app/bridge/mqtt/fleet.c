@@ -49,17 +49,17 @@ void fleet_text(const iwc_message_t *message, const char *path, char *out, size_
 }
 
 static void read_contradictions(iwn_json_t root, fleet_machine_t *machine) {
-    iwn_json_t ledger;
+    iwn_json_t assumptions;
     iwn_json_t name;
     iwn_json_t entry;
     iwn_json_t state;
     char word[32];
     size_t used = 0;
     machine->contradicted[0] = '\0';
-    if (!iwn_json_find(root, "ledger", &ledger) || iwn_json_kind(ledger) != IWN_JSON_OBJECT) {
+    if (!iwn_json_find(root, "ledger", &assumptions) || iwn_json_kind(assumptions) != IWN_JSON_OBJECT) {
         return;
     }
-    iwn_json_t rest = iwn_json_inside(ledger);
+    iwn_json_t rest = iwn_json_inside(assumptions);
     while (iwn_json_next(&rest, &name, &entry)) {
         if (iwn_json_kind(entry) == IWN_JSON_OBJECT && iwn_json_find(entry, "state", &state) &&
             iwn_json_is(state, "contradicted") && iwn_json_text(name, word, sizeof word) && iwn_plain_text(word) &&
@@ -167,7 +167,7 @@ void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t le
         take_stop(machine, &message, "last_stop.", FLEET_INFO);
         return;
     }
-    machine->heard_us = now_us;
+    machine->received_us = now_us;
     if (strcmp(what, "state") == 0) {
         take_state(machine, &message, root);
     } else if (strcmp(what, "event/stop") == 0) {
@@ -288,7 +288,7 @@ static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char li
     iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
     iwn_out_text(&json, "stop_from", source_word(machine->stop_from));
     iwn_out_text(&json, "contradicted", machine->contradicted);
-    iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
+    iwn_out_known(&json, "heard_ms", machine->received_us > 0U, (int64_t)((now_us - machine->received_us) / 1000U));
     iwn_out_close(&json, '}');
     const size_t length = iwn_out_finish(&json);
     return (length > 0U) ? length - 1U : 0U;

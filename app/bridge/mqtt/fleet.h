@@ -2,8 +2,8 @@
 /// What a fleet's machines say of themselves at a broker: one row each, and what several of them contradict. Pure but for the stream.
 ///
 /// What comes is judged before it is read: whoever may write to the broker may send anything.
-#ifndef IW_MQTT_FLEET_H
-#define IW_MQTT_FLEET_H
+#ifndef MQTT_FLEET_H
+#define MQTT_FLEET_H
 
 #include "mqtt_settings.h"
 
@@ -36,7 +36,7 @@ typedef struct {
     iwc_value_t battery_dV[2]; ///< Left, right.
     char zero[2][16];          ///< Where the force's zero comes from; `doubted` if it was taken under load.
     char contradicted[96];     ///< Assumptions, separated by blanks.
-    uint64_t heard_us;         ///< Its last message; 0: only retained ones.
+    uint64_t received_us;      ///< Its last message; 0: only retained ones.
 } fleet_machine_t;
 
 typedef struct {

@@ -6,7 +6,7 @@
 #include "fetch.h"
 #include "mqtt_tell.h"
 
-#include "common/service.h"
+#include "common/bridge_service.h"
 #include "iwheel_northbound/json_out.h"
 
 #include <errno.h>

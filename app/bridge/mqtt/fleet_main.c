@@ -70,7 +70,7 @@ static int take_when(const char *option, int64_t *out_us) {
                : misuse("%s wants a time such as 2026-11-21T22:00, not \"%.40s\"", option, optarg);
 }
 
-static int take_last(history_wish_t *span) {
+static int take_last(history_config_t *span) {
     int64_t last_us = 0;
     if (!history_span(optarg, &last_us)) {
         return misuse("--last wants a span such as 90min, 12h or 7d, not \"%.40s\"", optarg);
@@ -159,7 +159,7 @@ static int take_words(words_t *self, int count, char **words) {
 
 /// What cannot stand together.
 static int judge(words_t *self) {
-    history_wish_t *span = &self->wanted.span;
+    history_config_t *span = &self->wanted.span;
     if ((self->used & IN(self->verb)) == 0U) {
         return misuse("one of the options is of another verb");
     }

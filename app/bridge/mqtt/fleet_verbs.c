@@ -5,7 +5,7 @@
 #include "broker.h"
 #include "stream.h"
 
-#include "common/service.h"
+#include "common/bridge_service.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -68,12 +68,12 @@ static bool take_stored(void *context, const char *topic, const char *payload, s
 
 /// What happened before this console began. Without a stream the machines' own word must do.
 static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
-    const stream_wish_t wish = {.event = "stop", .last = true, .take = take_stored, .context = self};
+    const stream_config_t config = {.event = "stop", .last = true, .take = take_stored, .context = self};
     char why[STREAM_WHY_SIZE];
     if (settings->broker.stream_port == 0U) {
         return;
     }
-    if (stream_read(settings, &wish, self->host, why) == 0) {
+    if (stream_read(settings, &config, self->host, why) == 0) {
         self->fleet.stream = self->host;
     } else {
         (void)complain(0, why);
@@ -220,10 +220,10 @@ int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wa
     char host[MQTT_HOST_SIZE];
     char why[STREAM_WHY_SIZE];
     const int64_t since_us = (wanted->span.machine != NULL) ? 1 : wanted->span.since_us - AHEAD_US;
-    const stream_wish_t wish = {.machine = wanted->span.machine,
-                                .since_us = (since_us > 0) ? since_us : 1,
-                                .take = history_take,
-                                .context = &history};
+    const stream_config_t config = {.machine = wanted->span.machine,
+                                    .since_us = (since_us > 0) ? since_us : 1,
+                                    .take = history_take,
+                                    .context = &history};
     if (!history_open(&history, &wanted->span, stdout)) {
         return complain(EX_OSERR, "no memory");
     }
@@ -232,7 +232,7 @@ int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wa
         history_close(&history);
         return code;
     }
-    code = stream_read(settings, &wish, host, why);
+    code = stream_read(settings, &config, host, why);
     if (code == 0) {
         history_end(&history);
         history_sum(&history, host);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// What iwheel-fleet does: each verb asks a broker, or the stream behind it, and prints. None sends anything that moves, stops or changes a
 /// machine.
-#ifndef IW_MQTT_FLEET_VERBS_H
-#define IW_MQTT_FLEET_VERBS_H
+#ifndef MQTT_FLEET_VERBS_H
+#define MQTT_FLEET_VERBS_H
 
 #include "history.h"
 
@@ -14,10 +14,10 @@ typedef struct {
     const char *name; ///< Of a recording; NULL: the newest.
     const char *
         out; ///< Where its frames go; NULL: a name of its own, here. Of the table: a file that is rewritten every second.
-    uint64_t seconds;    ///< The table, once after so long; 0: until it is told to end.
-    uint64_t wait_s;     ///< For a machine that does not answer.
-    bool json;           ///< Objects, one a line.
-    history_wish_t span; ///< Of the history.
+    uint64_t seconds;      ///< The table, once after so long; 0: until it is told to end.
+    uint64_t wait_s;       ///< For a machine that does not answer.
+    bool json;             ///< Objects, one a line.
+    history_config_t span; ///< Of the history.
     const volatile sig_atomic_t *end_asked;
 } fleet_wanted_t;
 

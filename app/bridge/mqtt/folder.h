@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// Opens a directory and a file in it only if no other user can put anything there; root and the own user are no others.
-#ifndef IW_MQTT_FOLDER_H
-#define IW_MQTT_FOLDER_H
+#ifndef MQTT_FOLDER_H
+#define MQTT_FOLDER_H
 
 /// Not through a symbolic link. A descriptor; -1 with errno: EPERM if it belongs to another user, or if others may write to it.
 int mqtt_folder_open(const char *directory);

@@ -10,9 +10,9 @@
 
 #define MINUTE_US 60000000LL
 
-bool history_open(history_t *self, const history_wish_t *wish, FILE *out) {
+bool history_open(history_t *self, const history_config_t *config, FILE *out) {
     memset(self, 0, sizeof *self);
-    self->wish = *wish;
+    self->config = *config;
     self->out = out;
     self->machines = calloc(FLEET_MACHINES, sizeof *self->machines);
     return self->machines != NULL;
@@ -248,7 +248,7 @@ static void show(const history_t *self, const history_machine_t *machine, const 
     if (strcmp(name, "stop") != 0) {
         write_fields(event, name, text, sizeof text);
     }
-    if (self->wish.all && machine->began) {
+    if (self->config.all && machine->began) {
         (void)fprintf(self->out, "%-19s %-12s -- its bridge began anew: boot %s\n", "", machine->id,
                       machine->runs[machine->run].boot);
     }
@@ -296,12 +296,12 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
 }
 
 static bool is_within(const history_t *self, const int64_t times_us[2]) {
-    return (times_us[0] >= self->wish.since_us && times_us[0] < self->wish.until_us) ||
-           (times_us[1] >= self->wish.since_us && times_us[1] < self->wish.until_us);
+    return (times_us[0] >= self->config.since_us && times_us[0] < self->config.until_us) ||
+           (times_us[1] >= self->config.since_us && times_us[1] < self->config.until_us);
 }
 
 static bool is_before(const history_t *self, const int64_t times_us[2]) {
-    return times_us[0] < self->wish.since_us && times_us[1] < self->wish.since_us;
+    return times_us[0] < self->config.since_us && times_us[1] < self->config.since_us;
 }
 
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
@@ -332,10 +332,10 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
     if (is_before(self, times_us)) {
         forget_gap(machine);
     }
-    if (!is_within(self, times_us) || !(self->wish.all || is_stop)) {
+    if (!is_within(self, times_us) || !(self->config.all || is_stop)) {
         return true;
     }
-    if (self->wish.json) {
+    if (self->config.json) {
         tell(self, machine, &event, times_us);
     } else {
         show(self, machine, &event, name, times_us);
@@ -355,19 +355,19 @@ void history_sum(const history_t *self, const char *host) {
     for (size_t i = 0; i < self->count; i++) {
         machines += self->machines[i].told ? 1U : 0U;
     }
-    if (self->wish.json) {
+    if (self->config.json) {
         (void)fprintf(self->out,
                       "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
                       ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64
                       ",\"end_checked\":%s,\"since_wall_us\":%" PRId64 ",\"until_wall_us\":%" PRId64 "}\n",
                       self->told, machines, self->doubled, self->garbled, self->missing, self->unheard,
-                      self->has_info ? "true" : "false", self->wish.since_us, self->wish.until_us);
+                      self->has_info ? "true" : "false", self->config.since_us, self->config.until_us);
         return;
     }
-    history_time(self->wish.since_us, since);
-    history_time(self->wish.until_us, until);
+    history_time(self->config.since_us, since);
+    history_time(self->config.until_us, until);
     (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->told,
-                  self->wish.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
+                  self->config.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
                   (machines == 1U) ? "" : "s", since, until, host);
     if (self->doubled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " doubles left out", self->doubled);

@@ -9,8 +9,8 @@
 ///
 /// An event belongs to the span if the machine's clock (when it was heard; of one told late, when it happened) or the servers' (when it was
 /// stored) puts it there: so a wrong clock hides none. Where the two are more than a minute apart, both are told.
-#ifndef IW_MQTT_HISTORY_H
-#define IW_MQTT_HISTORY_H
+#ifndef MQTT_HISTORY_H
+#define MQTT_HISTORY_H
 
 #include "fleet.h"
 #include "mqtt_command.h"
@@ -22,7 +22,7 @@ typedef struct {
     int64_t until_us;
     bool all; ///< Every event, and where a bridge began anew; else stops only.
     bool json;
-} history_wish_t;
+} history_config_t;
 
 /// What a machine's retained `info` says.
 typedef struct {
@@ -66,7 +66,7 @@ typedef struct {
 } history_machine_t;
 
 typedef struct {
-    history_wish_t wish;
+    history_config_t config;
     FILE *out;
     history_machine_t *machines; ///< FLEET_MACHINES of them, in the order in which they came.
     size_t count;
@@ -80,7 +80,7 @@ typedef struct {
 } history_t;
 
 /// False: no memory.
-bool history_open(history_t *self, const history_wish_t *wish, FILE *out);
+bool history_open(history_t *self, const history_config_t *config, FILE *out);
 void history_close(history_t *self);
 
 /// One event of the stream, in the order in which they were stored. As `stream_take_t`, with the history as context: false when nobody

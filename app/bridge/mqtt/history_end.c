@@ -42,12 +42,12 @@ void history_take_info(history_t *self, const char *topic, const char *payload, 
 static uint64_t stops_behind(const history_t *self, const history_machine_t *machine) {
     const history_info_t *info = &machine->info;
     const bool later = machine->stop_wall_us > 0 && info->stop_wall_us > machine->stop_wall_us;
-    if (info->stop == 0 || (info->stop_wall_us > 0 && info->stop_wall_us < self->wish.since_us) ||
-        machine->stop_wall_us >= self->wish.until_us) {
+    if (info->stop == 0 || (info->stop_wall_us > 0 && info->stop_wall_us < self->config.since_us) ||
+        machine->stop_wall_us >= self->config.until_us) {
         return 0;
     }
     if (machine->stop == 0) { // The stream has none: at least this one.
-        return (info->stop_wall_us < self->wish.until_us) ? 1U : 0U;
+        return (info->stop_wall_us < self->config.until_us) ? 1U : 0U;
     }
     if (info->stop > machine->stop) {
         return (uint64_t)(info->stop - machine->stop);
@@ -58,7 +58,7 @@ static uint64_t stops_behind(const history_t *self, const history_machine_t *mac
 /// Events likewise. The number of an event never begins anew.
 static uint64_t events_behind(const history_t *self, const history_machine_t *machine) {
     const uint64_t there = machine->number + machine->info.waiting;
-    return (machine->number > 0U && machine->info.last > there && machine->event_us < self->wish.until_us)
+    return (machine->number > 0U && machine->info.last > there && machine->event_us < self->config.until_us)
                ? machine->info.last - there
                : 0U;
 }
@@ -120,7 +120,7 @@ static void tell_end(const history_t *self, const history_machine_t *machine, ui
 void history_end(history_t *self) {
     for (size_t i = 0; i < self->count; i++) {
         const history_machine_t *machine = &self->machines[i];
-        const bool wished = self->wish.machine == NULL || strcmp(self->wish.machine, machine->id) == 0;
+        const bool wished = self->config.machine == NULL || strcmp(self->config.machine, machine->id) == 0;
         const uint64_t events = machine->missing + events_behind(self, machine);
         const uint64_t stops = machine->unheard + stops_behind(self, machine);
         if (!wished || events + stops == 0U) {
@@ -128,7 +128,7 @@ void history_end(history_t *self) {
         }
         self->missing += events;
         self->unheard += stops;
-        if (self->wish.json) {
+        if (self->config.json) {
             tell_end(self, machine, events, stops);
         } else {
             show_end(self, machine, events, stops);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "mqtt_bridge.h"
 
+#include "common/bridge_service.h"
 #include "common/program.h"
 #include "common/reach.h"
-#include "common/service.h"
 
 #include "mqtt_texts.h"
 

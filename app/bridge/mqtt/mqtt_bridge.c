@@ -324,8 +324,8 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     return mqtt_broker_open(&self->broker, settings, &broker);
 }
 
-static void tend(mqtt_bridge_t *self) {
-    mqtt_spool_tend(&self->spool);
+static void poll(mqtt_bridge_t *self) {
+    mqtt_spool_poll(&self->spool);
     if (self->spool.behind != self->told_behind) {
         self->told_behind = self->spool.behind;
         (void)fprintf(stderr, "iwheel-mqtt: %s\n",
@@ -361,7 +361,7 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     mqtt_spool_sync(&self->spool);
     if (now_us >= self->second_us) {
         self->second_us = now_us + SECOND_US;
-        tend(self);
+        poll(self);
     }
     return code;
 }

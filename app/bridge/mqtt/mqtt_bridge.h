@@ -3,8 +3,8 @@
 ///
 /// It repeats no command and passes each on at most once, so the wheels stop by the gateway's lease however it ends. If who drives by it
 /// falls silent, or the broker is gone, it says `stop` once, if the lease is its own. Fixed memory but for the spool, which is bounded.
-#ifndef IW_MQTT_BRIDGE_H
-#define IW_MQTT_BRIDGE_H
+#ifndef MQTT_BRIDGE_H
+#define MQTT_BRIDGE_H
 
 #include "broker.h"
 #include "mqtt_tell.h"

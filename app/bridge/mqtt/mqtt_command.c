@@ -174,11 +174,11 @@ static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_
         if (strcmp(self->senders[i].name, from) == 0) {
             return i;
         }
-        if (self->senders[i].heard_us < self->senders[oldest].heard_us) {
+        if (self->senders[i].received_us < self->senders[oldest].received_us) {
             oldest = i;
         }
     }
-    const bool free = self->senders[oldest].name[0] == '\0' || now_us - self->senders[oldest].heard_us > FORGET_US;
+    const bool free = self->senders[oldest].name[0] == '\0' || now_us - self->senders[oldest].received_us > FORGET_US;
     return free ? oldest : MQTT_SENDERS;
 }
 
@@ -222,12 +222,12 @@ static bool judge_count(mqtt_judge_t *self, uint64_t now_us, mqtt_order_t *order
         return drop(order, MQTT_CROWDED, "too many senders within a second");
     }
     if (strcmp(self->senders[place].name, order->from) == 0 && order->seq <= self->senders[place].seq &&
-        now_us - self->senders[place].heard_us <= FORGET_US) {
+        now_us - self->senders[place].received_us <= FORGET_US) {
         return drop(order, MQTT_DOUBLED, "seq must rise with each command of a sender");
     }
     memcpy(self->senders[place].name, order->from, sizeof order->from);
     self->senders[place].seq = order->seq;
-    self->senders[place].heard_us = now_us;
+    self->senders[place].received_us = now_us;
     return true;
 }
 

@@ -7,8 +7,8 @@
 /// it. `from` is a label: whoever may write there may use any. The right to drive is the `key` of the reply to `arm`.
 ///
 /// A response topic of MQTT 5 counts only among this machine's replies: nobody makes the bridge write where only it may.
-#ifndef IW_MQTT_COMMAND_H
-#define IW_MQTT_COMMAND_H
+#ifndef MQTT_COMMAND_H
+#define MQTT_COMMAND_H
 
 #include "iwheel_northbound/json_in.h"
 
@@ -92,7 +92,7 @@ typedef struct {
     struct {
         char name[MQTT_SENDER_SIZE];
         int64_t seq;
-        uint64_t heard_us;
+        uint64_t received_us;
     } senders[MQTT_SENDERS];
     uint64_t counts[MQTT_VERDICTS];
     iwn_work_t work;

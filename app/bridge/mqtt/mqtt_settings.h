@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What may be configured of the MQTT bridge: share/mqtt.conf.
-#ifndef IW_MQTT_SETTINGS_H
-#define IW_MQTT_SETTINGS_H
+#ifndef MQTT_SETTINGS_H
+#define MQTT_SETTINGS_H
 
 #include "config/settings.h"
 

@@ -2,8 +2,8 @@
 /// What is published: the gateway's JSON with a few members before its own, and what the bridge says of itself. Pure.
 ///
 /// All lines go into a buffer of the caller's. 0: it did not fit, and must not be used.
-#ifndef IW_MQTT_TELL_H
-#define IW_MQTT_TELL_H
+#ifndef MQTT_TELL_H
+#define MQTT_TELL_H
 
 #include "mqtt_command.h"
 #include "mqtt_settings.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "peer.h"
 
-#include "common/service.h"
+#include "common/bridge_service.h"
 
 #include <arpa/inet.h>
 #include <errno.h>

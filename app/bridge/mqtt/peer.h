@@ -2,8 +2,8 @@
 /// Which user the process at the other end of a connection on this machine belongs to, as the kernel says it.
 ///
 /// Any local user may bind a free port, so a broker on loopback without TLS is believed only if its process belongs to a user that is allowed.
-#ifndef IW_MQTT_PEER_H
-#define IW_MQTT_PEER_H
+#ifndef MQTT_PEER_H
+#define MQTT_PEER_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What the codes of libmosquitto and of brokers mean.
-#ifndef IW_MQTT_REASONS_H
-#define IW_MQTT_REASONS_H
+#ifndef MQTT_REASONS_H
+#define MQTT_REASONS_H
 
 #include <stdbool.h>
 

@@ -370,7 +370,7 @@ void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number) {
     append_done(self, ACCEPTED, number);
 }
 
-void mqtt_spool_tend(mqtt_spool_t *self) {
+void mqtt_spool_poll(mqtt_spool_t *self) {
     if (self->behind) {
         (void)write_anew(self);
     }

@@ -10,8 +10,8 @@
 ///
 /// Bounded: beyond `max_bytes` the oldest is dropped and counted. For one thread; a second one of its own waits for the disk, so that a slow
 /// one holds up nobody.
-#ifndef IW_MQTT_SPOOL_H
-#define IW_MQTT_SPOOL_H
+#ifndef MQTT_SPOOL_H
+#define MQTT_SPOOL_H
 
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -83,6 +83,6 @@ void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number);
 void mqtt_spool_sync(mqtt_spool_t *self);
 
 /// Tries to write the file again, if it is behind. Call it now and then.
-void mqtt_spool_tend(mqtt_spool_t *self);
+void mqtt_spool_poll(mqtt_spool_t *self);
 
 #endif

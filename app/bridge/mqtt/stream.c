@@ -109,16 +109,16 @@ static int find_server(reader_t *self, const mqtt_settings_t *settings, char out
 // ---- reading ------------------------------------------------------------------------------------------------------
 
 /// The consumer is of the kind that forgets itself: nothing is written down for it, and what it was handed is not confirmed.
-static natsStatus subscribe(reader_t *self, const stream_wish_t *wish, jsErrCode *out_code) {
+static natsStatus subscribe(reader_t *self, const stream_config_t *config, jsErrCode *out_code) {
     char subject[TOPIC_SIZE];
     jsSubOptions options;
-    (void)snprintf(subject, sizeof subject, "iwheel.%s.event.%s", (wish->machine != NULL) ? wish->machine : "*",
-                   (wish->event != NULL) ? wish->event : "*");
+    (void)snprintf(subject, sizeof subject, "iwheel.%s.event.%s", (config->machine != NULL) ? config->machine : "*",
+                   (config->event != NULL) ? config->event : "*");
     (void)jsSubOptions_Init(&options);
     options.Stream = STREAM_NAME;
     options.Ordered = true;
-    options.Config.DeliverPolicy = wish->last ? js_DeliverLastPerSubject : js_DeliverByStartTime;
-    options.Config.OptStartTime = wish->last ? 0 : wish->since_us * 1000;
+    options.Config.DeliverPolicy = config->last ? js_DeliverLastPerSubject : js_DeliverByStartTime;
+    options.Config.OptStartTime = config->last ? 0 : config->since_us * 1000;
     return js_SubscribeSync(&self->events, self->stream, subject, NULL, &options, out_code);
 }
 
@@ -168,10 +168,10 @@ static natsStatus read_all(const reader_t *self, stream_take_t take, void *conte
 }
 
 /// One try. `*trouble` is the servers' own word for it, if they had one.
-static natsStatus try_to_read(reader_t *self, const stream_wish_t *wish, stream_take_t take, void *context,
+static natsStatus try_to_read(reader_t *self, const stream_config_t *config, stream_take_t take, void *context,
                               jsErrCode *trouble) {
     const char *words = NULL;
-    natsStatus status = subscribe(self, wish, trouble);
+    natsStatus status = subscribe(self, config, trouble);
     if (status == NATS_OK) {
         status = read_all(self, take, context);
     }
@@ -198,10 +198,10 @@ static bool may_pass(natsStatus status, jsErrCode trouble) {
     return status != NATS_OK && status != NATS_NOT_PERMITTED && trouble != JSStreamNotFoundErr;
 }
 
-int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, char out_host[MQTT_HOST_SIZE],
+int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, char out_host[MQTT_HOST_SIZE],
                 char out_why[STREAM_WHY_SIZE]) {
     reader_t reader = {.options = NULL};
-    counted_t counted = {wish->take, wish->context, 0};
+    counted_t counted = {config->take, config->context, 0};
     jsErrCode trouble = 0;
     natsStatus status = NATS_ERR;
     if (settings->broker.stream_port == 0U) {
@@ -214,7 +214,7 @@ int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, char
         if (code != 0) {
             return code;
         }
-        status = try_to_read(&reader, wish, take_counted, &counted, &trouble);
+        status = try_to_read(&reader, config, take_counted, &counted, &trouble);
         end(&reader);
     }
     if (status == NATS_OK) {

@@ -3,8 +3,8 @@
 ///
 /// Reading waits for the network: for programs that have nothing else to do meanwhile. Each host is tried for 2 s; servers that have
 /// just lost one of theirs are asked up to ten times; a stream that falls silent in the middle is given up after 5 s. With TLS the name of the server is checked as its certificate has it.
-#ifndef IW_MQTT_STREAM_H
-#define IW_MQTT_STREAM_H
+#ifndef MQTT_STREAM_H
+#define MQTT_STREAM_H
 
 #include "mqtt_settings.h"
 
@@ -23,11 +23,11 @@ typedef struct {
     int64_t since_us;    ///< Unless `last`: wall clock of the servers, from which on they have stored it.
     stream_take_t take;
     void *context; ///< For `take`.
-} stream_wish_t;
+} stream_config_t;
 
 /// Reads what is there now, in the order in which it was stored. 0 with the host that served in `out_host`; else an exit code of sysexits,
 /// with cause and cure in `out_why`.
-int stream_read(const mqtt_settings_t *settings, const stream_wish_t *wish, char out_host[MQTT_HOST_SIZE],
+int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, char out_host[MQTT_HOST_SIZE],
                 char out_why[STREAM_WHY_SIZE]);
 
 #endif

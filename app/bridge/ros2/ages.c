@@ -43,7 +43,7 @@ static ros_age_t judge_absolutely(int64_t sent_us, ros_moment_t now, int64_t *ou
 static void begin_anew(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
     entry->known = false;
     entry->first_sent_us = sent_us;
-    entry->first_heard_us = now_us;
+    entry->first_received_us = now_us;
     entry->least_us = now_us - sent_us;
 }
 
@@ -54,22 +54,22 @@ static ros_source_t *source_of(ros_ages_t *self, uint64_t source, int64_t sent_u
         if (entry->source == source) {
             return entry;
         }
-        if (oldest->source != 0 && (entry->source == 0 || entry->heard_us < oldest->heard_us)) {
+        if (oldest->source != 0 && (entry->source == 0 || entry->received_us < oldest->received_us)) {
             oldest = entry;
         }
     }
-    *oldest = (ros_source_t){.source = source, .heard_us = now_us, .sent_us = sent_us};
+    *oldest = (ros_source_t){.source = source, .received_us = now_us, .sent_us = sent_us};
     begin_anew(oldest, sent_us, now_us);
     return oldest;
 }
 
 static bool has_gap(const ros_source_t *entry, int64_t sent_us, int64_t now_us) {
-    return now_us - entry->heard_us > ROS_GAP_US || llabs(sent_us - entry->sent_us) > ROS_GAP_US;
+    return now_us - entry->received_us > ROS_GAP_US || llabs(sent_us - entry->sent_us) > ROS_GAP_US;
 }
 
 /// Learns from one sample of a writer that is not known.
 static void learn(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
-    const int64_t heard_span_us = now_us - entry->first_heard_us;
+    const int64_t heard_span_us = now_us - entry->first_received_us;
     const int64_t sent_span_us = sent_us - entry->first_sent_us;
     if (sent_span_us - heard_span_us > ROS_LEARN_US / TENTH) {
         begin_anew(entry, sent_us, now_us); // The first was held back for longer than this one.
@@ -89,11 +89,11 @@ static ros_age_t judge_by_writer(ros_ages_t *self, uint64_t source, int64_t sent
         *out_age_us = way_us - entry->least_us;
         return ROS_AGE_OVERTAKEN;
     }
-    entry->least_us += (now_us - entry->heard_us) / (PER_MILLION / ROS_DRIFT_PPM);
+    entry->least_us += (now_us - entry->received_us) / (PER_MILLION / ROS_DRIFT_PPM);
     if (way_us < entry->least_us) {
         entry->least_us = way_us;
     }
-    entry->heard_us = now_us;
+    entry->received_us = now_us;
     entry->sent_us = sent_us;
     if (!entry->known) {
         learn(entry, sent_us, now_us);

@@ -47,12 +47,12 @@ typedef struct {
 } ros_moment_t;
 
 typedef struct {
-    uint64_t source;  ///< The writer; 0: unused.
-    int64_t least_us; ///< Smallest reception minus sending.
-    int64_t heard_us; ///< Reception of its last sample, CLOCK_MONOTONIC.
-    int64_t sent_us;  ///< Sending of it, by the writer's clock, as the next two.
+    uint64_t source;     ///< The writer; 0: unused.
+    int64_t least_us;    ///< Smallest reception minus sending.
+    int64_t received_us; ///< Reception of its last sample, CLOCK_MONOTONIC.
+    int64_t sent_us;     ///< Sending of it, by the writer's clock, as the next two.
     int64_t first_sent_us;
-    int64_t first_heard_us; ///< Reception of the one with which the span begins.
+    int64_t first_received_us; ///< Reception of the one with which the span begins.
     bool known;
 } ros_source_t;
 

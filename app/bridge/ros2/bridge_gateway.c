@@ -74,13 +74,13 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
         return;
     }
     self->facts.link = ROS_LINK_UP;
-    self->heard_us = bridge_monotonic_us();
-    if (self->leased_us != 0 && !machine->now.ours && self->heard_us - self->leased_us > GRANTED_US) {
+    self->received_us = bridge_monotonic_us();
+    if (self->leased_us != 0 && !machine->now.ours && self->received_us - self->leased_us > GRANTED_US) {
         bridge_end_lease(self);
     }
-    if (self->ledger_due) {
-        self->ledger_due = false;
-        ros_facts_read_ledger(message, machine);
+    if (self->assumptions_due) {
+        self->assumptions_due = false;
+        ros_facts_read_assumptions(message, machine);
     }
     if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known && machine->track_mm > 0) {
         const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
@@ -107,7 +107,7 @@ iwc_result_t bridge_call(bridge_t *self) {
         result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);
     }
     if (result == IWC_OK) {
-        self->ledger_due = true;
+        self->assumptions_due = true;
         take_snapshot(self, &status);
         // Seen within 0.2 s: so often at least.
         const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
@@ -168,7 +168,7 @@ void bridge_listen(bridge_t *self) {
         } else if (iwc_is(&message, "event", "stop")) {
             take_stop(self, &message);
         } else if (iwc_is(&message, "event", "ledger")) {
-            self->ledger_due = true;
+            self->assumptions_due = true;
         }
     }
     if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {

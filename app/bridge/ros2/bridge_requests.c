@@ -25,7 +25,7 @@ const char *bridge_why_not_drive(const bridge_t *self) {
 
 /// `age_us` ago by the clock of the gateway's events. A snapshot that came late makes it older, never younger.
 static iwc_value_t since(const bridge_t *self, int64_t age_us) {
-    const int64_t gateway_us = self->facts.machine.now.t_us + bridge_clock_us(CLOCK_MONOTONIC) - self->heard_us;
+    const int64_t gateway_us = self->facts.machine.now.t_us + bridge_clock_us(CLOCK_MONOTONIC) - self->received_us;
     return (iwc_value_t){.known = true, .value = gateway_us - age_us};
 }
 

@@ -20,7 +20,7 @@ ros_twist_verdict_t ros_twist_read(const double linear[3], const double angular[
 }
 
 void ros_auto_init(ros_auto_t *self, int64_t now_us) {
-    *self = (ros_auto_t){.state = ROS_AUTO_TRUSTED, .moved_us = now_us, .heard_us = now_us, .tried_us = now_us};
+    *self = (ros_auto_t){.state = ROS_AUTO_TRUSTED, .moved_us = now_us, .received_us = now_us, .tried_us = now_us};
 }
 
 static ros_auto_state_t state_after_command(const ros_auto_t *self, int64_t now_us) {
@@ -28,7 +28,7 @@ static ros_auto_state_t state_after_command(const ros_auto_t *self, int64_t now_
     case ROS_AUTO_STOPPED:
         return ROS_AUTO_RESUMED;
     case ROS_AUTO_RESUMED:
-        return (now_us - self->heard_us >= ROS_SILENT_US) ? ROS_AUTO_TRUSTED : ROS_AUTO_RESUMED;
+        return (now_us - self->received_us >= ROS_SILENT_US) ? ROS_AUTO_TRUSTED : ROS_AUTO_RESUMED;
     default:
         return self->state;
     }
@@ -37,7 +37,7 @@ static ros_auto_state_t state_after_command(const ros_auto_t *self, int64_t now_
 bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
     const bool quiet = now_us - self->moved_us >= ROS_QUIET_US;
     self->state = state_after_command(self, now_us);
-    self->heard_us = now_us;
+    self->received_us = now_us;
     if (moves) {
         self->moved_us = now_us;
     }

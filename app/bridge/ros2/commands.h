@@ -38,8 +38,8 @@ typedef enum { ROS_AUTO_TRUSTED = 0, ROS_AUTO_WAITING, ROS_AUTO_STOPPED, ROS_AUT
 
 typedef struct {
     ros_auto_state_t state;
-    int64_t moved_us; ///< When a command that was none of zero came last, passed or not,
-    int64_t heard_us; ///< and any command.
+    int64_t moved_us;    ///< When a command that was none of zero came last, passed or not,
+    int64_t received_us; ///< and any command.
     int64_t tried_us;
 } ros_auto_t;
 

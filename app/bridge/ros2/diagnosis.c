@@ -130,7 +130,7 @@ static void tell_wheel(const iwc_wheel_t *wheel, ros_status_t *status) {
     }
 }
 
-static void tell_ledger(const ros_facts_t *facts, ros_status_t *status) {
+static void tell_assumptions(const ros_facts_t *facts, ros_status_t *status) {
     add(status, "assumed", true, facts->machine.assumed);
     if (facts->machine.contradicted[0] != '\0') {
         say(status, ROS_ERROR, "%s", facts->machine.contradicted);
@@ -219,8 +219,8 @@ void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out
     case ROS_TELLS_RIGHT:
         tell_wheel(&facts->machine.now.right, out_status);
         break;
-    case ROS_TELLS_LEDGER:
-        tell_ledger(facts, out_status);
+    case ROS_REPORTS_ASSUMPTIONS:
+        tell_assumptions(facts, out_status);
         break;
     default:
         tell_commands(facts, out_status);

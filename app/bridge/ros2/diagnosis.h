@@ -15,7 +15,7 @@ typedef enum {
     ROS_TELLS_TIMING,
     ROS_TELLS_LEFT,
     ROS_TELLS_RIGHT,
-    ROS_TELLS_LEDGER,
+    ROS_REPORTS_ASSUMPTIONS,
     ROS_TELLS_COMMANDS,
     ROS_TELLS
 } ros_tells_t;

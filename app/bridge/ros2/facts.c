@@ -62,42 +62,42 @@ void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine) {
 }
 
 /// The value of a ledger's entry, or what is configured; empty: neither is known.
-static void text_of(const iwc_message_t *ledger, valued_t which, const ros_machine_t *machine, char out[48]) {
+static void text_of(const iwc_message_t *assumptions, valued_t which, const ros_machine_t *machine, char out[48]) {
     char path[48];
     (void)snprintf(path, sizeof path, "%s.value", valued[which].item);
-    if (!iwc_text(ledger, path, out, 48)) {
+    if (!iwc_text(assumptions, path, out, 48)) {
         (void)snprintf(out, 48, "%s", machine->configured[which]);
     }
 }
 
 /// A number at the beginning of it; `otherwise` if there is none above 0.
-static long value_of(const iwc_message_t *ledger, valued_t which, const ros_machine_t *machine, long otherwise) {
+static long value_of(const iwc_message_t *assumptions, valued_t which, const ros_machine_t *machine, long otherwise) {
     char text[48];
-    text_of(ledger, which, machine, text);
+    text_of(assumptions, which, machine, text);
     const long value = strtol(text, NULL, 10);
     return (value > 0) ? value : otherwise;
 }
 
-static bool is_confirmed(const iwc_message_t *ledger, const char *item) {
+static bool is_confirmed(const iwc_message_t *assumptions, const char *item) {
     char path[48];
     (void)snprintf(path, sizeof path, "%s.state", item);
-    return iwc_is(ledger, path, "confirmed");
+    return iwc_is(assumptions, path, "confirmed");
 }
 
-static void tell_contradiction(const iwc_message_t *ledger, const char *item, ros_machine_t *machine) {
+static void tell_contradiction(const iwc_message_t *assumptions, const char *item, ros_machine_t *machine) {
     char path[48];
     char reason[160];
     char cure[160];
     (void)snprintf(path, sizeof path, "%s.reason", item);
-    (void)iwc_text(ledger, path, reason, sizeof reason);
+    (void)iwc_text(assumptions, path, reason, sizeof reason);
     (void)snprintf(path, sizeof path, "%s.disabled", item);
-    (void)iwc_text(ledger, path, cure, sizeof cure);
+    (void)iwc_text(assumptions, path, cure, sizeof cure);
     const size_t used = strlen(machine->contradicted);
     (void)snprintf(machine->contradicted + used, sizeof machine->contradicted - used, "%s%s: %s; %s",
                    (used > 0) ? ". " : "", item, reason, cure);
 }
 
-void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine) {
+void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine) {
     static const char *const items[] = {"setpoint_type",
                                         "current_role",
                                         "force_unit_left",
@@ -115,31 +115,31 @@ void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine)
     char path[48];
     char text[48];
     char *slash;
-    iwc_message_t ledger = {.is_event = true};
-    ledger.text = iwc_json(message, "ledger", &ledger.length);
-    if (ledger.text == NULL) {
+    iwc_message_t assumptions = {.is_event = true};
+    assumptions.text = iwc_json(message, "ledger", &assumptions.length);
+    if (assumptions.text == NULL) {
         return;
     }
     machine->contradicted[0] = '\0';
     machine->assumed = 0;
     for (size_t i = 0; i < sizeof items / sizeof items[0]; i++) {
         (void)snprintf(path, sizeof path, "%s.state", items[i]);
-        machine->assumed += iwc_is(&ledger, path, "assumed") ? 1U : 0U;
-        if (iwc_is(&ledger, path, "contradicted")) {
-            tell_contradiction(&ledger, items[i], machine);
+        machine->assumed += iwc_is(&assumptions, path, "assumed") ? 1U : 0U;
+        if (iwc_is(&assumptions, path, "contradicted")) {
+            tell_contradiction(&assumptions, items[i], machine);
         }
     }
-    text_of(&ledger, ROLE, machine, text);
+    text_of(&assumptions, ROLE, machine, text);
     machine->setpoint_current = strcmp(text, "setpoint") == 0;
-    machine->radius_mm = value_of(&ledger, RADIUS, machine, 192);
-    machine->track_mm = value_of(&ledger, TRACK, machine, 0);
-    text_of(&ledger, GEAR, machine, text);
+    machine->radius_mm = value_of(&assumptions, RADIUS, machine, 192);
+    machine->track_mm = value_of(&assumptions, TRACK, machine, 0);
+    text_of(&assumptions, GEAR, machine, text);
     const double turns = strtod(text, &slash);
     const double per = (*slash == '/') ? strtod(slash + 1, NULL) : 1.0;
     const double rotor_turns = (turns > 0.0 && per > 0.0) ? turns / per : 1.0;
     machine->measures = (ros_measures_t){
-        .radius_confirmed = is_confirmed(&ledger, "wheel_radius"),
-        .track_confirmed = is_confirmed(&ledger, "track"),
+        .radius_confirmed = is_confirmed(&assumptions, "wheel_radius"),
+        .track_confirmed = is_confirmed(&assumptions, "track"),
         .tick_m = 2.0 * M_PI * (double)machine->radius_mm / 1000.0 / TICKS_PER_TURN / rotor_turns,
         .track_m = (double)machine->track_mm / 1000.0,
     };

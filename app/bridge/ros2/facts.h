@@ -75,6 +75,6 @@ void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine);
 bool ros_facts_lack_values(const iwc_message_t *snapshot);
 
 /// Takes in what the ledger of a snapshot says: measures, contradictions. Dearer, and seldom new.
-void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine);
+void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine);
 
 #endif

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "ros2_bridge.h"
 
+#include "common/bridge_service.h"
 #include "common/program.h"
 #include "common/reach.h"
-#include "common/service.h"
 
 #include "ros_texts.h"
 
@@ -75,7 +75,7 @@ static int check_gateway(const ros_settings_t *settings) {
         ros_facts_read_config(&status, &machine);
     }
     if (iwc_ask(gateway, "{\"cmd\":\"status\"}", 1000, &status) == IWC_OK) {
-        ros_facts_read_ledger(&status, &machine);
+        ros_facts_read_assumptions(&status, &machine);
         if (settings->drive.enabled && machine.setpoint_current) {
             (void)puts("fail  current_role = setpoint: a twist carries no current, so driving is refused; set [drive] "
                        "enabled = no to watch");

@@ -165,7 +165,7 @@ static void tell(bridge_t *self, int64_t now) {
     ros_publish_diagnostics(self->ros, statuses, bridge_clock_us(CLOCK_REALTIME));
     if (now >= self->second_us) {
         self->second_us = now + SECOND_US;
-        self->ledger_due = true;
+        self->assumptions_due = true;
         if (self->facts.link == ROS_LINK_UP) {
             ros_publish_battery(self->ros, &self->facts.machine);
         }
@@ -182,7 +182,7 @@ void bridge_step(bridge_t *self) {
     }
     const int64_t now = bridge_monotonic_us();
     judge_silence(self, now);
-    if (self->facts.link == ROS_LINK_UP && now - self->heard_us > SILENT_US) {
+    if (self->facts.link == ROS_LINK_UP && now - self->received_us > SILENT_US) {
         self->facts.link = ROS_LINK_SILENT;
     }
     tell(self, now);
@@ -197,7 +197,8 @@ static int wait_ms(const bridge_t *self) {
         return 0;
     }
     const int64_t others[3] = {
-        here ? INT64_MAX : self->retry_us, (self->facts.link == ROS_LINK_UP) ? self->heard_us + SILENT_US : INT64_MAX,
+        here ? INT64_MAX : self->retry_us,
+        (self->facts.link == ROS_LINK_UP) ? self->received_us + SILENT_US : INT64_MAX,
         (self->commanded_us > 0) ? self->commanded_us + (int64_t)self->settings.drive.timeout_ms * 1000 : INT64_MAX};
     for (size_t i = 0; i < 3U; i++) {
         if (others[i] < next_us) {

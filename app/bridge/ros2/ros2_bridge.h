@@ -30,10 +30,10 @@ typedef struct {
     ros_auto_t auto_arm;
     int64_t leased_us;    ///< When this bridge was granted the lease; 0: it has none.
     uint64_t driver;      ///< The publisher that has the wheels: the first that drove since then; 0: none has driven.
-    bool ledger_due;      ///< Read it out of the next snapshot, in every state of the link.
+    bool assumptions_due; ///< Read it out of the next snapshot, in every state of the link.
     bool silenced;        ///< The stop that comes is ours: the source was silent. The lease has ended already.
     bool told_gone;       ///< In the log; in every state: a gateway that accepts and fails again is one absence.
-    int64_t heard_us;     ///< When the last snapshot came.
+    int64_t received_us;  ///< When the last snapshot came.
     int64_t commanded_us; ///< When the last command was passed on; 0: none since armed.
     int64_t coming_us;    ///< When the last command came, passed or not,
     int64_t moved_us;     ///< and the last one that was not zero; 0: none.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
-#include "common/service.h"
+#include "common/bridge_service.h"
 #include "firsts.h"
 #include "ros_parts.h"
 #include "ros_types.h"

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static relay_channel_t *channel_of(relay_t *self, const gw_client_t *client) {
+static relay_channel_t *channel_of(relay_t *self, const sock_client_t *client) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         if (self->channel[i].client == client->id) {
             return &self->channel[i];
@@ -36,12 +36,12 @@ static relay_channel_t *free_channel(relay_t *self) {
     return found;
 }
 
-static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
-    gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
+static void turn_away(relay_t *self, sock_client_t *client, const char *why) {
+    sock_log(&self->log, SOCK_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
     iwn_refusal_t refusal;
     (void)IWN_REFUSE(&refusal, IWN_BUS_DOWN, "no board on the serial line: ", why);
-    gw_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
-    gw_client_finish(client, self->now_us);
+    sock_clients_refuse(&self->clients, client, &(iwn_id_t){.kind = IWN_ID_NONE}, &refusal);
+    sock_client_finish(client, self->now_us);
 }
 
 /// An answer to a `drive` comes no later, unless it is lost: a longest line may be before it.
@@ -49,9 +49,9 @@ static uint64_t hold_us(const relay_t *self) {
     return 30000U + (uint64_t)4608U * 10U * 1000000U / self->settings->board.baud;
 }
 
-static void welcome(void *context, gw_client_t *client) {
+static void welcome(void *context, sock_client_t *client) {
     relay_t *self = (relay_t *)context;
-    if (client->right == GW_STOP) {
+    if (client->right == SOCK_STOP) {
         return; // A guest: guests.c carries out its one line.
     }
     relay_channel_t *channel = free_channel(self);
@@ -61,7 +61,7 @@ static void welcome(void *context, gw_client_t *client) {
     }
     *channel = (relay_channel_t){.state = RELAY_NEW,
                                  .client = client->id,
-                                 .watch = client->right == GW_WATCH,
+                                 .watch = client->right == SOCK_WATCH,
                                  .close_due = channel->close_due,
                                  .since_us = self->now_us,
                                  .used_us = self->now_us};
@@ -69,7 +69,7 @@ static void welcome(void *context, gw_client_t *client) {
 }
 
 /// Called once or oftener: who has gone holds no lease. Who only asks gets the answers it waits for.
-static void leave(void *context, gw_client_t *client) {
+static void leave(void *context, sock_client_t *client) {
     relay_channel_t *channel = channel_of((relay_t *)context, client);
     if (channel != NULL && channel->granted) {
         release(channel);
@@ -143,9 +143,9 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
     serial_queue_put(&channel->queue);
 }
 
-static void carry_out(void *context, gw_client_t *client, const char *line, size_t length) {
+static void carry_out(void *context, sock_client_t *client, const char *line, size_t length) {
     relay_t *self = (relay_t *)context;
-    if (client->right == GW_STOP) {
+    if (client->right == SOCK_STOP) {
         relay_guest_carry_out(self, client, line, length);
         return;
     }
@@ -153,7 +153,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
     iwn_request_t request;
     iwn_refusal_t refusal;
     iwn_json_t root;
-    if (channel == NULL || gw_client_is_closing(client)) {
+    if (channel == NULL || sock_client_is_closing(client)) {
         return;
     }
     iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
@@ -166,21 +166,21 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
             "of its group");
     } else if (iwn_json_check(line, length, &self->work, &root, &fault)) {
         const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
-        forward(self, channel, &request, root, gw_client_sent_us(client, self->now_us, since_us));
+        forward(self, channel, &request, root, sock_client_sent_us(client, self->now_us, since_us));
     }
     client->held = serial_queue_is_full(&channel->queue); // The next line stays where it is.
 }
 
-gw_servant_t relay_servant(relay_t *self) {
-    return (gw_servant_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
+sock_handler_t relay_handler(relay_t *self) {
+    return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
 }
 
 // ---- an answer ----------------------------------------------------------------------------------------------------
 
 /// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
-static void pass_reply(relay_t *self, gw_client_t *owner, const serial_request_t *request, const char *rest,
+static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request_t *request, const char *rest,
                        size_t length) {
-    gw_client_t *client = relay_guest_or(self, owner, request);
+    sock_client_t *client = relay_guest_or(self, owner, request);
     if (client == NULL) {
         return;
     }
@@ -188,21 +188,21 @@ static void pass_reply(relay_t *self, gw_client_t *owner, const serial_request_t
     if (length + 1U < json.size - json.length) {
         memcpy(&json.data[json.length], rest, length);
         json.data[json.length + length] = '\n';
-        gw_client_reply(client, json.data, json.length + length + 1U);
+        sock_client_reply(client, json.data, json.length + length + 1U);
     }
 }
 
-static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *client) {
+static void tell_answered(relay_t *self, relay_channel_t *channel, sock_client_t *client) {
     const serial_request_t *request;
     while ((request = serial_queue_answered(&channel->queue)) != NULL) {
         if (request->state == SERIAL_HELD) {
             pass_reply(self, client, request, request->json, request->length);
         } else {
             iwn_refusal_t refusal;
-            gw_client_t *who = relay_guest_or(self, client, request);
+            sock_client_t *who = relay_guest_or(self, client, request);
             (void)IWN_REFUSE(&refusal, request->error, request->reason);
             if (who != NULL) {
-                gw_clients_refuse(&self->clients, who, &request->id, &refusal);
+                sock_clients_refuse(&self->clients, who, &request->id, &refusal);
             }
         }
         serial_queue_drop(&channel->queue);
@@ -231,7 +231,7 @@ static bool read_reply(const char **at, const char *end, uint64_t *out_number, b
     return *out_ok || skip(at, end, ",\"ok\":false");
 }
 
-static void take_reply(relay_t *self, relay_channel_t *channel, gw_client_t *client, const iwn_line_t *line) {
+static void take_reply(relay_t *self, relay_channel_t *channel, sock_client_t *client, const iwn_line_t *line) {
     const char *end = &line->json[line->length];
     const char *at = line->json;
     const serial_request_t *oldest = &channel->queue.ring[channel->queue.first];
@@ -258,7 +258,7 @@ static bool begins(const iwn_line_t *line, const char *words) {
 
 void relay_take_line(relay_t *self, const iwn_line_t *line) {
     relay_channel_t *channel = &self->channel[line->channel];
-    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
+    sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     const bool hello = begins(line, "{\"event\":\"hello\"");
     if (client == NULL || (channel->state != RELAY_WELCOMED && !hello) ||
         line->length + 1U > sizeof self->clients.line) {
@@ -272,19 +272,19 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     self->clients.line[line->length] = '\n';
     if (hello && channel->state != RELAY_WELCOMED) {
         channel->state = RELAY_WELCOMED;
-        gw_client_reply(client, self->clients.line, line->length + 1U);
+        sock_client_reply(client, self->clients.line, line->length + 1U);
     } else if (!hello) {
-        gw_client_event(client, self->clients.line, line->length + 1U);
+        sock_client_event(client, self->clients.line, line->length + 1U);
     }
 }
 
 // ---- coming and going ---------------------------------------------------------------------------------------------
 
 static void drop_client(relay_t *self, relay_channel_t *channel) {
-    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
+    sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     release(channel);
     if (client != NULL) {
-        gw_client_finish(client, self->now_us);
+        sock_client_finish(client, self->now_us);
     }
 }
 
@@ -297,9 +297,9 @@ void relay_drop_clients(relay_t *self) {
     }
 }
 
-static void tend(relay_t *self, relay_channel_t *channel) {
-    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
-    if (client == NULL || gw_client_is_closing(client) || gw_client_is_broken(client)) {
+static void poll_channel(relay_t *self, relay_channel_t *channel) {
+    sock_client_t *client = sock_clients_find(&self->clients, channel->client);
+    if (client == NULL || sock_client_is_closing(client) || sock_client_is_broken(client)) {
         release(channel);
         return;
     }
@@ -318,14 +318,14 @@ static void tend(relay_t *self, relay_channel_t *channel) {
     client->owed = channel->queue.count > 0U; // Who has said all it has to say is kept for its answers.
     if (client->held && !serial_queue_is_full(&channel->queue)) {
         client->held = false;
-        gw_client_check_caught_up(client, self->now_us);
+        sock_client_check_caught_up(client, self->now_us);
     }
 }
 
-void relay_tend_channels(relay_t *self) {
+void relay_poll_channels(relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         if (self->channel[i].state != RELAY_FREE) {
-            tend(self, &self->channel[i]);
+            poll_channel(self, &self->channel[i]);
         }
     }
 }
@@ -393,7 +393,7 @@ static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
         self->asked_us = self->now_us;
         return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
     }
-    return (self->link.state == SERIAL_LINKED && gw_clients_count(&self->clients) > 0U &&
+    return (self->link.state == SERIAL_LINKED && sock_clients_count(&self->clients) > 0U &&
             self->now_us >= self->said_us + RELAY_ALIVE_US)
                ? write_line(0, alive, sizeof alive - 1U, out, size)
                : 0U;

@@ -34,7 +34,7 @@ static relay_channel_t *quietest_channel(relay_t *self) {
 }
 
 /// A stop of a client for which there is no channel goes by another's.
-static bool forward_stop(relay_t *self, gw_client_t *client, const iwn_request_t *asked, iwn_json_t root) {
+static bool forward_stop(relay_t *self, sock_client_t *client, const iwn_request_t *asked, iwn_json_t root) {
     relay_channel_t *channel = quietest_channel(self);
     if (channel == NULL) {
         return false;
@@ -51,7 +51,7 @@ static bool forward_stop(relay_t *self, gw_client_t *client, const iwn_request_t
     return true;
 }
 
-void relay_guest_carry_out(relay_t *self, gw_client_t *client, const char *line, size_t length) {
+void relay_guest_carry_out(relay_t *self, sock_client_t *client, const char *line, size_t length) {
     iwn_request_t request;
     iwn_refusal_t refusal;
     iwn_json_t root;
@@ -59,16 +59,16 @@ void relay_guest_carry_out(relay_t *self, gw_client_t *client, const char *line,
     const bool stops = iwn_request_read(line, length, &self->work, &request, &refusal) && iwn_cmd_stops(request.cmd) &&
                        iwn_json_check(line, length, &self->work, &root, &fault);
     if (!stops || !forward_stop(self, client, &request, root)) {
-        gw_service_refuse_crowd(&self->clients, client, &refusal);
-        gw_clients_refuse(&self->clients, client, &request.id, &refusal);
+        sock_service_refuse_crowd(&self->clients, client, &refusal);
+        sock_clients_refuse(&self->clients, client, &request.id, &refusal);
     }
 }
 
-gw_client_t *relay_guest_or(relay_t *self, gw_client_t *client, const serial_request_t *request) {
+sock_client_t *relay_guest_or(relay_t *self, sock_client_t *client, const serial_request_t *request) {
     if (request->guest == IW_CLIENT_NONE) {
         return client;
     }
-    gw_client_t *guest = gw_clients_find(&self->clients, request->guest);
+    sock_client_t *guest = sock_clients_find(&self->clients, request->guest);
     if (guest != NULL) {
         guest->owed = false;
     }

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
+#define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 6)
 /// Read of the port in one cycle.
 #define READS_PER_CYCLE 4U
 /// What waits in the kernel's buffer on purpose, so that the line never pauses: it is as old as that when it leaves.
@@ -31,7 +31,7 @@
 // ---- the port -----------------------------------------------------------------------------------------------------
 
 static void watch_port(relay_t *self, int operation) {
-    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
     interest.events |= (self->out_length > 0U) ? (uint32_t)EPOLLOUT : 0U;
     (void)epoll_ctl(self->clients.epoll_fd, operation, self->port.fd, &interest);
 }
@@ -39,7 +39,7 @@ static void watch_port(relay_t *self, int operation) {
 static void set_trouble(relay_t *self, const char *words) {
     if (strcmp(self->trouble, words) != 0) {
         (void)snprintf(self->trouble, sizeof self->trouble, "%s", words);
-        gw_log(&self->log, GW_LOG_WARNING, "%s", self->trouble);
+        sock_log(&self->log, SOCK_LOG_WARNING, "%s", self->trouble);
     }
 }
 
@@ -77,8 +77,8 @@ static int open_port(relay_t *self) {
 
 /// The board is there, or has started anew: whoever was served by the one of before is closed.
 static void greet(relay_t *self) {
-    gw_log(&self->log, GW_LOG_INFO, "board on %s: start %s, version %s", self->settings->board.port, self->link.boot,
-           (self->link.version[0] != '\0') ? self->link.version : "unknown");
+    sock_log(&self->log, SOCK_LOG_INFO, "board on %s: start %s, version %s", self->settings->board.port,
+             self->link.boot, (self->link.version[0] != '\0') ? self->link.version : "unknown");
     self->backoff_us = BACKOFF_MIN_US;
     self->trouble[0] = '\0';
     relay_drop_clients(self);
@@ -121,7 +121,7 @@ static void read_port(relay_t *self) {
     }
 }
 
-static void tend_link(relay_t *self) {
+static void poll_link(relay_t *self) {
     char words[sizeof self->trouble];
     const bool fell_silent = serial_link_fell_silent(&self->link, self->now_us);
     if (fell_silent) {
@@ -171,7 +171,7 @@ static void write_port(relay_t *self) {
 }
 
 /// What the kernel holds back for so long is old by now, and so is all that would follow it.
-static void tend_port(relay_t *self) {
+static void poll_port(relay_t *self) {
     if (self->port.fd < 0 && self->now_us >= self->retry_us) {
         (void)open_port(self);
     } else if (self->port.fd >= 0 && self->out_length > 0U && self->now_us >= self->said_us + RELAY_STUCK_US &&
@@ -195,11 +195,11 @@ static int open_loop(relay_t *self) {
     (void)sigaddset(&set, SIGINT);
     (void)sigprocmask(SIG_BLOCK, &set, NULL);
     self->signal_fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
-    const int error = gw_wakeup_open(&self->wakeup);
+    const int error = sock_wakeup_open(&self->wakeup);
     self->clients.epoll_fd = self->wakeup.fd;
-    if (self->signal_fd < 0 || error != 0 || watch(self, self->signal_fd, GW_TAG_SIGNAL) != 0 ||
-        watch(self, self->clients.listener[GW_DRIVE].fd, GW_TAG_LISTENER) != 0 ||
-        watch(self, self->clients.listener[GW_WATCH].fd, GW_TAG_WATCH_LISTENER) != 0) {
+    if (self->signal_fd < 0 || error != 0 || watch(self, self->signal_fd, SOCK_TAG_SIGNAL) != 0 ||
+        watch(self, self->clients.listener[SOCK_DRIVE].fd, SOCK_TAG_LISTENER) != 0 ||
+        watch(self, self->clients.listener[SOCK_WATCH].fd, SOCK_TAG_WATCH_LISTENER) != 0) {
         (void)fputs("iwheel-serial: cannot make the descriptors for the event loop; raise the limit of open files\n",
                     stderr);
         return EX_UNAVAILABLE;
@@ -213,9 +213,9 @@ static uint64_t earlier(uint64_t a_us, uint64_t b_us) {
 
 /// When the loop must come round by itself.
 static uint64_t next_us(const relay_t *self) {
-    const bool busy = gw_clients_count(&self->clients) > 0U;
+    const bool busy = sock_clients_count(&self->clients) > 0U;
     uint64_t then_us = self->now_us + (busy ? RELAY_ALIVE_US / 2U : IDLE_US);
-    then_us = earlier(then_us, gw_service_next_us(&self->clients));
+    then_us = earlier(then_us, sock_service_next_us(&self->clients));
     if (self->port.fd < 0) {
         return earlier(then_us, self->retry_us);
     }
@@ -234,11 +234,11 @@ static void judge_gap(relay_t *self) {
     }
     const uint64_t away_us = self->now_us - self->planned_us;
     self->gap_us = self->now_us;
-    if (gw_clients_count(&self->clients) == 0U) {
+    if (sock_clients_count(&self->clients) == 0U) {
         return;
     }
-    gw_log(&self->log, GW_LOG_WARNING, "the relay was stopped or starved for %llu ms: what waited is not sent",
-           (unsigned long long)(away_us / 1000U));
+    sock_log(&self->log, SOCK_LOG_WARNING, "the relay was stopped or starved for %llu ms: what waited is not sent",
+             (unsigned long long)(away_us / 1000U));
     if (away_us >= RELAY_LEFT_US) {
         relay_drop_clients(self); // The board has closed their channels.
     }
@@ -247,19 +247,19 @@ static void judge_gap(relay_t *self) {
 /// True if somebody wants to be let in.
 static bool note_event(relay_t *self, const struct epoll_event *event, bool *out_end) {
     switch (event->data.u64) {
-    case GW_TAG_SIGNAL:
+    case SOCK_TAG_SIGNAL:
         *out_end = true;
         return false;
-    case GW_TAG_LISTENER:
-    case GW_TAG_WATCH_LISTENER:
+    case SOCK_TAG_LISTENER:
+    case SOCK_TAG_WATCH_LISTENER:
         return true;
-    case GW_TAG_BUS:
+    case SOCK_TAG_BUS:
         if ((event->events & (EPOLLHUP | EPOLLERR)) != 0U && self->port.fd >= 0) {
             lose_port(self, "the port has gone: was the cable pulled?");
         }
         return false;
     default: {
-        gw_client_t *client = &self->clients.client[event->data.u64 - GW_TAG_CLIENT];
+        sock_client_t *client = &self->clients.client[event->data.u64 - SOCK_TAG_CLIENT];
         client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
         client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
         client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
@@ -270,18 +270,18 @@ static bool note_event(relay_t *self, const struct epoll_event *event, bool *out
 
 /// The clients are read before the board: a stamp that came while a command waited is not quoted by it.
 static void cycle(relay_t *self, bool somebody_knocks) {
-    gw_service_clients(&self->clients, IW_CLIENT_NONE);
+    sock_service_clients(&self->clients, IW_CLIENT_NONE);
     if (self->port.fd >= 0) {
         read_port(self);
     }
-    tend_port(self);
-    tend_link(self);
+    poll_port(self);
+    poll_link(self);
     if (somebody_knocks) {
-        gw_service_accept(&self->clients);
+        sock_service_accept(&self->clients);
     }
-    relay_tend_channels(self);
+    relay_poll_channels(self);
     write_port(self);
-    gw_service_flush(&self->clients, IW_CLIENT_NONE);
+    sock_service_flush(&self->clients, IW_CLIENT_NONE);
     bridge_service_round(&self->service, self->now_us);
 }
 
@@ -290,17 +290,17 @@ static int loop(relay_t *self) {
     bridge_service_tell(&self->service, "READY=1");
     while (!ends) {
         struct epoll_event events[EVENTS_PER_WAIT];
-        const uint64_t then_us = gw_service_is_busy(&self->clients) ? 0U : next_us(self);
+        const uint64_t then_us = sock_service_is_busy(&self->clients) ? 0U : next_us(self);
         bool knocks = false;
         self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
-        const int count = gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, 0U, then_us);
+        const int count = sock_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, 0U, then_us);
         if (count < 0) {
             if (errno != EINTR) {
                 return EX_SOFTWARE;
             }
             continue; // It has found nothing out: what waits is not to be taken for new.
         }
-        self->now_us = iw_clock_now_us();
+        self->now_us = iwl_clock_now_us();
         self->clients.now_us = self->now_us;
         judge_gap(self);
         for (int i = 0; i < count; i++) {
@@ -315,19 +315,19 @@ static int loop(relay_t *self) {
 
 static int open_sockets(relay_t *self) {
     const serial_settings_t *settings = self->settings;
-    const gw_listener_wish_t drive = {"iwheel-serial", GW_DRIVE, settings->northbound.socket,
-                                      settings->northbound.group, settings->northbound.mode};
-    const gw_listener_wish_t watching = {"iwheel-serial", GW_WATCH, settings->northbound.watch_socket,
-                                         settings->northbound.watch_group, settings->northbound.watch_mode};
-    gw_listener_t *listener = self->clients.listener;
-    int result = gw_listener_prepare(&listener[GW_DRIVE], &drive, stderr);
+    const sock_listener_config_t drive = {"iwheel-serial", SOCK_DRIVE, settings->northbound.socket,
+                                          settings->northbound.group, settings->northbound.mode};
+    const sock_listener_config_t watching = {"iwheel-serial", SOCK_WATCH, settings->northbound.watch_socket,
+                                             settings->northbound.watch_group, settings->northbound.watch_mode};
+    sock_listener_t *listener = self->clients.listener;
+    int result = sock_listener_prepare(&listener[SOCK_DRIVE], &drive, stderr);
     if (result == 0) {
-        result = gw_listener_open(&listener[GW_DRIVE], &self->log, stderr);
+        result = sock_listener_open(&listener[SOCK_DRIVE], &self->log, stderr);
     }
     if (result == 0 && strcmp(watching.path, "none") != 0) {
-        result = gw_listener_prepare(&listener[GW_WATCH], &watching, stderr);
+        result = sock_listener_prepare(&listener[SOCK_WATCH], &watching, stderr);
         if (result == 0) {
-            result = gw_listener_open(&listener[GW_WATCH], &self->log, stderr);
+            result = sock_listener_open(&listener[SOCK_WATCH], &self->log, stderr);
         }
     }
     return result;
@@ -338,17 +338,17 @@ static void compose(relay_t *self, const serial_settings_t *settings) {
     memset(self, 0, sizeof *self);
     self->settings = settings;
     self->port.fd = -1;
-    self->clients.servant = relay_servant(self);
+    self->clients.handler = relay_handler(self);
     self->clients.log = &self->log;
-    self->clients.most[GW_DRIVE] = settings->northbound.max_clients;
-    self->clients.most[GW_WATCH] = settings->northbound.max_watchers;
-    for (unsigned right = 0; right < GW_RIGHTS; right++) {
-        self->clients.listener[right] = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    self->clients.most[SOCK_DRIVE] = settings->northbound.max_clients;
+    self->clients.most[SOCK_WATCH] = settings->northbound.max_watchers;
+    for (unsigned right = 0; right < SOCK_RIGHTS; right++) {
+        self->clients.listener[right] = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
     }
     self->backoff_us = BACKOFF_MIN_US;
-    self->now_us = iw_clock_now_us();
+    self->now_us = iwl_clock_now_us();
     self->clients.now_us = self->now_us;
-    gw_log_open(&self->log, GW_LOG_INFO);
+    sock_log_open(&self->log, SOCK_LOG_INFO);
     self->log.program = "iwheel-serial";
 }
 
@@ -372,17 +372,17 @@ int relay_run(relay_t *self, const serial_settings_t *settings) {
     }
     if (result == 0) {
         bridge_service_open(&self->service);
-        gw_log(&self->log, GW_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,
-               (unsigned)settings->board.baud, settings->northbound.socket);
+        sock_log(&self->log, SOCK_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,
+                 (unsigned)settings->board.baud, settings->northbound.socket);
         result = loop(self);
         bridge_service_tell(&self->service, "STOPPING=1");
         relay_drop_clients(self);
         write_port(self); // As far as it goes: the board also ends who says nothing.
-        gw_service_close_all(&self->clients);
+        sock_service_close_all(&self->clients);
     }
     serial_port_close(&self->port);
-    gw_listener_close(&self->clients.listener[GW_WATCH]);
-    gw_listener_close(&self->clients.listener[GW_DRIVE]);
-    gw_log_close(&self->log);
+    sock_listener_close(&self->clients.listener[SOCK_WATCH]);
+    sock_listener_close(&self->clients.listener[SOCK_DRIVE]);
+    sock_log_close(&self->log);
     return result;
 }

@@ -8,21 +8,21 @@
 ///   the last time that nothing of that client was waiting. The quote never changes after that.
 /// - When the loop itself was away for longer than RELAY_GAP_US (stopped, starved, suspended), whatever could lead to a motion and
 ///   was waiting then is refused. Away for longer than RELAY_LEFT_US, every client is closed: the board has closed the channels.
-/// - A command leaves only for a line that has room for it at once (queue.h).
+/// - A command leaves only for a line that has room for it at once (serial_queue.h).
 ///
 ///     port: CLOSED --opens--> ASKING (link, every RELAY_ASK_US) --event link--> LINKED: clients are served
 ///                ^------------- goes, or cannot be written to -----'
-#ifndef IW_SERIAL_RELAY_H
-#define IW_SERIAL_RELAY_H
+#ifndef SERIAL_RELAY_H
+#define SERIAL_RELAY_H
 
-#include "port.h"
-#include "queue.h"
 #include "serial_link.h"
+#include "serial_port.h"
+#include "serial_queue.h"
 #include "serial_settings.h"
 
-#include "common/service.h"
-#include "sockets/clients.h"
+#include "common/bridge_service.h"
 #include "sockets/log.h"
+#include "sockets/sock_clients.h"
 #include "sockets/wakeup.h"
 
 /// The loop comes round at least this often while there are clients, and says so to the board.
@@ -63,9 +63,9 @@ typedef struct {
 
 typedef struct {
     const serial_settings_t *settings;
-    gw_log_t log;
-    gw_clients_t clients;
-    gw_wakeup_t wakeup;
+    sock_log_t log;
+    sock_clients_t clients;
+    sock_wakeup_t wakeup;
     bridge_service_t service;
     serial_port_t port;
     serial_link_t link;
@@ -94,16 +94,16 @@ int relay_run(relay_t *self, const serial_settings_t *settings);
 
 // ---- channels.c: the clients' side --------------------------------------------------------------------------------
 
-gw_servant_t relay_servant(relay_t *self);
+sock_handler_t relay_handler(relay_t *self);
 
 /// Writes the request without its id, and with this one; its length, 0 if it does not fit.
 size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size);
 
 /// The one line of a client beyond the maximum (guests.c): a stop goes by the channel of another client, all else is refused.
-void relay_guest_carry_out(relay_t *self, gw_client_t *client, const char *line, size_t length);
+void relay_guest_carry_out(relay_t *self, sock_client_t *client, const char *line, size_t length);
 
 /// Who gets the answer to a request: the channel's client, or the guest that asked by it. NULL: that one has gone.
-gw_client_t *relay_guest_or(relay_t *self, gw_client_t *client, const serial_request_t *request);
+sock_client_t *relay_guest_or(relay_t *self, sock_client_t *client, const serial_request_t *request);
 
 /// A line of the board's for a client.
 void relay_take_line(relay_t *self, const iwn_line_t *line);
@@ -112,7 +112,7 @@ void relay_take_line(relay_t *self, const iwn_line_t *line);
 void relay_drop_clients(relay_t *self);
 
 /// What time does to requests; answers that we give ourselves; clients that have gone.
-void relay_tend_channels(relay_t *self);
+void relay_poll_channels(relay_t *self);
 uint64_t relay_channels_next_us(const relay_t *self);
 
 /// Writes the next line for the board into `out`; its length, 0 if there is none.

@@ -13,7 +13,7 @@ void serial_link_init(serial_link_t *self, uint64_t now_us) {
     fall_silent(self);
     self->boot[0] = '\0';
     self->version[0] = '\0';
-    self->heard_us = now_us;
+    self->received_us = now_us;
     self->noise = (serial_noise_t){.bytes = 0};
     iwn_receiver_init(&self->receiver, self->buffer, sizeof self->buffer, true);
 }
@@ -25,7 +25,7 @@ static serial_stamp_t *newest(serial_link_t *self) {
 /// Of stamps that come close together the newest is kept only once another is far enough away: the ring reaches back.
 static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
     const bool close =
-        self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].heard_us < SERIAL_STAMP_US;
+        self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].received_us < SERIAL_STAMP_US;
     self->stamps += close ? 0U : 1U;
     *newest(self) = (serial_stamp_t){now_us, t_us};
 }
@@ -33,7 +33,7 @@ static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us) {
     for (unsigned back = 1; back <= self->stamps && back <= SERIAL_STAMPS; back++) {
         const serial_stamp_t *stamp = &self->stamp[(self->stamps - back) % SERIAL_STAMPS];
-        if (stamp->heard_us <= then_us) {
+        if (stamp->received_us <= then_us) {
             *out_t_us = stamp->t_us;
             return true;
         }
@@ -98,7 +98,7 @@ static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t n
         self->refused++;
         return SERIAL_NEWS_NONE;
     }
-    self->heard_us = now_us;
+    self->received_us = now_us;
     self->noise = (serial_noise_t){.bytes = 0};
     // A board's time falls when it starts anew, whatever it says of itself.
     const bool fell = self->state == SERIAL_LINKED && self->stamps > 0U && line->t_us < newest(self)->t_us;
@@ -140,7 +140,7 @@ serial_news_t serial_link_put(serial_link_t *self, char byte, uint64_t now_us, i
 }
 
 bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us) {
-    if (self->state == SERIAL_SILENT || now_us < self->heard_us + SERIAL_SILENT_US) {
+    if (self->state == SERIAL_SILENT || now_us < self->received_us + SERIAL_SILENT_US) {
         return false;
     }
     fall_silent(self);

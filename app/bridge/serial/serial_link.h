@@ -6,8 +6,8 @@
 ///                              '--another boot, a stamp that falls--> SILENT (and at once LINKED with the other boot)
 ///
 /// Pure: bytes and time in, lines and words out.
-#ifndef IW_SERIAL_LINK_H
-#define IW_SERIAL_LINK_H
+#ifndef SERIAL_LINK_H
+#define SERIAL_LINK_H
 
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/line.h"
@@ -25,8 +25,8 @@
 #define SERIAL_SAMPLE 48U
 
 typedef struct {
-    uint64_t heard_us; ///< By our clock.
-    uint64_t t_us;     ///< By the board's.
+    uint64_t received_us; ///< By our clock.
+    uint64_t t_us;        ///< By the board's.
 } serial_stamp_t;
 
 /// What came over the line since it was opened or last understood.
@@ -46,7 +46,7 @@ typedef struct {
     serial_link_state_t state;
     char boot[IWN_LINE_BOOT + 1U];
     char version[33];
-    uint64_t heard_us; ///< The last good line, or when the port was opened.
+    uint64_t received_us; ///< The last good line, or when the port was opened.
     serial_stamp_t stamp[SERIAL_STAMPS];
     unsigned stamps; ///< Ever noted since the boot was learnt.
     serial_noise_t noise;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "serial_settings.h"
 
-#include "port.h"
+#include "serial_port.h"
 
 #include "iwheel_northbound/line.h"
 

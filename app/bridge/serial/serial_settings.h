@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What may be configured of the relay: share/serial.conf.
-#ifndef IW_SERIAL_SETTINGS_H
-#define IW_SERIAL_SETTINGS_H
+#ifndef SERIAL_SETTINGS_H
+#define SERIAL_SETTINGS_H
 
 #include "config/settings.h"
 

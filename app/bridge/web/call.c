@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One request: judged, answered, or passed on to the gateway (ask.c).
+// One request: judged, answered, or passed on to the gateway (web_ask.c).
 #include "call.h"
 
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// Between the two parts of answering a request: call.c (with HTTP) and ask.c (with the gateway).
-#ifndef IW_WEB_CALL_H
-#define IW_WEB_CALL_H
+/// Between the two parts of answering a request: call.c (with HTTP) and web_ask.c (with the gateway).
+#ifndef WEB_CALL_H
+#define WEB_CALL_H
 
-#include "server.h"
+#include "web_server.h"
 
 /// The message of a stop, or anything else, that found no gateway.
 extern const char *const web_not_there;

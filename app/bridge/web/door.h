@@ -3,8 +3,8 @@
 ///
 /// Everybody has WEB_DOOR_GRACE_US to speak. After that the oldest makes room when the room is full; until then newcomers wait in the
 /// kernel's queue, and come in at WEB_DOOR_MAX per grace or faster.
-#ifndef IW_WEB_DOOR_H
-#define IW_WEB_DOOR_H
+#ifndef WEB_DOOR_H
+#define WEB_DOOR_H
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -7,10 +7,10 @@
 ///
 ///     NOBODY --begin--> DRIVEN --end--> NOBODY
 ///     silent (only from DRIVEN): the page has said nothing for so long that the bridge lets go
-#ifndef IW_WEB_DRIVER_H
-#define IW_WEB_DRIVER_H
+#ifndef WEB_DRIVER_H
+#define WEB_DRIVER_H
 
-#include "judge.h"
+#include "web_judge.h"
 
 /// How long a page that has armed may take for its first command, and a driving one between two.
 #define WEB_FIRST_US  1000000U

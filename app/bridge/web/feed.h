@@ -3,8 +3,8 @@
 ///
 /// Pure: no socket, no clock. Bounded: WEB_FEED_KEPT events, one state, and what readers are in the middle of. A reader that falls behind is
 /// told how many it missed (event `lost`, as the gateway tells it), never waited for. One thread.
-#ifndef IW_WEB_FEED_H
-#define IW_WEB_FEED_H
+#ifndef WEB_FEED_H
+#define WEB_FEED_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -2,8 +2,8 @@
 /// The listening sockets of the page: those that systemd holds (iwheel-web.socket), also while the bridge restarts, or its own.
 ///
 /// A page on loopback has both 127.0.0.1 and [::1]: `localhost` may mean either, and the one that is free any local user could take.
-#ifndef IW_WEB_LISTEN_H
-#define IW_WEB_LISTEN_H
+#ifndef WEB_LISTEN_H
+#define WEB_LISTEN_H
 
 #include "door.h"
 #include "web_settings.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include "common/bridge_service.h"
 #include "common/program.h"
-#include "common/service.h"
-#include "server.h"
+#include "web_server.h"
 
 #include "web_texts.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The newest state as OpenMetrics text. What is not known is left out: no invented zero. Pure but for the stream.
-#ifndef IW_WEB_METRICS_H
-#define IW_WEB_METRICS_H
+#ifndef WEB_METRICS_H
+#define WEB_METRICS_H
 
 #include "iwheel_client/client.h"
 

@@ -11,8 +11,8 @@
 /// as `Bearer`: who gets it may read, and cannot drive, reset or arm.
 ///
 /// Pure but for the HMAC of GnuTLS: no socket, no clock. Fixed memory.
-#ifndef IW_WEB_PROOF_H
-#define IW_WEB_PROOF_H
+#ifndef WEB_PROOF_H
+#define WEB_PROOF_H
 
 #include "common/secret.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The secret of the page: a file that only the bridge may read.
-#ifndef IW_WEB_TOKEN_H
-#define IW_WEB_TOKEN_H
+#ifndef WEB_TOKEN_H
+#define WEB_TOKEN_H
 
-#include "judge.h"
+#include "web_judge.h"
 
 #include <stdio.h>
 #include <time.h>

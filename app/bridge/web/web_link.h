@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What the page is told of the gateway: its newest state, what happens, the last stops. And the connection to it.
-#ifndef IW_WEB_LINK_H
-#define IW_WEB_LINK_H
+#ifndef WEB_LINK_H
+#define WEB_LINK_H
 
 #include "common/bridge_link.h"
 #include "common/lease.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What may be configured of the web bridge: share/web.conf.
-#ifndef IW_WEB_SETTINGS_H
-#define IW_WEB_SETTINGS_H
+#ifndef WEB_SETTINGS_H
+#define WEB_SETTINGS_H
 
 #include "config/settings.h"
 

@@ -16,36 +16,36 @@
 
 /// A board has no room for sentences: what it tells in figures gets the daemon's words.
 static void explain(const char *name, json_t *entry) {
-    char text[GW_EVIDENCE_SIZE];
-    iw_ledger_item_t item;
-    iw_ledger_entry_t known = {.figure = (int32_t)json_integer_value(json_object_get(entry, "figure"))};
-    if (!iwn_ledger_item_of(name, &item) || json_is_string(json_object_get(entry, "reason"))) {
+    char text[INSPECT_SOURCE_SIZE];
+    iw_assumption_item_t item;
+    iw_assumption_entry_t known = {.figure = (int32_t)json_integer_value(json_object_get(entry, "figure"))};
+    if (!iwn_assumption_item_of(name, &item) || json_is_string(json_object_get(entry, "reason"))) {
         return;
     }
-    for (int state = 0; state <= (int)IW_LEDGER_CONTRADICTED; state++) {
-        if (strcmp(text_word(entry, "state"), iwn_ledger_state_name((iw_ledger_state_t)state)) == 0) {
-            known.state = (iw_ledger_state_t)state;
+    for (int state = 0; state <= (int)IW_CONTRADICTED; state++) {
+        if (strcmp(text_word(entry, "state"), iwn_assumption_state_name((iw_assumption_state_t)state)) == 0) {
+            known.state = (iw_assumption_state_t)state;
         }
     }
-    for (int evidence = 0; evidence <= (int)IW_EVIDENCE_OPERATOR; evidence++) {
-        if (strcmp(text_word(entry, "evidence"), iwn_evidence_name((iw_evidence_t)evidence)) == 0) {
-            known.evidence = (iw_evidence_t)evidence;
+    for (int source = 0; source <= (int)IW_SOURCE_OPERATOR; source++) {
+        if (strcmp(text_word(entry, "evidence"), iwn_source_name((iw_source_t)source)) == 0) {
+            known.source = (iw_source_t)source;
         }
     }
-    gw_assumption_evidence(item, &known, &(gw_word_t){"", ""}, text);
-    if (known.evidence == IW_EVIDENCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
+    inspect_assumption_source(item, &known, &(inspect_word_t){"", ""}, text);
+    if (known.source == IW_SOURCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
         (void)snprintf(text, sizeof text, "the bus showed it");
     }
     (void)json_object_set_new(entry, "reason", json_string(text));
-    if (known.state == IW_LEDGER_CONTRADICTED) {
-        (void)json_object_set_new(entry, "disabled", json_string(gw_assumption_cost(item)));
+    if (known.state == IW_CONTRADICTED) {
+        (void)json_object_set_new(entry, "disabled", json_string(inspect_assumption_cost(item)));
     }
 }
 
-void ctl_explain_ledger(json_t *ledger) {
+void ctl_explain_assumptions(json_t *assumptions) {
     const char *name = NULL;
     json_t *entry = NULL;
-    json_object_foreach(ledger, name, entry) {
+    json_object_foreach(assumptions, name, entry) {
         explain(name, entry);
     }
 }
@@ -64,7 +64,7 @@ static void print_item(const paper_t *paper, const char *label, tone_t tone, con
     }
 }
 
-static void print_state(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
+static void print_state(const paper_t *paper, json_t *assumptions, const char *state, tone_t tone) {
     char label[PAPER_LABEL + 1U];
     const char *name = NULL;
     json_t *entry = NULL;
@@ -73,7 +73,7 @@ static void print_state(const paper_t *paper, json_t *ledger, const char *state,
         label[length] = (char)toupper((unsigned char)state[length]);
     }
     label[length] = '\0';
-    json_object_foreach(ledger, name, entry) {
+    json_object_foreach(assumptions, name, entry) {
         if (strcmp(text_word(entry, "state"), state) == 0) {
             print_item(paper, label, tone, name, entry);
             label[0] = '\0';
@@ -89,11 +89,11 @@ int verb_ledger(ctl_t *self, int count, char **words) {
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);
     if (code == CTL_OK && !self->json) {
         const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
-        json_t *ledger = json_object_get(status, "ledger");
-        ctl_explain_ledger(ledger);
-        print_state(&paper, ledger, "contradicted", TONE_BAD);
-        print_state(&paper, ledger, "confirmed", TONE_GOOD);
-        print_state(&paper, ledger, "assumed", TONE_PLAIN);
+        json_t *assumptions = json_object_get(status, "ledger");
+        ctl_explain_assumptions(assumptions);
+        print_state(&paper, assumptions, "contradicted", TONE_BAD);
+        print_state(&paper, assumptions, "confirmed", TONE_GOOD);
+        print_state(&paper, assumptions, "assumed", TONE_PLAIN);
     }
     json_decref(status);
     return code;
@@ -134,10 +134,10 @@ static json_t *compose(int count, char **words, const char **out_item) {
 /// The gateway knows no such item: perhaps one that is spelt nearly so.
 static void suggest(const char *item) {
     const char *best = NULL;
-    size_t best_distance = GW_WORD_STRANGE;
-    for (unsigned i = 0; i < (unsigned)IW_LEDGER_ITEMS; i++) {
-        const char *name = iwn_ledger_item_name((iw_ledger_item_t)i);
-        const size_t far = gw_word_distance(item, name);
+    size_t best_distance = SETTINGS_WORD_STRANGE;
+    for (unsigned i = 0; i < (unsigned)IW_ASSUMPTION_ITEMS; i++) {
+        const char *name = iwn_assumption_item_name((iw_assumption_item_t)i);
+        const size_t far = settings_word_distance(item, name);
         if (far < best_distance) {
             best = name;
             best_distance = far;

@@ -23,7 +23,7 @@ typedef struct {
     int64_t begin_us;
     int64_t end_us;
     int64_t next_us;
-    int64_t heard_us;
+    int64_t received_us;
     int64_t sum_mm_s[IW_SIDES];
     int samples;
     int in_force;     ///< Snapshots in which the wheels were told what was commanded, ramps over.
@@ -110,7 +110,7 @@ static burst_end_t take_line(run_t *run, const json_t *line, int64_t now_us) {
         }
         return BURST_DONE;
     }
-    run->heard_us = now_us;
+    run->received_us = now_us;
     return json_is_true(ok) ? BURST_DONE : fail(run, BURST_STOPPED, text_word(line, "message"));
 }
 
@@ -128,7 +128,7 @@ static burst_end_t drive(run_t *run) {
         if (now_us >= run->end_us) {
             return BURST_DONE;
         }
-        if (now_us - run->heard_us > SILENT_US) {
+        if (now_us - run->received_us > SILENT_US) {
             return fail(run, BURST_LOST, "the gateway does not answer");
         }
         if (now_us >= run->next_us) {
@@ -256,7 +256,7 @@ static void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outc
     json_decref(armed);
     talk_keys_begin();
     run.begin_us = client_now_us();
-    run.heard_us = run.begin_us;
+    run.received_us = run.begin_us;
     run.end_us = run.begin_us + (int64_t)burst->for_ms * 1000;
     const burst_end_t end = drive(&run);
     stop(&run, end);

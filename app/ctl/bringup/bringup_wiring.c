@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const keys[IW_ESTOP_CONTACTS][2] = {{"chip", "chip_line"}, {"chip2", "chip2_line"}};
+static const char *const keys[IWL_ESTOP_CONTACTS][2] = {{"chip", "chip_line"}, {"chip2", "chip2_line"}};
 
 static int set(bringup_t *self, const char *name, const char *value, FILE *complaints) {
     char key[32];
@@ -14,15 +14,15 @@ static int set(bringup_t *self, const char *name, const char *value, FILE *compl
 }
 
 void bringup_forget_wiring(bringup_t *self) {
-    for (size_t i = 0; i < IW_ESTOP_CONTACTS; i++) {
+    for (size_t i = 0; i < IWL_ESTOP_CONTACTS; i++) {
         (void)set(self, keys[i][0], "any", stderr);
         (void)set(self, keys[i][1], "any", stderr);
     }
 }
 
 static void store_contact(bringup_t *self, size_t contact, const char *line, FILE *nowhere) {
-    iw_estop_seen_t seen;
-    if (strcmp(line, "none") == 0 || iw_estop_see(line, &seen) != 0) {
+    iwl_estop_seen_t seen;
+    if (strcmp(line, "none") == 0 || iwl_estop_see(line, &seen) != 0) {
         return;
     }
     const char *const found[] = {seen.chip, seen.line};

@@ -18,7 +18,7 @@ typedef struct {
     near_gateway_t gateway;
     inspect_findings_t findings;
     inspect_heard_t heard;
-    iw_linux_hal_t hal;
+    iwl_hal_t hal;
     bool open; ///< `hal` is.
     unsigned listen_ms;
 } doctor_t;

@@ -17,10 +17,10 @@ static bool forces_known(const json_t *status) {
 }
 
 static void say_contradicted(doctor_t *self, const char *name, const json_t *entry) {
-    iw_ledger_item_t item = IW_LEDGER_ITEMS; // An item of a gateway newer than we are.
-    const bool known = iwn_ledger_item_of(name, &item);
-    const bool tared = known && item == IW_LEDGER_OFFSET_INCLUDED && forces_known(self->gateway.status);
-    const bool harmless = known && item == IW_LEDGER_DLC;
+    iw_assumption_item_t item = IW_ASSUMPTION_ITEMS; // An item of a gateway newer than we are.
+    const bool known = iwn_assumption_item_of(name, &item);
+    const bool tared = known && item == IW_ASSUMPTION_OFFSET_INCLUDED && forces_known(self->gateway.status);
+    const bool harmless = known && item == IW_ASSUMPTION_DLC;
     inspect_say(&self->findings, "ledger",
                 tared      ? INSPECT_OK
                 : harmless ? INSPECT_WARN
@@ -28,16 +28,16 @@ static void say_contradicted(doctor_t *self, const char *name, const json_t *ent
                 "assumption %s is contradicted: %s%s", name, text_word(entry, "reason"),
                 tared ? "; the tare has settled it" : "");
     if (!tared) {
-        inspect_cure(&self->findings, "%s", gw_assumption_cure(item));
+        inspect_cure(&self->findings, "%s", inspect_assumption_cure(item));
     }
 }
 
-static void list_contradicted(doctor_t *self, json_t *ledger) {
+static void list_contradicted(doctor_t *self, json_t *assumptions) {
     const char *name = NULL;
     json_t *entry = NULL;
     unsigned assumed = 0;
     unsigned confirmed = 0;
-    json_object_foreach(ledger, name, entry) {
+    json_object_foreach(assumptions, name, entry) {
         const char *state = text_word(entry, "state");
         assumed += (strcmp(state, "assumed") == 0) ? 1U : 0U;
         confirmed += (strcmp(state, "confirmed") == 0) ? 1U : 0U;
@@ -150,16 +150,16 @@ static bool is_occupied(const doctor_t *self) {
 
 /// False if there is no bus to listen to.
 static bool open_hal(doctor_t *self) {
-    const iw_estop_wish_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
-                                  .active_high = self->config.estop.active_high,
-                                  .debounce_ms = self->config.estop.debounce_ms,
-                                  .chip = self->config.estop.chip,
-                                  .chip_line = self->config.estop.chip_line,
-                                  .name2 = is_occupied(self) ? NULL : self->config.estop.line2,
-                                  .active_high2 = self->config.estop.active2_high,
-                                  .chip2 = self->config.estop.chip2,
-                                  .chip2_line = self->config.estop.chip2_line,
-                                  .discrepancy_ms = self->config.estop.discrepancy_ms};
+    const iwl_estop_config_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
+                                     .active_high = self->config.estop.active_high,
+                                     .debounce_ms = self->config.estop.debounce_ms,
+                                     .chip = self->config.estop.chip,
+                                     .chip_line = self->config.estop.chip_line,
+                                     .name2 = is_occupied(self) ? NULL : self->config.estop.line2,
+                                     .active_high2 = self->config.estop.active2_high,
+                                     .chip2 = self->config.estop.chip2,
+                                     .chip2_line = self->config.estop.chip2_line,
+                                     .discrepancy_ms = self->config.estop.discrepancy_ms};
     const inspect_opened_t opened = inspect_open(&self->hal, self->bus, &line, &self->findings);
     self->open = opened.hal;
     return opened.hal && opened.bus;
@@ -188,8 +188,8 @@ static void hear_gateway(doctor_t *self) {
 
 inspect_estop_t doctor_estop(doctor_t *self) {
     if (!has_gateway(self)) {
-        iw_linux_hal_tend(&self->hal, (iw_time_us_t)client_now_us());
-        (void)iw_linux_hal_pressed(&self->hal);
+        iwl_hal_poll(&self->hal, (iw_time_us_t)client_now_us());
+        (void)iwl_hal_pressed(&self->hal);
         return inspect_estop_of(&self->hal, self->config.estop.line);
     }
     const json_t *estop = json_object_get(self->gateway.status, "estop");
@@ -208,7 +208,7 @@ inspect_estop_t doctor_estop(doctor_t *self) {
 }
 
 void doctor_look_at_bus(doctor_t *self) {
-    const inspect_wish_t wish = {
+    const inspect_config_t config = {
         .name = self->bus,
         .bitrate_hz = self->config.bus.bitrate,
         .sample_point_permille = self->config.bus.sample_point_permille,
@@ -220,8 +220,8 @@ void doctor_look_at_bus(doctor_t *self) {
     }
     inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->heard);
     hear_gateway(self);
-    inspect_link(iw_linux_hal_link(&self->hal), &wish, &self->findings);
-    inspect_bus(iw_linux_hal_link(&self->hal), &self->heard, &wish, &self->findings);
+    inspect_link(iwl_hal_link(&self->hal), &config, &self->findings);
+    inspect_bus(iwl_hal_link(&self->hal), &self->heard, &config, &self->findings);
     if (has_gateway(self) ||
         (!is_occupied(self) && (strcmp(self->config.estop.line, "none") == 0 || self->hal.estop_ops->present))) {
         const inspect_estop_t estop = doctor_estop(self);
@@ -231,7 +231,7 @@ void doctor_look_at_bus(doctor_t *self) {
 
 void doctor_close(doctor_t *self) {
     if (self->open) {
-        iw_linux_hal_close(&self->hal);
+        iwl_hal_close(&self->hal);
     }
     self->open = false;
     json_decref(self->gateway.status);

@@ -168,28 +168,28 @@ static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const 
 
 /// The wheel's answer to a speed that it was told for long enough.
 static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, int32_t rpm, int64_t for_us) {
-    const int32_t told_mm_s = told->speed_mm_s;
-    learn_answer_t *answer = (told_mm_s > 0) ? &self->forward : &self->backward;
+    const int32_t commanded_mm_s = told->speed_mm_s;
+    learn_answer_t *answer = (commanded_mm_s > 0) ? &self->forward : &self->backward;
     const bool turns = size_of(rpm) > REST_RPM;
-    if (told_mm_s == 0 && told->current_mA != 0) {
+    if (commanded_mm_s == 0 && told->current_mA != 0) {
         self->stood_us += turns ? 0 : for_us;
         self->ran_us += turns ? for_us : 0;
     }
-    if (size_of(told_mm_s) < STEADY_MM_S) {
+    if (size_of(commanded_mm_s) < STEADY_MM_S) {
         return;
     }
     if (!turns) {
         answer->still_us += for_us;
         return;
     }
-    const int64_t told_um_s = (int64_t)size_of(told_mm_s) * 1000;
-    const int64_t off_um_s = told_um_s - (int64_t)size_of(rpm) * UM_S_PER_RPM;
-    const int64_t slack_um_s = (told_um_s / 10 > UM_S_PER_RPM) ? told_um_s / 10 : UM_S_PER_RPM;
-    answer->with_us += ((told_mm_s > 0) == (rpm > 0)) ? for_us : 0;
-    answer->against_us += ((told_mm_s > 0) == (rpm > 0)) ? 0 : for_us;
+    const int64_t commanded_um_s = (int64_t)size_of(commanded_mm_s) * 1000;
+    const int64_t off_um_s = commanded_um_s - (int64_t)size_of(rpm) * UM_S_PER_RPM;
+    const int64_t slack_um_s = (commanded_um_s / 10 > UM_S_PER_RPM) ? commanded_um_s / 10 : UM_S_PER_RPM;
+    answer->with_us += ((commanded_mm_s > 0) == (rpm > 0)) ? for_us : 0;
+    answer->against_us += ((commanded_mm_s > 0) == (rpm > 0)) ? 0 : for_us;
     self->steady_us += for_us;
     self->steady_fit_us += (off_um_s <= slack_um_s && off_um_s >= -slack_um_s) ? for_us : 0;
-    self->steady_mm_s += size_of(told_mm_s);
+    self->steady_mm_s += size_of(commanded_mm_s);
     self->steady_rpm += size_of(rpm);
 }
 

@@ -14,7 +14,7 @@ void learn_drives_init(learn_drives_t *self, const iw_config_t *config) {
     self->config = config;
     iw_diverge_init(&self->pair, config);
     for (size_t side = 0; side < IW_SIDES; side++) {
-        self->heard_us[side] = self->told_us[side] = -1;
+        self->received_us[side] = self->told_us[side] = -1;
         learn_lag_init(&self->lag[side]);
     }
 }
@@ -41,7 +41,7 @@ static bool has_ended(const learn_drives_t *self, int64_t now_us) {
 static void compare(learn_drives_t *self, int64_t now_us) {
     bool known = true;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        known = known && is_recent(self->heard_us[side], now_us, HEARD_US) &&
+        known = known && is_recent(self->received_us[side], now_us, HEARD_US) &&
                 is_recent(self->told_us[side], now_us, ENDED_US);
     }
     if (!known || !self->compared) {
@@ -80,9 +80,9 @@ static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t 
 
 static void hear(learn_drives_t *self, size_t side, int32_t rpm, int64_t now_us) {
     const int32_t speed_um_s = rpm * self->pair.um_s_per_rpm;
-    learn_lag_hear(&self->lag[side], now_us, speed_um_s / 1e3);
-    iw_diverge_hear(&self->pair, side, (self->config->invert[side] ? -speed_um_s : speed_um_s) / 1000);
-    self->heard_us[side] = now_us;
+    learn_lag_receive(&self->lag[side], now_us, speed_um_s / 1e3);
+    iw_diverge_receive(&self->pair, side, (self->config->invert[side] ? -speed_um_s : speed_um_s) / 1000);
+    self->received_us[side] = now_us;
 }
 
 void learn_drives_frame(learn_drives_t *self, const candump_t *frame) {

@@ -22,10 +22,10 @@ typedef struct {
 typedef struct {
     const iw_config_t *config;
     iw_diverge_t pair;
-    int64_t heard_us[IW_SIDES]; ///< Its last speed frame; -1: none.
-    int64_t told_us[IW_SIDES];  ///< Its last setpoint; -1: none.
-    int64_t last_us;            ///< Of any frame.
-    int64_t moved_us;           ///< The last setpoint with a speed.
+    int64_t received_us[IW_SIDES]; ///< Its last speed frame; -1: none.
+    int64_t told_us[IW_SIDES];     ///< Its last setpoint; -1: none.
+    int64_t last_us;               ///< Of any frame.
+    int64_t moved_us;              ///< The last setpoint with a speed.
     bool driving;
     bool compared; ///< Up to the last frame.
     uint32_t count;

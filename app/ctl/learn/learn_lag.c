@@ -46,7 +46,7 @@ static void take(learn_lag_t *self, double lag_ms) {
 
 /// The wheel has a steady speed again.
 static void end_change(learn_lag_t *self) {
-    const double told = self->told_mm_s - self->before_told;
+    const double told = self->commanded_mm_s - self->before_told;
     const double measured = self->settled_mm / ((double)self->settled_us / 1e6) - self->before;
     self->changing = false;
     if (fabs(told) >= CHANGE_MIN_MM_S && measured / told > 0.5 && measured / told < 2.0) {
@@ -59,7 +59,7 @@ static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measu
     const double span_s = (double)(to_us - from_us) / 1e6;
     const double way_mm = (self->measured_mm_s + measured_mm_s) / 2.0 * span_s;
     if (self->changing) {
-        self->way_told_mm += (self->told_mm_s - self->before_told) * span_s;
+        self->way_told_mm += (self->commanded_mm_s - self->before_told) * span_s;
         self->way_mm += way_mm - self->before * span_s;
     }
     if (from_us - self->constant_us >= SETTLE_US) {
@@ -71,7 +71,7 @@ static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measu
     }
 }
 
-void learn_lag_hear(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
+void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
     const int64_t gap_us = at_us - self->measured_us;
     const bool told = self->told_us >= 0 && at_us - self->told_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
     if (self->measured_us < 0 || gap_us < 0 || gap_us > GAP_US || !told) {
@@ -86,7 +86,7 @@ void learn_lag_hear(learn_lag_t *self, int64_t at_us, double speed_mm_s) {
 void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
     const bool first = self->told_us < 0 || at_us < self->told_us;
     self->told_us = at_us;
-    if (!first && speed_mm_s == self->told_mm_s) {
+    if (!first && speed_mm_s == self->commanded_mm_s) {
         return;
     }
     if (self->measured_us >= 0 && at_us > self->measured_us && at_us - self->measured_us <= GAP_US) {
@@ -95,13 +95,13 @@ void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
     }
     if (!self->changing && self->settled_us >= SETTLE_US) {
         self->changing = true;
-        self->before_told = self->told_mm_s;
+        self->before_told = self->commanded_mm_s;
         self->before = self->settled_mm / ((double)self->settled_us / 1e6);
         self->way_told_mm = self->way_mm = 0;
     }
     self->settled_us = 0;
     self->settled_mm = 0;
-    self->told_mm_s = speed_mm_s;
+    self->commanded_mm_s = speed_mm_s;
     self->constant_us = at_us;
 }
 

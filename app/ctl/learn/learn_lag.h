@@ -12,7 +12,7 @@
 
 /// One wheel.
 typedef struct {
-    int32_t told_mm_s;
+    int32_t commanded_mm_s;
     int64_t told_us;     ///< The last setpoint; -1: none.
     int64_t constant_us; ///< It is that since then.
     double measured_mm_s;
@@ -33,7 +33,7 @@ typedef struct {
 
 void learn_lag_init(learn_lag_t *self);
 void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s);
-void learn_lag_hear(learn_lag_t *self, int64_t at_us, double speed_mm_s);
+void learn_lag_receive(learn_lag_t *self, int64_t at_us, double speed_mm_s);
 
 /// Adds what both wheels showed; `lag_ms` is what the gateway assumes.
 void learn_lag_weigh(const learn_lag_t wheel[IW_SIDES], uint32_t lag_ms, learn_findings_t *out_findings);

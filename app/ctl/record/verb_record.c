@@ -113,7 +113,7 @@ static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
 }
 
 /// Lets others see what was written, once a second. False as above.
-static bool tend(recorder_t *self) {
+static bool poll_recorder(recorder_t *self) {
     const int64_t now_us = client_now_us();
     if (now_us - self->flushed_us < FLUSH_US) {
         return ferror(self->file) == 0;
@@ -150,7 +150,7 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
         const iwc_result_t result =
             client_receive(&ctl->client, (look_us < self->end_us) ? look_us : self->end_us, &line);
         written = result != IWC_OK || take_event(self, line);
-        written = tend(self) && written;
+        written = poll_recorder(self) && written;
         json_decref(line);
         if (result == IWC_INTERRUPTED) {
             break;
@@ -163,7 +163,7 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
 }
 
 typedef struct {
-    iw_backend_store_t bus;
+    iwl_backend_store_t bus;
     unsigned signals;
 } source_t;
 
@@ -193,7 +193,7 @@ static int tell_down(const char *bus) {
 /// Waits for something to read, a signal, or a while.
 static void wait_a_while(source_t *source) {
     const struct timespec while_ = {.tv_sec = 0, .tv_nsec = WAIT_MS * 1000000L};
-    struct pollfd entry = {.fd = iw_bus_fd(&source->bus), .events = POLLIN};
+    struct pollfd entry = {.fd = iwl_bus_fd(&source->bus), .events = POLLIN};
     (void)ppoll(&entry, 1, &while_, signals_let_in());
 }
 
@@ -202,20 +202,20 @@ static bool drain(source_t *source, recorder_t *self) {
     iw_can_frame_t frame;
     const int64_t now_us = client_now_us();
     bool written = true;
-    iw_bus_tend(&source->bus, (iw_time_us_t)now_us);
-    while (written && iw_bus_receive(&source->bus, &frame) > 0) {
+    iwl_bus_poll(&source->bus, (iw_time_us_t)now_us);
+    while (written && iwl_bus_receive(&source->bus, &frame) > 0) {
         candump_t out = candump_from_core(&frame, 0, "");
         out.mark = CANDUMP_RECEIVED;
         written = put(self, &out, now_us);
     }
-    return tend(self) && written;
+    return poll_recorder(self) && written;
 }
 
 static bool comes_up(source_t *source) {
     const int64_t until_us = client_now_us() + UP_US;
     for (;;) {
-        iw_bus_tend(&source->bus, (iw_time_us_t)client_now_us());
-        if (iw_bus_state(&source->bus) >= IW_BUS_PASSIVE) {
+        iwl_bus_poll(&source->bus, (iw_time_us_t)client_now_us());
+        if (iwl_bus_state(&source->bus) >= IW_BUS_PASSIVE) {
             return true;
         }
         if (client_now_us() > until_us || signals_count() != source->signals) {
@@ -230,7 +230,7 @@ static bool comes_up(source_t *source) {
 static int record_bus(const char *bus, recorder_t *self) {
     static source_t source; // Too large for a stack.
     source.signals = signals_count();
-    const int error = iw_bus_open(&source.bus, bus);
+    const int error = iwl_bus_open(&source.bus, bus);
     if (error != 0) {
         return tell_unopened(bus, error);
     }
@@ -241,15 +241,15 @@ static int record_bus(const char *bus, recorder_t *self) {
         if (!drain(&source, self)) {
             break;
         }
-        const bool now_up = iw_bus_state(&source.bus) >= IW_BUS_PASSIVE;
+        const bool now_up = iwl_bus_state(&source.bus) >= IW_BUS_PASSIVE;
         if (now_up != up) {
             (void)ctl_fail(CTL_OK, now_up ? "%s is up again" : "%s went down; waiting for it", bus);
         }
         up = now_up;
     }
-    const iw_bus_link_t *link = iw_bus_link(&source.bus);
+    const iwl_bus_link_t *link = iwl_bus_link(&source.bus);
     self->lost += link->lost;
-    iw_bus_close(&source.bus);
+    iwl_bus_close(&source.bus);
     return code;
 }
 

@@ -35,9 +35,9 @@ static unsigned word_of(const json_t *line, const char *name, const char *(*name
 NAMES(bus, iwn_bus_state_name, iw_bus_state_t)
 NAMES(state, iwn_state_name, iw_state_t)
 NAMES(cause, iwn_cause_name, iw_cause_t)
-NAMES(item, iwn_ledger_item_name, iw_ledger_item_t)
-NAMES(ledger_state, iwn_ledger_state_name, iw_ledger_state_t)
-NAMES(evidence, iwn_evidence_name, iw_evidence_t)
+NAMES(item, iwn_assumption_item_name, iw_assumption_item_t)
+NAMES(ledger_state, iwn_assumption_state_name, iw_assumption_state_t)
+NAMES(source, iwn_source_name, iw_source_t)
 
 static const char *refusal_name(unsigned refusal) {
     return iwn_error_name(iwn_error_of((iw_refusal_t)refusal));
@@ -101,11 +101,11 @@ static bool take_decision(const json_t *line, blackbox_entry_t *out) {
 }
 
 static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
-    const unsigned evidence = word_of(line, "evidence", evidence_name, IW_EVIDENCE_OPERATOR + 1U);
-    const unsigned states = IW_LEDGER_CONTRADICTED + 1U;
-    out->number = evidence;
+    const unsigned source = word_of(line, "evidence", source_name, IW_SOURCE_OPERATOR + 1U);
+    const unsigned states = IW_CONTRADICTED + 1U;
+    out->number = source;
     out->as.value = limited(integer(line, "figure"), INT32_MAX);
-    return evidence <= IW_EVIDENCE_OPERATOR && take_word(line, "item", item_name, IW_LEDGER_ITEMS, &out->a) &&
+    return source <= IW_SOURCE_OPERATOR && take_word(line, "item", item_name, IW_ASSUMPTION_ITEMS, &out->a) &&
            take_word(line, "state", ledger_state_name, states, &out->b);
 }
 
@@ -140,7 +140,7 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
     case BLACKBOX_TARE:
         out->a = (uint8_t)(word_of(line, "side", side_name, IW_SIDES_BOTH + 1U) - 1U);
         return out->a < IW_SIDES;
-    case BLACKBOX_LEDGER:
+    case BLACKBOX_ASSUMPTION:
         return take_assumption(line, out);
     case BLACKBOX_NOT_SENT:
         out->number = (uint32_t)integer(line, "id");

@@ -112,7 +112,7 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     self->next_us = at_us;
     const iw_snapshot_t seen = replay_look(self);
     self->state = seen.state;
-    memcpy(self->ledger, seen.assumed, sizeof self->ledger);
+    memcpy(self->assumptions, seen.assumed, sizeof self->assumptions);
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->force[side] = iw_snapshot_force_validity(&seen, (iw_side_t)side);
     }
@@ -240,9 +240,10 @@ static void answer(replay_t *self, const blackbox_entry_t *entry) {
 }
 
 static void know(replay_t *self, const blackbox_entry_t *entry) {
-    const iw_ledger_entry_t known = {(iw_ledger_state_t)entry->b, (iw_evidence_t)entry->number,
-                                     (int32_t)entry->as.value};
-    iw_gateway_know(&self->gateway, (iw_ledger_item_t)entry->a, &known); // What it changes the next step tells.
+    const iw_assumption_entry_t known = {(iw_assumption_state_t)entry->b, (iw_source_t)entry->number,
+                                         (int32_t)entry->as.value};
+    iw_gateway_set_assumption(&self->gateway, (iw_assumption_item_t)entry->a,
+                              &known); // What it changes the next step tells.
 }
 
 void replay_event(replay_t *self, const blackbox_entry_t *entry) {
@@ -275,7 +276,7 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
         tare(self, entry);
         replay_tell_request(self, entry, IW_REFUSE_NONE);
         break;
-    case BLACKBOX_LEDGER:
+    case BLACKBOX_ASSUMPTION:
         know(self, entry);
         break;
     case BLACKBOX_STATE:

@@ -57,7 +57,7 @@ typedef struct {
     uint32_t present;
     bool heard[IW_SIDES];
     iw_force_validity_t force[IW_SIDES];
-    iw_ledger_entry_t ledger[IW_LEDGER_ITEMS];
+    iw_assumption_entry_t assumptions[IW_ASSUMPTION_ITEMS];
     blackbox_drive_t drive;
     uint8_t drive_refusal;
     iw_client_t drive_client; ///< IW_CLIENT_NONE: no command was told since the last other thing.

@@ -81,15 +81,15 @@ static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
     }
 }
 
-static void tell_ledger(replay_t *self, const iw_snapshot_t *seen) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        const iw_ledger_entry_t *entry = &seen->assumed[item];
-        if (entry->state != self->ledger[item].state) {
+static void tell_assumptions(replay_t *self, const iw_snapshot_t *seen) {
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        const iw_assumption_entry_t *entry = &seen->assumed[item];
+        if (entry->state != self->assumptions[item].state) {
             tell(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
-                 iwn_ledger_item_name((iw_ledger_item_t)item), iwn_ledger_state_name(entry->state),
-                 iwn_evidence_name(entry->evidence), entry->figure);
+                 iwn_assumption_item_name((iw_assumption_item_t)item), iwn_assumption_state_name(entry->state),
+                 iwn_source_name(entry->source), entry->figure);
         }
-        self->ledger[item] = *entry;
+        self->assumptions[item] = *entry;
     }
 }
 
@@ -136,7 +136,7 @@ static void tell_state(replay_t *self, iw_state_t state) {
 void replay_tell_step(replay_t *self) {
     const iw_snapshot_t seen = replay_look(self);
     tell_wheels(self, &seen);
-    tell_ledger(self, &seen);
+    tell_assumptions(self, &seen);
     tell_causes(self, seen.present);
     tell_stop(self, seen.stop);
     tell_arming(self, &seen);

@@ -215,12 +215,12 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
 }
 
 /// The names of the ledger's items in one state, as one line; nothing if there are none.
-static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
+static void draw_assumptions(const paper_t *paper, json_t *assumptions, const char *state, tone_t tone) {
     char text[1024];
     iwn_text_t names = iwn_text_begin(text, sizeof text);
     const char *name = NULL;
     json_t *entry = NULL;
-    json_object_foreach(ledger, name, entry) {
+    json_object_foreach(assumptions, name, entry) {
         if (is(text_word(entry, "state"), state)) {
             IWN_TEXT_JOIN(&names, (names.length > 0U) ? ", " : "", name);
         }
@@ -231,12 +231,12 @@ static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state,
 }
 
 /// Every contradiction with its evidence and its cost.
-static void draw_contradictions(const paper_t *paper, json_t *ledger) {
+static void draw_contradictions(const paper_t *paper, json_t *assumptions) {
     char text[640];
     const char *label = "CONTRADICTED";
     const char *name = NULL;
     json_t *entry = NULL;
-    json_object_foreach(ledger, name, entry) {
+    json_object_foreach(assumptions, name, entry) {
         if (is(text_word(entry, "state"), "contradicted")) {
             (void)snprintf(text, sizeof text, "%.64s = %.64s: %.240s; disabled: %.240s", name,
                            text_word(entry, "value"), text_word(entry, "reason"), text_word(entry, "disabled"));
@@ -308,8 +308,8 @@ static void draw(const json_t *status, const json_t *why) {
     draw_budget(&paper, get(status, "budget"));
     draw_pair(&paper, json_object_get(status, "pair"));
     draw_contradictions(&paper, json_object_get(status, "ledger"));
-    draw_ledger(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
-    draw_ledger(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
+    draw_assumptions(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
+    draw_assumptions(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
     draw_memory(&paper, get(status, "memory"));
     draw_warnings(&paper, get(status, "warnings"));
 }
@@ -325,7 +325,7 @@ int verb_status(ctl_t *self, int count, char **words) {
         json_decref(status);
         return code;
     }
-    ctl_explain_ledger(json_object_get(status, "ledger"));
+    ctl_explain_assumptions(json_object_get(status, "ledger"));
     if (ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &why) == CTL_OK) {
         draw(status, why);
     }

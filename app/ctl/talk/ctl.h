@@ -85,7 +85,7 @@ int ctl_accept(const ctl_t *self, json_t **reply);
 int ctl_refused(const json_t *reply);
 
 /// Fills in the sentences of a status's ledger where the gateway, a board, has told figures only.
-void ctl_explain_ledger(json_t *ledger);
+void ctl_explain_assumptions(json_t *assumptions);
 
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
 int ctl_lost(const ctl_t *self, iwc_result_t result);

@@ -209,7 +209,7 @@ static void draw_gaps(const top_model_t *model, int row) {
     }
 }
 
-static void draw_ledger(const top_model_t *model, int row) {
+static void draw_assumptions(const top_model_t *model, int row) {
     static const char *const states[] = {"confirmed", "assumed", "contradicted"};
     unsigned total[3] = {0, 0, 0};
     char names[TOP_TEXT_SIZE];
@@ -270,7 +270,7 @@ int top_draw_rest(const top_model_t *model, int row, int rows) {
     const struct {
         void (*draw)(const top_model_t *, int);
         int rows;
-    } parts[] = {{draw_bus, 1}, {draw_ledger, 1}, {draw_gaps, is_narrow() ? 1 : 2}, {draw_budget, 1}};
+    } parts[] = {{draw_bus, 1}, {draw_assumptions, 1}, {draw_gaps, is_narrow() ? 1 : 2}, {draw_budget, 1}};
     int used = 0;
     for (size_t i = 0; i < sizeof parts / sizeof parts[0] && rows - used >= parts[i].rows; i++) {
         parts[i].draw(model, row + used);

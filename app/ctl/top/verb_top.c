@@ -26,7 +26,7 @@ typedef struct {
     ctl_t *ctl;
     top_model_t model;
     top_history_t history;
-    int64_t heard_us;
+    int64_t received_us;
     int64_t retry_us;
     int64_t notice_until_us;
     int64_t pending_id;  ///< Of the last request; its answer is shown.
@@ -93,7 +93,7 @@ static void try_connect(top_t *self) {
     if (iwc_watches_only(self->ctl->client.gateway)) {
         notice(self, "by this socket you may watch and stop, but not drive");
     }
-    self->heard_us = client_now_us();
+    self->received_us = client_now_us();
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
     keep_sentence(self, why);
     json_decref(why);
@@ -115,7 +115,7 @@ static void take_reply(top_t *self, const json_t *line) {
 
 static void take_line(top_t *self, json_t *line) {
     const char *event = text_word(line, "event");
-    self->heard_us = client_now_us();
+    self->received_us = client_now_us();
     if (json_object_get(line, "ok") != NULL) {
         take_reply(self, line);
     } else if (strcmp(event, "state") == 0) {
@@ -187,7 +187,7 @@ static bool wait_and_take(top_t *self) {
         try_connect(self);
     }
     read_gateway(self);
-    self->model.stale = self->model.connected && client_now_us() > self->heard_us + STALE_US;
+    self->model.stale = self->model.connected && client_now_us() > self->received_us + STALE_US;
     if (self->model.connected && client_now_us() > self->notice_until_us) {
         self->model.notice[0] = '\0';
     }

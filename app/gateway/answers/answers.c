@@ -2,7 +2,7 @@
 // Requests: who may ask, in which order, and what is noted of them.
 #include "answers.h"
 
-#include "ledger/knowledge.h"
+#include "assumptions/assumptions.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_server/target.h"
@@ -20,13 +20,13 @@ void gw_answers_begin(gw_answers_t *self) {
 
 /// What does not change while the gateway runs.
 static iwn_estop_t describe_estop(const gw_wheels_t *wheels) {
-    const iw_linux_hal_t *hal = &wheels->hal;
+    const iwl_hal_t *hal = &wheels->hal;
     return (iwn_estop_t){
         .line = wheels->estop, .present = hal->estop_ops->present, .simulated = hal->estop_ops->simulated};
 }
 
 void gw_answers_refresh(gw_answers_t *self) {
-    const iw_linux_hal_t *hal = &self->wheels->hal;
+    const iwl_hal_t *hal = &self->wheels->hal;
     iwn_estop_t *estop = &self->server.estop;
     self->server.now_us = self->wheels->now_us;
     if (estop->line == NULL) {
@@ -42,23 +42,23 @@ void gw_answers_refresh(gw_answers_t *self) {
 iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
     gw_answers_t *self = gw_answers_of(server);
     const uint32_t from = (after == NULL) ? 0U : (uint32_t)((const gw_served_t *)after - self->served) + 1U;
-    const uint32_t slot = gw_clients_from(self->clients, from);
-    return (slot < GW_CLIENTS_MAX) ? &self->served[slot].client : NULL;
+    const uint32_t slot = sock_clients_from(self->clients, from);
+    return (slot < SOCK_CLIENTS_MAX) ? &self->served[slot].client : NULL;
 }
 
 char *iwn_target_line(iwn_server_t *server, size_t *out_size) {
-    gw_clients_t *clients = gw_answers_of(server)->clients;
+    sock_clients_t *clients = gw_answers_of(server)->clients;
     *out_size = sizeof clients->line;
     return clients->line;
 }
 
 void iwn_target_reply(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
-    gw_client_reply(gw_answers_connection(gw_answers_of(server), client), line, length);
+    sock_client_reply(gw_answers_connection(gw_answers_of(server), client), line, length);
 }
 
 void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
     if (length > 0U) {
-        gw_client_event(gw_answers_connection(gw_answers_of(server), client), line, length);
+        sock_client_event(gw_answers_connection(gw_answers_of(server), client), line, length);
     }
 }
 
@@ -70,7 +70,7 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     if (arms && self->wheels->shutting_down) {
         return IWN_REFUSE(&server->refusal, IWN_DENIED, "the gateway is shutting down; wait until it is started again");
     }
-    if (gw_client_waited_through_stop(gw_answers_connection(self, client))) {
+    if (sock_client_waited_through_stop(gw_answers_connection(self, client))) {
         return IWN_REFUSE(
             &server->refusal, IWN_STALE_COMMAND,
             "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send "
@@ -92,15 +92,15 @@ bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_
     const gw_answers_t *self = gw_answers_of(server);
     const iw_time_us_t armed_us = gw_wheels_look(self->wheels).armed_us;
     *out_sent_us =
-        gw_client_sent_us(gw_answers_connection(self, client), server->now_us, armed_us); // It may have waited.
+        sock_client_sent_us(gw_answers_connection(self, client), server->now_us, armed_us); // It may have waited.
     return true;
 }
 
 void iwn_target_asked_to_stop(iwn_server_t *server, const iwn_client_t *client) {
     gw_answers_t *self = gw_answers_of(server);
-    const gw_client_t *connection = gw_answers_connection(self, client);
+    const sock_client_t *connection = gw_answers_connection(self, client);
     const gw_stopper_t by = {.pid = connection->pid, .uid = connection->uid};
-    gw_clients_note_stop(self->clients, connection);
+    sock_clients_note_stop(self->clients, connection);
     if (server->request.cmd == IWN_CMD_ESTOP) {
         self->estopped_by = by;
     } else {
@@ -150,9 +150,9 @@ void iwn_target_granted(iwn_server_t *server, iwn_client_t *client) {
 }
 
 const iwn_id_t *iwn_target_settled(iwn_server_t *server, iwn_client_t *client) {
-    gw_client_t *connection = gw_answers_connection(gw_answers_of(server), client);
+    sock_client_t *connection = gw_answers_connection(gw_answers_of(server), client);
     connection->held = false;
-    gw_client_check_caught_up(connection, server->now_us);
+    sock_client_check_caught_up(connection, server->now_us);
     return &((const gw_served_t *)client)->arm_id;
 }
 
@@ -165,23 +165,23 @@ void iwn_target_tared(iwn_server_t *server, const iwn_client_t *client, iw_side_
                       const iw_force_quality_t *window) {
     gw_answers_t *self = gw_answers_of(server);
     const blackbox_entry_t entry = {.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)IW_TARE_OK};
-    self->knowledge->tare[side] = *window;
+    self->assumptions->tare[side] = *window;
     gw_wheels_note(self->wheels, client->id, &entry);
 }
 
 /// The operator's word. Moves nothing; what it contradicts is disabled from now on.
 static void do_confirm(gw_answers_t *self, iwn_client_t *client) {
     const iwn_request_t *request = &self->server.request;
-    gw_word_t word;
+    inspect_word_t word;
     memcpy(word.found, request->value, sizeof word.found);
     memcpy(word.how, request->how, sizeof word.how);
-    if (!gw_knowledge_confirm(self->knowledge, request->item, &word, &self->server.refusal)) {
+    if (!gw_assumptions_confirm(self->assumptions, request->item, &word, &self->server.refusal)) {
         iwn_server_refuse(&self->server, client, &request->id);
         return;
     }
     iwn_out_t json = iwn_server_begin_reply(&self->server, &request->id);
-    iwn_out_text(&json, "item", iwn_ledger_item_name(request->item));
-    gw_knowledge_write_item(self->knowledge, request->item, &json);
+    iwn_out_text(&json, "item", iwn_assumption_item_name(request->item));
+    gw_assumptions_write_item(self->assumptions, request->item, &json);
     iwn_server_send_reply(&self->server, client, &json);
 }
 
@@ -206,13 +206,14 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
 
 /// Whether the line may be carried out; refuses it else. Who has come only to stop may only stop, and so may a connection that is being
 /// closed.
-static bool may_be_carried_out(gw_answers_t *self, const gw_client_t *connection, iwn_client_t *client, bool is_right) {
+static bool may_be_carried_out(gw_answers_t *self, const sock_client_t *connection, iwn_client_t *client,
+                               bool is_right) {
     const bool stops = is_right && iwn_cmd_stops(self->server.request.cmd);
-    if (gw_client_is_closing(connection) && !stops) {
+    if (sock_client_is_closing(connection) && !stops) {
         return false;
     }
-    if (connection->right == GW_STOP && !stops) {
-        gw_service_refuse_crowd(self->clients, connection, &self->server.refusal);
+    if (connection->right == SOCK_STOP && !stops) {
+        sock_service_refuse_crowd(self->clients, connection, &self->server.refusal);
     } else if (is_right) {
         return true;
     }
@@ -220,7 +221,7 @@ static bool may_be_carried_out(gw_answers_t *self, const gw_client_t *connection
     return false;
 }
 
-static void carry_out(void *context, gw_client_t *connection, const char *line, size_t length) {
+static void carry_out(void *context, sock_client_t *connection, const char *line, size_t length) {
     gw_answers_t *self = (gw_answers_t *)context;
     iwn_server_t *server = &self->server;
     iwn_client_t *client = &gw_answers_served(self, connection)->client;
@@ -234,14 +235,14 @@ static void carry_out(void *context, gw_client_t *connection, const char *line, 
 }
 
 /// What comes of a leaving client is told while it is still known who it was.
-static void leave(void *context, gw_client_t *connection) {
+static void leave(void *context, sock_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);
     gw_wheels_time_request(self->wheels);
     gw_wheels_leave(self->wheels, connection->id);
     connection->held = false;
     served->client.arming = false;
-    if (connection->phase != GW_OPEN) {
+    if (connection->phase != SOCK_OPEN) {
         served->client.topics = 0; // It gets no more events.
     }
     const iw_snapshot_t seen = gw_wheels_look(self->wheels);
@@ -249,19 +250,19 @@ static void leave(void *context, gw_client_t *connection) {
 }
 
 /// Who has come only to stop is not greeted: its first line is awaited.
-static void welcome(void *context, gw_client_t *connection) {
+static void welcome(void *context, sock_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);
     memset(served, 0, sizeof *served);
-    iwn_server_welcome(&served->client, connection->id, connection->right == GW_WATCH);
-    if (connection->right != GW_STOP) {
+    iwn_server_welcome(&served->client, connection->id, connection->right == SOCK_WATCH);
+    if (connection->right != SOCK_STOP) {
         self->server.now_us = self->wheels->now_us;
         iwn_server_hello(&self->server, &served->client);
     }
 }
 
-gw_servant_t gw_answers_servant(gw_answers_t *self) {
-    return (gw_servant_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
+sock_handler_t gw_answers_handler(gw_answers_t *self) {
+    return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
 }
 
 void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen) {
@@ -269,16 +270,16 @@ void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen) {
 }
 
 void gw_answers_periodic(gw_answers_t *self) {
-    if (gw_clients_count(self->clients) > 0U) {
+    if (sock_clients_count(self->clients) > 0U) {
         self->server.now_us = self->wheels->now_us;
         iwn_server_periodic(&self->server);
     }
 }
 
 iw_time_us_t gw_answers_next_us(gw_answers_t *self) {
-    return (gw_clients_count(self->clients) > 0U) ? iwn_server_next_us(&self->server) : IW_NEVER;
+    return (sock_clients_count(self->clients) > 0U) ? iwn_server_next_us(&self->server) : IW_NEVER;
 }
 
 uint32_t gw_answers_watching_frames(gw_answers_t *self) {
-    return (gw_clients_count(self->clients) > 0U) ? iwn_server_watching(&self->server, IWN_TOPIC_FRAME) : 0U;
+    return (sock_clients_count(self->clients) > 0U) ? iwn_server_watching(&self->server, IWN_TOPIC_FRAME) : 0U;
 }

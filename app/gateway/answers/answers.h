@@ -4,14 +4,14 @@
 #ifndef GATEWAY_ANSWERS_H
 #define GATEWAY_ANSWERS_H
 
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "iwheel_linux/bus_link.h"
 #include "iwheel_server/server.h"
 
 struct gw_box;
-struct gw_knowledge;
-struct gw_log;
+struct gw_assumptions;
+struct sock_log;
 struct gw_wheels;
 
 /// So many watch each frame as it comes. More than these get them together, this often: telling costs a system call for each of them.
@@ -50,21 +50,21 @@ typedef struct {
 typedef struct gw_answers {
     iwn_server_t server; ///< Must be the first member.
     struct gw_wheels *wheels;
-    struct gw_knowledge *knowledge;
+    struct gw_assumptions *assumptions;
     struct gw_box *box;
-    struct gw_log *log;
-    gw_clients_t *clients;
+    struct sock_log *log;
+    sock_clients_t *clients;
     const char *socket; ///< By which one may drive, and its group, for messages.
     const char *group;
     gw_stopper_t stopped_by;
     gw_stopper_t estopped_by;
-    iw_link_purge_t purge;            ///< As told to the log.
+    iwl_link_purge_t purge;           ///< As told to the log.
     iw_time_us_t frames_us;           ///< Frames that are told together wait until then.
     char key[IWN_LEASE_KEY_MAX + 1U]; ///< Drawn for the arm that is being carried out.
     char text[GW_CLIENT_TEXT_SIZE];   ///< Of iwn_target_name.
     gw_refuse_texts_t texts;
     iwn_work_t work; ///< For reading requests.
-    gw_served_t served[GW_CLIENTS_MAX];
+    gw_served_t served[SOCK_CLIENTS_MAX];
 } gw_answers_t;
 
 /// Before anything else; wheels, knowledge, box, log, clients, socket, group and the first group of the server are set.
@@ -72,7 +72,7 @@ void gw_answers_begin(gw_answers_t *self);
 
 /// What `clients` is to be served by: welcomes with `hello`, carries out each line whole or not at all, and answers it (the reply to
 /// `arm` may come later). `self` must outlive it.
-gw_servant_t gw_answers_servant(gw_answers_t *self);
+sock_handler_t gw_answers_handler(gw_answers_t *self);
 
 /// Answers the arms that have been decided by the last step.
 void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen);
@@ -104,11 +104,11 @@ static inline gw_answers_t *gw_answers_of(iwn_server_t *server) {
     return (gw_answers_t *)server;
 }
 
-static inline gw_client_t *gw_answers_connection(const gw_answers_t *self, const iwn_client_t *client) {
+static inline sock_client_t *gw_answers_connection(const gw_answers_t *self, const iwn_client_t *client) {
     return &self->clients->client[(const gw_served_t *)client - self->served];
 }
 
-static inline gw_served_t *gw_answers_served(gw_answers_t *self, const gw_client_t *connection) {
+static inline gw_served_t *gw_answers_served(gw_answers_t *self, const sock_client_t *connection) {
     return &self->served[connection - self->clients->client];
 }
 

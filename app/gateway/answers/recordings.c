@@ -12,7 +12,7 @@ static void refuse(gw_answers_t *self, iwn_client_t *client, const iwn_id_t *id,
 }
 
 void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
-    gw_client_t *connection = gw_answers_connection(self, client);
+    sock_client_t *connection = gw_answers_connection(self, client);
     const iwn_request_t *request = &self->server.request;
     const char *why = NULL;
     gw_box_question_t question = {
@@ -20,7 +20,7 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
     memcpy(question.name, request->file, sizeof question.name);
     if (connection->owed) {
         why = "the recording asked for before is still being read; wait for that reply, then ask again";
-    } else if (self->box->wish.blackbox_s == 0U) {
+    } else if (self->box->config.blackbox_s == 0U) {
         why = "nothing is recorded: [record] blackbox_s is 0; set it, then restart the gateway";
     } else if (!gw_box_ask(self->box, &question)) {
         why = "the process that reads recordings is gone or too far behind; ask again after 10 s";
@@ -34,15 +34,15 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
 }
 
 /// Its question is answered. A client that has ended is looked at again: it was kept for this only.
-static void settle(gw_client_t *connection) {
+static void settle(sock_client_t *connection) {
     connection->owed = false;
-    if (connection->phase == GW_ENDED) {
+    if (connection->phase == SOCK_ENDED) {
         connection->readable = true;
     }
 }
 
 static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
-    gw_client_t *connection = gw_clients_find(self->clients, answer->client);
+    sock_client_t *connection = sock_clients_find(self->clients, answer->client);
     if (connection == NULL || !connection->owed) {
         return; // It did not wait for it.
     }
@@ -58,9 +58,9 @@ static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
 }
 
 static void give_up(gw_answers_t *self) {
-    gw_clients_t *clients = self->clients;
-    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
-        gw_client_t *connection = &clients->client[i];
+    sock_clients_t *clients = self->clients;
+    for (uint32_t i = sock_clients_from(clients, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(clients, i + 1U)) {
+        sock_client_t *connection = &clients->client[i];
         if (connection->owed) {
             settle(connection);
             refuse(self, &self->served[i].client, &self->served[i].read_id, IWN_DENIED,
@@ -70,7 +70,7 @@ static void give_up(gw_answers_t *self) {
 }
 
 bool gw_recordings_take(gw_answers_t *self) {
-    const gw_child_news_t news = gw_box_hear(self->box);
+    const gw_child_news_t news = gw_box_receive(self->box);
     if (news == GW_CHILD_SAID) {
         pass_on(self, &self->box->answer);
     } else if (news == GW_CHILD_ENDED) {

@@ -19,25 +19,27 @@
 
 static void write_recordings(int fd, const void *context) {
     const gw_box_t *self = (const gw_box_t *)context;
-    gw_box_writer_run(fd, self->ring, &self->wish);
+    gw_box_writer_run(fd, self->ring, &self->config);
 }
 
 static void read_recordings(int fd, const void *context) {
     const gw_box_t *self = (const gw_box_t *)context;
-    gw_box_reader_run(fd, self->wish.directory);
+    gw_box_reader_run(fd, self->config.directory);
 }
 
-int gw_box_open(gw_box_t *self, const gw_box_wish_t *wish) {
-    *self = (gw_box_t){
-        .writer = {.fd = -1}, .reader = {.fd = -1}, .wish = *wish, .ring_size = blackbox_ring_size(wish->blackbox_s)};
+int gw_box_open(gw_box_t *self, const gw_box_config_t *config) {
+    *self = (gw_box_t){.writer = {.fd = -1},
+                       .reader = {.fd = -1},
+                       .config = *config,
+                       .ring_size = blackbox_ring_size(config->blackbox_s)};
     self->ring = (blackbox_ring_t *)mmap(NULL, self->ring_size, PROT_READ | PROT_WRITE,
                                          MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
     if (self->ring == MAP_FAILED) {
         self->ring = NULL;
         return errno;
     }
-    blackbox_ring_init(self->ring, wish->blackbox_s);
-    if (wish->blackbox_s > 0U) {
+    blackbox_ring_init(self->ring, config->blackbox_s);
+    if (config->blackbox_s > 0U) {
         (void)gw_child_start(&self->writer, &(gw_child_work_t){"iwheel-blackbox", NICE, write_recordings, self});
         (void)gw_child_start(&self->reader, &(gw_child_work_t){"iwheel-records", NICE, read_recordings, self});
     }
@@ -67,7 +69,7 @@ static gw_child_news_t not_understood(gw_child_t *child) {
 gw_child_news_t gw_box_take(gw_box_t *self) {
     gw_box_result_t result;
     size_t length;
-    const gw_child_news_t news = gw_child_hear(&self->writer, &result, sizeof result, &length);
+    const gw_child_news_t news = gw_child_receive(&self->writer, &result, sizeof result, &length);
     if (news == GW_CHILD_SAID && length != sizeof result) {
         return not_understood(&self->writer);
     }
@@ -84,10 +86,10 @@ bool gw_box_ask(gw_box_t *self, const gw_box_question_t *question) {
     return gw_child_revive(&self->reader) && gw_child_say(&self->reader, question, sizeof *question);
 }
 
-gw_child_news_t gw_box_hear(gw_box_t *self) {
+gw_child_news_t gw_box_receive(gw_box_t *self) {
     const size_t head = offsetof(gw_box_answer_t, text);
     size_t length;
-    const gw_child_news_t news = gw_child_hear(&self->reader, &self->answer, sizeof self->answer, &length);
+    const gw_child_news_t news = gw_child_receive(&self->reader, &self->answer, sizeof self->answer, &length);
     if (news != GW_CHILD_SAID) {
         return news;
     }
@@ -101,7 +103,7 @@ gw_child_news_t gw_box_hear(gw_box_t *self) {
 /// False if it cannot be ordered; without a box there is nothing to order.
 static bool order_recording(gw_box_t *box, const iwn_stop_note_t *note, const char *cause, iw_time_us_t now_us) {
     const char *side = iwn_sides_name(note->stop.sides);
-    if (box->wish.blackbox_s == 0U) {
+    if (box->config.blackbox_s == 0U) {
         return true;
     }
     gw_box_order_t order = {
@@ -116,17 +118,17 @@ static const char *why_not(const gw_box_t *box) {
     return (box->writer.fd < 0) ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)";
 }
 
-void gw_record_stop(gw_box_t *box, gw_log_t *log, const iwn_stop_note_t *note, iw_time_us_t now_us) {
+void gw_record_stop(gw_box_t *box, sock_log_t *log, const iwn_stop_note_t *note, iw_time_us_t now_us) {
     if (!order_recording(box, note, iwn_cause_name(note->stop.cause), now_us)) {
-        gw_log(log, GW_LOG_WARNING,
-               "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
-               "memory: iwheelctl why",
-               (unsigned)note->stop.number, why_not(box));
+        sock_log(log, SOCK_LOG_WARNING,
+                 "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
+                 "memory: iwheelctl why",
+                 (unsigned)note->stop.number, why_not(box));
     }
 }
 
-void gw_record_rolling(gw_box_t *box, gw_log_t *log, const iw_snapshot_t *seen) {
-    iwn_stop_note_t note = {.stop = {.at_us = seen->at_us, .from = seen->state}, .wall_us = iw_clock_wall_us()};
+void gw_record_rolling(gw_box_t *box, sock_log_t *log, const iw_snapshot_t *seen) {
+    iwn_stop_note_t note = {.stop = {.at_us = seen->at_us, .from = seen->state}, .wall_us = iwl_clock_wall_us()};
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const bool turns = seen->wheel[side].heard && abs(seen->wheel[side].speed_mm_s) > IW_ROLLING_MM_S;
         if (turns) {
@@ -137,39 +139,40 @@ void gw_record_rolling(gw_box_t *box, gw_log_t *log, const iw_snapshot_t *seen) 
                    "a wheel turns although nothing is sent to it, and soon after the last setpoint: the machine rolls "
                    "away; use its parking brake");
     if (!order_recording(box, &note, "rolling", seen->at_us)) {
-        gw_log(log, GW_LOG_WARNING, "that is not recorded: the process that writes recordings is %s", why_not(box));
+        sock_log(log, SOCK_LOG_WARNING, "that is not recorded: the process that writes recordings is %s", why_not(box));
     }
 }
 
-static void tell_result(const gw_box_t *box, gw_log_t *log) {
+static void tell_result(const gw_box_t *box, sock_log_t *log) {
     const gw_box_result_t *result = &box->last;
-    const char *directory = box->wish.directory;
+    const char *directory = box->config.directory;
     if (result->number == 0U && result->error == 0) {
-        gw_log(log, GW_LOG_INFO, "recorded in %s", result->path);
+        sock_log(log, SOCK_LOG_INFO, "recorded in %s", result->path);
     } else if (result->number == 0U) {
-        gw_log(log, GW_LOG_WARNING,
-               "no recording can be written to %s: %s; %s, or name another place as [record] directory. Until then a "
-               "stop is kept in memory only: iwheelctl why",
-               directory, gw_folder_fault(result->error), gw_folder_cure(result->error));
+        sock_log(log, SOCK_LOG_WARNING,
+                 "no recording can be written to %s: %s; %s, or name another place as [record] directory. Until then a "
+                 "stop is kept in memory only: iwheelctl why",
+                 directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
     } else if (result->error != 0) {
-        gw_log(log, GW_LOG_WARNING,
-               "stop %u is not recorded in %s: %s; %s, or name another place as [record] directory",
-               (unsigned)result->number, directory, gw_folder_fault(result->error), gw_folder_cure(result->error));
+        sock_log(
+            log, SOCK_LOG_WARNING, "stop %u is not recorded in %s: %s; %s, or name another place as [record] directory",
+            (unsigned)result->number, directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
     } else {
-        gw_log(log, GW_LOG_INFO, "stop %u is recorded in %s (%u frames, %u.%u s before it)", (unsigned)result->number,
-               result->path, (unsigned)result->frames, (unsigned)(result->ms / 1000U),
-               (unsigned)(result->ms % 1000U / 100U));
+        sock_log(log, SOCK_LOG_INFO, "stop %u is recorded in %s (%u frames, %u.%u s before it)",
+                 (unsigned)result->number, result->path, (unsigned)result->frames, (unsigned)(result->ms / 1000U),
+                 (unsigned)(result->ms % 1000U / 100U));
     }
 }
 
-void gw_record_take(gw_box_t *box, gw_log_t *log) {
+void gw_record_take(gw_box_t *box, sock_log_t *log) {
     switch (gw_box_take(box)) {
     case GW_CHILD_SAID:
         tell_result(box, log);
         break;
     case GW_CHILD_ENDED:
-        gw_log(log, GW_LOG_WARNING,
-               "the process that writes recordings has ended (was it killed?); it is started again with the next stop");
+        sock_log(
+            log, SOCK_LOG_WARNING,
+            "the process that writes recordings has ended (was it killed?); it is started again with the next stop");
         break;
     case GW_CHILD_SILENT:
         break;
@@ -179,7 +182,7 @@ void gw_record_take(gw_box_t *box, gw_log_t *log) {
 void gw_record_write(const gw_box_t *box, uint32_t number, iwn_out_t *json) {
     const gw_box_result_t *last = &box->stop;
     const bool known = number != 0U && last->number == number;
-    iwn_out_text(json, "directory", box->wish.directory);
+    iwn_out_text(json, "directory", box->config.directory);
     iwn_out_text(json, "recording", (known && last->error == 0) ? last->path : NULL);
-    iwn_out_text(json, "recording_error", (known && last->error != 0) ? gw_folder_fault(last->error) : NULL);
+    iwn_out_text(json, "recording_error", (known && last->error != 0) ? sock_folder_fault(last->error) : NULL);
 }

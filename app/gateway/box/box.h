@@ -18,12 +18,12 @@
 
 #include "iwheel_northbound/json_out.h"
 
-struct gw_log;
+struct sock_log;
 
 typedef struct gw_box {
     blackbox_ring_t *ring;
     size_t ring_size;
-    gw_box_wish_t wish;
+    gw_box_config_t config;
     gw_child_t writer;
     gw_child_t reader;
     gw_box_result_t last;   ///< The last result; number 0: none, or not of a stop.
@@ -33,7 +33,7 @@ typedef struct gw_box {
 
 /// Makes the ring, and the writer unless blackbox_s is 0. 0, or an errno: not enough memory. Call it while nothing is sent and few
 /// descriptors are open.
-int gw_box_open(gw_box_t *self, const gw_box_wish_t *wish);
+int gw_box_open(gw_box_t *self, const gw_box_config_t *config);
 
 /// Lets the writer finish and end by itself.
 void gw_box_close(gw_box_t *self);
@@ -47,7 +47,7 @@ bool gw_box_write(gw_box_t *self, const gw_box_order_t *order);
 bool gw_box_ask(gw_box_t *self, const gw_box_question_t *question);
 
 /// The next answer of the process that reads, which is in `answer`. Never waits.
-gw_child_news_t gw_box_hear(gw_box_t *self);
+gw_child_news_t gw_box_receive(gw_box_t *self);
 
 /// The next result of the writer, which is in `last`. Never waits.
 gw_child_news_t gw_box_take(gw_box_t *self);
@@ -55,13 +55,13 @@ gw_child_news_t gw_box_take(gw_box_t *self);
 /// A stop on its way to disk, and what became of it.
 ///
 /// Orders a recording of a stop that has just been seen, if stops are recorded.
-void gw_record_stop(gw_box_t *box, struct gw_log *log, const iwn_stop_note_t *note, iw_time_us_t now_us);
+void gw_record_stop(gw_box_t *box, struct sock_log *log, const iwn_stop_note_t *note, iw_time_us_t now_us);
 
 /// The same of wheels that roll although nothing is sent to them: a recording without a stop, with the cause `rolling`.
-void gw_record_rolling(gw_box_t *box, struct gw_log *log, const iw_snapshot_t *seen);
+void gw_record_rolling(gw_box_t *box, struct sock_log *log, const iw_snapshot_t *seen);
 
 /// Takes what the writer tells, to the log.
-void gw_record_take(gw_box_t *box, struct gw_log *log);
+void gw_record_take(gw_box_t *box, struct sock_log *log);
 
 /// Where the stop with this number was written (0: there was none), into an object that is open.
 void gw_record_write(const gw_box_t *box, uint32_t number, iwn_out_t *json);

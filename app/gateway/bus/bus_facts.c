@@ -10,17 +10,17 @@
 
 #define PATH_SIZE 256
 
-static iw_timing_t judge(const inspect_wish_t *wish, const iw_bus_link_t *link) {
-    return iw_timing_judge(link, wish->bitrate_hz, wish->sample_point_permille);
+static iwl_timing_t judge(const inspect_config_t *config, const iwl_bus_link_t *link) {
+    return iwl_timing_judge(link, config->bitrate_hz, config->sample_point_permille);
 }
 
-const char *gw_bus_facts_timing(const inspect_wish_t *wish, const iw_bus_link_t *link) {
-    switch (judge(wish, link)) {
-    case IW_TIMING_RIGHT:
+const char *gw_bus_facts_timing(const inspect_config_t *config, const iwl_bus_link_t *link) {
+    switch (judge(config, link)) {
+    case IWL_TIMING_RIGHT:
         return "confirmed";
-    case IW_TIMING_NEAR:
+    case IWL_TIMING_NEAR:
         return "near";
-    case IW_TIMING_WRONG:
+    case IWL_TIMING_WRONG:
         return "contradicted";
     default:
         return "unproven";
@@ -51,7 +51,7 @@ static void warn_of_health(gw_wheels_t *wheels) {
 }
 
 static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
-    const iw_linux_hal_t *hal = &wheels->hal;
+    const iwl_hal_t *hal = &wheels->hal;
     char sentence[GW_WARNING_SIZE];
     wheels->warnings = 0;
     if (!hal->estop_ops->present) {
@@ -65,12 +65,12 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
         warn(wheels, GW_ESTOP_UNTRIED, wheels->estop);
     }
     if (left_behind) {
-        gw_bus_left_sentence(iw_linux_hal_link(hal), wheels->bus.name, sentence, sizeof sentence);
+        gw_bus_left_sentence(iwl_hal_link(hal), wheels->bus.name, sentence, sizeof sentence);
         warn(wheels, "%s", sentence);
     }
     static inspect_findings_t findings; // Too large for a stack.
     inspect_begin(&findings);
-    inspect_link(iw_linux_hal_link(hal), &wheels->bus, &findings);
+    inspect_link(iwl_hal_link(hal), &wheels->bus, &findings);
     for (unsigned i = 0; i < findings.count; i++) {
         if (findings.finding[i].verdict != INSPECT_OK) {
             inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
@@ -80,7 +80,7 @@ static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
 }
 
 void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_behind) {
-    const iw_bus_link_t *link = iw_linux_hal_link(&wheels->hal);
+    const iwl_bus_link_t *link = iwl_hal_link(&wheels->hal);
     const bool news = !self->known || link->changes != self->changes;
     if (!news && left_behind == self->left_behind && wheels->estop_untried == self->untried &&
         wheels->health.changes == self->health) {
@@ -88,7 +88,7 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
     }
     if (news) {
         const iw_bus_facts_t facts = {.timing_contradicted =
-                                          wheels->bus.refuses && judge(&wheels->bus, link) == IW_TIMING_WRONG,
+                                          wheels->bus.refuses && judge(&wheels->bus, link) == IWL_TIMING_WRONG,
                                       .echo_proven = link->echo_proven};
         self->known = true;
         self->changes = link->changes;
@@ -101,9 +101,9 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
     note_warnings(wheels, left_behind);
 }
 
-void gw_bus_left_sentence(const iw_bus_link_t *link, const char *bus, char *out_sentence, size_t size) {
+void gw_bus_left_sentence(const iwl_bus_link_t *link, const char *bus, char *out_sentence, size_t size) {
     static const char what[] = "a setpoint is still in the controller and may leave when wheels get power";
-    if (link->presence == IW_LINK_LOCAL) {
+    if (link->presence == IWL_LINK_LOCAL) {
         (void)snprintf(out_sentence, size, "bus %s: %s; start its hub (the simulator) again", bus, what);
     } else if (!link->echo_proven) {
         (void)snprintf(out_sentence, size, "bus %s: %s; this adapter gives nothing back: switch it off and on", bus,

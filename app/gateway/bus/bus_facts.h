@@ -20,7 +20,7 @@ typedef struct gw_bus_facts {
 void gw_bus_facts_follow(gw_bus_facts_t *self, struct gw_wheels *wheels, bool left_behind);
 
 /// The word for `status`: what is known of the bit timing.
-const char *gw_bus_facts_timing(const inspect_wish_t *wish, const iw_bus_link_t *link);
+const char *gw_bus_facts_timing(const inspect_config_t *config, const iwl_bus_link_t *link);
 
 /// A setpoint that was left in the controller when sending ended, and that this process may not take back: what to say
 /// of it, and whom to ask.
@@ -30,7 +30,7 @@ const char *gw_bus_facts_timing(const inspect_wish_t *wish, const iw_bus_link_t 
 /// restart as it notices any other: the bus goes down and up, and with that everything that was queued is gone.
 ///
 /// What it means, and what to do.
-void gw_bus_left_sentence(const iw_bus_link_t *link, const char *bus, char *out_sentence, size_t size);
+void gw_bus_left_sentence(const iwl_bus_link_t *link, const char *bus, char *out_sentence, size_t size);
 
 /// False if nobody can be asked: there is no such directory, or we may not write there. Does not wait for a disk: the
 /// directory is meant to be in memory.

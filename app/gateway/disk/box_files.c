@@ -40,7 +40,7 @@ int gw_box_files_open(const char *directory) {
     if (mkdir(directory, 0755) != 0 && errno != EEXIST) {
         return -1;
     }
-    return gw_folder_open_own(directory);
+    return sock_folder_open_own(directory);
 }
 
 unsigned gw_box_files_ending(const char *text) {

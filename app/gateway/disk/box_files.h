@@ -69,7 +69,7 @@ FILE *gw_box_files_create(int directory, const char *stem, const char *ending);
 #define GW_BOX_LINE_SIZE 4096U
 
 /// First line: what this is and how its times are to be read. Lengths are without a terminator, 0: it did not fit.
-size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, bool from_start,
+size_t gw_box_line_head(const gw_box_config_t *config, const gw_box_order_t *order, bool from_start,
                         char out_line[GW_BOX_LINE_SIZE]);
 
 /// Second line: the stop. `in_motion`: a wheel turned, or was commanded to.
@@ -98,7 +98,7 @@ size_t gw_box_line_end(uint64_t frames, char out_line[GW_BOX_LINE_SIZE]);
 ///
 /// Runs until the gateway is gone; then, if setpoints were being sent, writes a last recording. `fd` is the socket to the
 /// gateway.
-void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t *wish);
+void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_config_t *config);
 
 /// The process that reads recordings for clients: a question, an answer, so that neither the loop nor the writer waits for a disk
 /// because somebody reads.

@@ -21,13 +21,13 @@ static size_t end(iwn_out_t *json) {
     return iwn_out_finish(json);
 }
 
-size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, bool from_start,
+size_t gw_box_line_head(const gw_box_config_t *config, const gw_box_order_t *order, bool from_start,
                         char out_line[GW_BOX_LINE_SIZE]) {
     iwn_out_t json = begin(out_line, "blackbox");
     iwn_out_int(&json, "format", FORMAT_VERSION);
     iwn_out_text(&json, "version", IWHEEL_VERSION);
-    iwn_out_text(&json, "bus", wish->bus);
-    iwn_out_text(&json, "estop", wish->estop);
+    iwn_out_text(&json, "bus", config->bus);
+    iwn_out_text(&json, "estop", config->estop);
     iwn_out_int(&json, "wall_minus_monotonic_us", order->wall_minus_us);
     iwn_out_bool(&json, "from_start", from_start);
     return end(&json);
@@ -136,10 +136,10 @@ static void put_request(iwn_out_t *json, const blackbox_entry_t *entry) {
     case BLACKBOX_RELEASE:
         put_refusal(json, entry->b);
         break;
-    case BLACKBOX_LEDGER:
-        iwn_out_text(json, "item", iwn_ledger_item_name((iw_ledger_item_t)entry->a));
-        iwn_out_text(json, "state", iwn_ledger_state_name((iw_ledger_state_t)entry->b));
-        iwn_out_text(json, "evidence", iwn_evidence_name((iw_evidence_t)entry->number));
+    case BLACKBOX_ASSUMPTION:
+        iwn_out_text(json, "item", iwn_assumption_item_name((iw_assumption_item_t)entry->a));
+        iwn_out_text(json, "state", iwn_assumption_state_name((iw_assumption_state_t)entry->b));
+        iwn_out_text(json, "evidence", iwn_source_name((iw_source_t)entry->number));
         iwn_out_int(json, "figure", entry->as.value);
         break;
     case BLACKBOX_TARE:
@@ -173,7 +173,7 @@ size_t gw_box_line_entry(const blackbox_entry_t *entry, uint64_t frames, char ou
     case BLACKBOX_RELEASE:
     case BLACKBOX_GONE:
     case BLACKBOX_TARE:
-    case BLACKBOX_LEDGER:
+    case BLACKBOX_ASSUMPTION:
         put_request(&json, entry);
         break;
     default:

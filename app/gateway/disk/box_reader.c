@@ -213,13 +213,13 @@ static void write_piece(int fd, const gw_box_question_t *question, int64_t size,
 /// The name has the right form: never a path.
 static int open_file(int directory, const char *name, int64_t *out_size) {
     struct stat status;
-    const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
+    const sock_owners_t owners = sock_owners_of(SOCK_RUNTIME_DIRECTORY);
     // Not waiting either: somebody might have put a pipe there.
     const int fd = openat(directory, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (fd < 0) {
         return -1;
     }
-    const int error = (fstat(fd, &status) != 0) ? errno : gw_owners_wrote(&owners, &status) ? 0 : GW_FOLDER_FILE;
+    const int error = (fstat(fd, &status) != 0) ? errno : sock_owners_wrote(&owners, &status) ? 0 : SOCK_FOLDER_FILE;
     if (error != 0) {
         (void)close(fd);
         errno = error;
@@ -245,7 +245,7 @@ static void answer_piece(int directory, const gw_box_question_t *question, gw_bo
                question->name);
     } else if (fd < 0) {
         refuse(out, IWN_DENIED, "%s is not read: %s", question->name,
-               (errno == ELOOP) ? "it is a symbolic link, which is not followed" : gw_folder_fault(errno));
+               (errno == ELOOP) ? "it is a symbolic link, which is not followed" : sock_folder_fault(errno));
     } else if (question->offset > size) {
         refuse(out, IWN_OUT_OF_RANGE, "offset must be 0 to %" PRId64 ", the size of %s", size, question->name);
     } else {
@@ -257,11 +257,11 @@ static void answer_piece(int directory, const gw_box_question_t *question, gw_bo
 }
 
 void gw_box_reader_answer(const char *path, const gw_box_question_t *question, gw_box_answer_t *out) {
-    const int directory = gw_folder_open_own(path);
+    const int directory = sock_folder_open_own(path);
     out->client = question->client;
     if (directory < 0) {
-        refuse(out, IWN_DENIED, "the directory of the recordings cannot be read: %s; %s", gw_folder_fault(errno),
-               gw_folder_cure(errno));
+        refuse(out, IWN_DENIED, "the directory of the recordings cannot be read: %s; %s", sock_folder_fault(errno),
+               sock_folder_cure(errno));
         return;
     }
     if (question->list) {

@@ -27,7 +27,7 @@
 typedef struct {
     int fd;
     const blackbox_ring_t *ring;
-    const gw_box_wish_t *wish;
+    const gw_box_config_t *config;
     blackbox_entry_t *copy; ///< Room for as many entries as the ring has.
     const gw_box_order_t *order;
     const char *bus; ///< As the file of frames names it.
@@ -106,7 +106,7 @@ static void flush(writer_t *self) {
 /// What happens after the stop, until it is over or the next order waits.
 static void follow(writer_t *self) {
     const iw_time_us_t until_us = self->order->note.stop.at_us + GW_BOX_AFTER_US;
-    while (iw_clock_now_us() < until_us && !is_called(self, FOLLOW_MS)) {
+    while (iwl_clock_now_us() < until_us && !is_called(self, FOLLOW_MS)) {
         write_entries(self, UINT64_MAX, 0);
         flush(self);
     }
@@ -123,21 +123,21 @@ static void write_config(writer_t *self, int directory, const char *stem) {
     FILE *file = gw_box_files_create(directory, stem, ".conf");
     keep_error(self, file == NULL);
     if (file != NULL) {
-        keep_error(self, fputs(self->wish->config, file) < 0);
+        keep_error(self, fputs(self->config->config, file) < 0);
         finish_file(self, file);
     }
 }
 
 static void fill_files(writer_t *self) {
     const iw_stop_t *stop = &self->order->note.stop;
-    const iw_time_us_t length_us = (iw_time_us_t)self->wish->blackbox_s * 1000000U;
+    const iw_time_us_t length_us = (iw_time_us_t)self->config->blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
     const iw_time_us_t begin_us = begin_of(self, since_us);
     const bool from_start = blackbox_ring_is_whole(self->ring) && begin_us <= self->copy[0].at_us;
     self->next = 0;
     self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
-    put_line(self, self->events_file, gw_box_line_head(self->wish, self->order, from_start, self->line));
+    put_line(self, self->events_file, gw_box_line_head(self->config, self->order, from_start, self->line));
     put_line(self, self->events_file, gw_box_line_stop(self->order, self->in_motion, self->line));
     write_entries(self, self->order->mark, since_us);
     flush(self);
@@ -154,7 +154,7 @@ static void fill_files(writer_t *self) {
 static int write_files(writer_t *self, int directory, uint32_t number) {
     char stem[GW_BOX_STEM_SIZE];
     (void)snprintf(stem, sizeof stem, "stop-%06u-%s", (unsigned)number, self->order->cause);
-    (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->wish->directory, stem);
+    (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->config->directory, stem);
     self->error = 0;
     write_config(self, directory, stem);
     if (self->error == EEXIST) {
@@ -191,7 +191,7 @@ static void reserve(const writer_t *self, int directory) {
 
 /// A full disk costs older recordings.
 static int write_recording(writer_t *self) {
-    const int directory = gw_box_files_open(self->wish->directory);
+    const int directory = gw_box_files_open(self->config->directory);
     if (directory < 0) {
         return errno;
     }
@@ -204,7 +204,8 @@ static int write_recording(writer_t *self) {
     while ((error == ENOSPC || error == EDQUOT) && make_room(self, directory, number)) {
         error = write_files(self, directory, number);
     }
-    gw_box_files_rotate(directory, &(gw_box_room_t){self->wish->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
+    gw_box_files_rotate(directory,
+                        &(gw_box_room_t){self->config->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
     reserve(self, directory);
     (void)fsync(directory);
     (void)close(directory);
@@ -260,7 +261,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
 
 /// Said at once, not when the first stop is lost.
 static void try_directory(writer_t *self) {
-    const int directory = gw_box_files_open(self->wish->directory);
+    const int directory = gw_box_files_open(self->config->directory);
     self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
     if (directory >= 0 && faccessat(directory, ".", W_OK, AT_EACCESS) != 0) {
         self->result.error = errno;
@@ -283,8 +284,8 @@ static void note_death(writer_t *self) {
     (void)signal(SIGTERM,
                  SIG_DFL); // A service manager that waits for us before it starts the next gateway must not wait.
     iw_pair_t *applied = &order.note.stop.applied;
-    order.note.wall_us = iw_clock_wall_us();
-    order.note.stop.at_us = iw_clock_now_us();
+    order.note.wall_us = iwl_clock_wall_us();
+    order.note.stop.at_us = iwl_clock_now_us();
     order.wall_minus_us = order.note.wall_us - (int64_t)order.note.stop.at_us;
     *applied = find_last(self, order.mark).setpoints;
     const unsigned long long ms = (unsigned long long)(order.note.stop.at_us / IW_US_PER_MS);
@@ -297,11 +298,11 @@ static void note_death(writer_t *self) {
     carry_out(self, &order);
 }
 
-void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t *wish) {
+void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_config_t *config) {
     gw_box_order_t order;
     static writer_t self; // Too large for a stack.
-    self = (writer_t){.fd = fd, .ring = ring, .wish = wish};
-    self.bus = (strncmp(wish->bus, "unix:", 5) == 0) ? "local" : wish->bus;
+    self = (writer_t){.fd = fd, .ring = ring, .config = config};
+    self.bus = (strncmp(config->bus, "unix:", 5) == 0) ? "local" : config->bus;
     self.copy = (blackbox_entry_t *)calloc(blackbox_ring_most(ring), sizeof *self.copy);
     if (self.copy == NULL) {
         return;

@@ -18,7 +18,7 @@
 /// An answer of the process that reads: a piece in base64, or the list, and what is around it.
 #define GW_BOX_ANSWER_SIZE 52000U
 /// Directory, '/', "stop-000001-", cause, ".jsonl".
-#define GW_BOX_PATH_SIZE (GW_PATH_SIZE + GW_BOX_CAUSE_SIZE + 48U)
+#define GW_BOX_PATH_SIZE (SOCK_PATH_SIZE + GW_BOX_CAUSE_SIZE + 48U)
 
 /// What is recorded, and where. The texts must outlive the box.
 typedef struct {
@@ -28,7 +28,7 @@ typedef struct {
     const char *bus;    ///< As configured; also the next two.
     const char *estop;  ///< The line.
     const char *config; ///< The whole configuration in force, as its file would be.
-} gw_box_wish_t;
+} gw_box_config_t;
 
 /// What the gateway tells the writer.
 typedef struct {

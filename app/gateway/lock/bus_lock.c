@@ -24,11 +24,11 @@ const char *gw_bus_lock_local_path(const char *bus) {
 
 /// A path of any length and spelling as 16 digits.
 static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
-    char folder[GW_ADDRESS_SIZE];
+    char folder[SOCK_ADDRESS_SIZE];
     static char real[PATH_MAX]; // Too large for a stack.
     const char *slash = strrchr(path, '/');
     uint64_t hash = 0xCBF29CE484222325U;
-    gw_folder_of(path, folder, sizeof folder);
+    sock_folder_of(path, folder, sizeof folder);
     const char *const parts[] = {(realpath(folder, real) != NULL) ? real : folder, "/",
                                  (slash == NULL) ? path : slash + 1};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
@@ -68,7 +68,7 @@ static bool is_ours(gw_bus_lock_t *self, int fd) {
     if (fstat(fd, &status) != 0) {
         return false;
     }
-    const bool ours = gw_owners_wrote(&self->names.owners, &status) && (status.st_mode & 077U) == 0U;
+    const bool ours = sock_owners_wrote(&self->names.owners, &status) && (status.st_mode & 077U) == 0U;
     if (!ours) {
         note_stranger(self, &status);
     }
@@ -99,7 +99,7 @@ static int lock_file(gw_bus_lock_t *self) {
     struct stat status;
     const int fd = open_file(self->path);
     self->error = (fd < 0) ? errno : 0;
-    if (fd < 0 && lstat(self->path, &status) == 0 && !gw_owners_have(&self->names.owners, status.st_uid)) {
+    if (fd < 0 && lstat(self->path, &status) == 0 && !sock_owners_have(&self->names.owners, status.st_uid)) {
         note_stranger(self, &status);
     }
     if (fd < 0) {
@@ -130,17 +130,17 @@ static void name_interface(gw_bus_lock_t *self, const char *bus, const char *dir
 
 int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory) {
     const char *path = gw_bus_lock_local_path(bus);
-    char folder[GW_ADDRESS_SIZE];
+    char folder[SOCK_ADDRESS_SIZE];
     *self = (gw_bus_lock_t){.fd = -1, .names = {.fd = -1}};
     if (path != NULL) {
         (void)snprintf(self->path, sizeof self->path, "%s.gateway-lock", path);
         name_local(path, self->names.key);
-        gw_folder_of(path, folder, sizeof folder);
+        sock_folder_of(path, folder, sizeof folder);
     } else {
         name_interface(self, bus, directory);
         (void)snprintf(folder, sizeof folder, "%.96s", directory);
     }
-    self->names.owners = gw_owners_of(folder);
+    self->names.owners = sock_owners_of(folder);
     int error = lock_file(self);
     if (error == 0 && path != NULL && (self->error == ENOENT || self->error == ENOTDIR)) {
         error = self->error; // No bus can be there.
@@ -154,12 +154,12 @@ int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory
     return error;
 }
 
-bool gw_bus_lock_tend(gw_bus_lock_t *self, iw_time_us_t now_us) {
+bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us) {
     if (now_us < self->look_us) {
         return false;
     }
     self->look_us = now_us + GW_BUS_LOCK_LOOK_US;
-    return gw_bus_names_tend(&self->names, &self->holder);
+    return gw_bus_names_poll(&self->names, &self->holder);
 }
 
 void gw_bus_lock_release(gw_bus_lock_t *self) {

@@ -16,7 +16,7 @@
 
 #include "iwheel/types.h"
 
-#define GW_BUS_LOCK_PATH_SIZE (GW_ADDRESS_SIZE + 48U)
+#define GW_BUS_LOCK_PATH_SIZE (SOCK_ADDRESS_SIZE + 48U)
 /// Who may have come is looked at this often.
 #define GW_BUS_LOCK_LOOK_US 1000000U
 
@@ -34,7 +34,7 @@ typedef struct {
 int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory);
 
 /// Once per cycle. True if we must give the bus to `self->holder`.
-bool gw_bus_lock_tend(gw_bus_lock_t *self, iw_time_us_t now_us);
+bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us);
 
 void gw_bus_lock_release(gw_bus_lock_t *self);
 

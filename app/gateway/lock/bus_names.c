@@ -69,10 +69,10 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
 /// Reads the list until the name comes, or its end.
 static uid_t search_list(int fd, const char *name) {
     static _Alignas(struct nlmsghdr) char buffer[16384]; // Too large for a stack.
-    const iw_time_us_t until_us = iw_clock_now_us() + LIST_US;
+    const iw_time_us_t until_us = iwl_clock_now_us() + LIST_US;
     const struct timeval patience = {.tv_usec = LIST_US};
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    while (iw_clock_now_us() < until_us) {
+    while (iwl_clock_now_us() < until_us) {
         const ssize_t got = recv(fd, buffer, sizeof buffer, 0);
         struct nlmsghdr *message = (struct nlmsghdr *)buffer;
         for (ssize_t left = got; left > 0 && NLMSG_OK(message, (size_t)left); message = NLMSG_NEXT(message, left)) {
@@ -167,7 +167,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }
-        const bool stranger = holder.uid == NOBODY || !gw_owners_have(&self->owners, holder.uid);
+        const bool stranger = holder.uid == NOBODY || !sock_owners_have(&self->owners, holder.uid);
         if (stranger && (out_stranger->name[0] == '\0' || (out_stranger->pid == 0 && holder.pid > 0))) {
             *out_stranger = holder; // One is told: the first of whom most is known.
         }
@@ -193,7 +193,7 @@ static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_
     if (holder.uid == NOBODY) {
         return SEEN_UNKNOWN;
     }
-    if (!gw_owners_have(&self->owners, holder.uid)) {
+    if (!sock_owners_have(&self->owners, holder.uid)) {
         return SEEN_NOBODY;
     }
     *out_holder = holder;
@@ -221,9 +221,9 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
     if (error != 0) {
         return error;
     }
-    const iw_time_us_t until_us = iw_clock_now_us() + GW_BUS_PATIENCE_US;
+    const iw_time_us_t until_us = iwl_clock_now_us() + GW_BUS_PATIENCE_US;
     seen_t seen = look(self, out_holder);
-    while (seen != SEEN_NOBODY && seen != SEEN_EARLIER && iw_clock_now_us() < until_us) {
+    while (seen != SEEN_NOBODY && seen != SEEN_EARLIER && iwl_clock_now_us() < until_us) {
         (void)nanosleep(&again, NULL);
         seen = look(self, out_holder);
     }
@@ -234,7 +234,7 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
     return 0;
 }
 
-bool gw_bus_names_tend(gw_bus_names_t *self, gw_holder_t *out_holder) {
+bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder) {
     const bool first = self->owners.own == 0U || self->owners.own == self->owners.service;
     for (unsigned i = 0; i < ASKERS_MAX && self->fd >= 0; i++) {
         const int fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC);

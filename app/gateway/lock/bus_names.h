@@ -31,7 +31,7 @@ typedef struct {
 
 typedef struct {
     char key[GW_BUS_KEY_SIZE]; ///< What all names of this bus begin with, with an `@` for the zero byte.
-    gw_owners_t owners;
+    sock_owners_t owners;
     unsigned place; ///< GW_BUS_PLACES: all of ours were taken.
     int fd;         ///< -1: no name.
 } gw_bus_names_t;
@@ -42,7 +42,7 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
 
 /// Lets go those who asked who we are. True, with `*out_holder`, if we are neither root nor the service and one of these
 /// has come: it does not wait for us. A few system calls; never waits.
-bool gw_bus_names_tend(gw_bus_names_t *self, gw_holder_t *out_holder);
+bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder);
 
 void gw_bus_names_release(gw_bus_names_t *self);
 

@@ -52,7 +52,7 @@ static int explain(const gw_bus_lock_t *lock, const char *bus, int error, FILE *
 /// What keeps nobody from starting, but somebody should see to.
 static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
     static const char prefix[] = "iwheel-gateway: warning:";
-    const gw_owners_t *owners = &lock->names.owners;
+    const sock_owners_t *owners = &lock->names.owners;
     char who[64];
     for (size_t i = 0; i < sizeof lock->stranger / sizeof lock->stranger[0]; i++) {
         if (lock->stranger[i].name[0] != '\0') {
@@ -73,9 +73,9 @@ static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
 }
 
 /// A stranger's file says nothing.
-static bool is_marked(const gw_owners_t *owners, const char *path) {
+static bool is_marked(const sock_owners_t *owners, const char *path) {
     struct stat status;
-    return path[0] != '\0' && lstat(path, &status) == 0 && gw_owners_have(owners, status.st_uid);
+    return path[0] != '\0' && lstat(path, &status) == 0 && sock_owners_have(owners, status.st_uid);
 }
 
 int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err) {

@@ -12,7 +12,7 @@
 
 #include <stdio.h>
 
-#define GW_RUNTIME_PATH_SIZE (GW_PATH_SIZE + GW_ADDRESS_SIZE + 16U)
+#define GW_RUNTIME_PATH_SIZE (SOCK_PATH_SIZE + SOCK_ADDRESS_SIZE + 16U)
 #define GW_RUNTIME_PLACES    2U
 
 typedef struct {
@@ -24,7 +24,7 @@ typedef struct {
     bool unsure;                                         ///< The last change failed.
 } gw_runtime_t;
 
-/// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
+/// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is SOCK_RUNTIME_DIRECTORY but in tests, and must outlive
 /// `self`. 0, or a sysexits code after the cause and the cure have been printed on `err`; a stranger who holds what locks the
 /// bus is printed there too.
 int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err);

@@ -38,7 +38,7 @@ static void become(const gw_child_work_t *work, int fd) {
 
 int gw_child_start(gw_child_t *self, const gw_child_work_t *work) {
     int ends[2];
-    *self = (gw_child_t){.work = *work, .fd = -1, .started_us = iw_clock_now_us()};
+    *self = (gw_child_t){.work = *work, .fd = -1, .started_us = iwl_clock_now_us()};
     if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
         return errno;
     }
@@ -59,7 +59,7 @@ int gw_child_start(gw_child_t *self, const gw_child_work_t *work) {
 }
 
 bool gw_child_revive(gw_child_t *self) {
-    if (self->fd < 0 && self->work.run != NULL && iw_clock_now_us() - self->started_us >= RESTART_US) {
+    if (self->fd < 0 && self->work.run != NULL && iwl_clock_now_us() - self->started_us >= RESTART_US) {
         const gw_child_work_t work = self->work;
         (void)gw_child_start(self, &work);
     }
@@ -70,7 +70,7 @@ bool gw_child_say(const gw_child_t *self, const void *message, size_t length) {
     return send(self->fd, message, length, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length;
 }
 
-gw_child_news_t gw_child_hear(gw_child_t *self, void *out_message, size_t size, size_t *out_length) {
+gw_child_news_t gw_child_receive(gw_child_t *self, void *out_message, size_t size, size_t *out_length) {
     if (self->fd < 0) {
         return GW_CHILD_SILENT;
     }

@@ -49,7 +49,7 @@ bool gw_child_revive(gw_child_t *self);
 bool gw_child_say(const gw_child_t *self, const void *message, size_t length);
 
 /// Takes its next message; `*out_length` is written with GW_CHILD_SAID. Never waits. A message longer than `size` is cut off.
-gw_child_news_t gw_child_hear(gw_child_t *self, void *out_message, size_t size, size_t *out_length);
+gw_child_news_t gw_child_receive(gw_child_t *self, void *out_message, size_t size, size_t *out_length);
 
 /// Lets it finish and end by itself. Also for one that has said what nobody understands.
 void gw_child_close(gw_child_t *self);

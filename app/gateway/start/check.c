@@ -71,7 +71,7 @@ static bool is_to_be_made(const char *path, int *out_error) {
     if (*out_error != ENOENT) {
         return false;
     }
-    gw_folder_of(bare, above, sizeof above);
+    sock_folder_of(bare, above, sizeof above);
     *out_error = (faccessat(AT_FDCWD, above, W_OK | X_OK, AT_EACCESS) == 0) ? 0 : errno;
     return true;
 }
@@ -95,7 +95,7 @@ static void cure_directory(const char *path, const char *key, int error, inspect
         inspect_cure(findings, "correct %s in the configuration", key);
         break;
     default:
-        inspect_cure(findings, "%s, or set %s to another directory", gw_folder_cure(error), key);
+        inspect_cure(findings, "%s, or set %s to another directory", sock_folder_cure(error), key);
         break;
     }
 }
@@ -118,37 +118,37 @@ static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_
 }
 
 /// `text`: what the start would print.
-static int judge_place(const gw_listener_wish_t *wish, char *text, size_t size, int *out_error) {
-    static gw_listener_t listener;
+static int judge_place(const sock_listener_config_t *wanted, char *text, size_t size, int *out_error) {
+    static sock_listener_t listener;
     FILE *const memory = fmemopen(text, size, "w");
     if (memory == NULL) {
         return 0;
     }
-    int result = gw_listener_prepare(&listener, wish, memory);
+    int result = sock_listener_prepare(&listener, wanted, memory);
     if (result == 0) {
         *out_error = write_error(listener.folder.fd);
         rewind(memory); // A warning about the directory stays if there is nothing worse.
-        result = gw_listener_judge(&listener, memory);
+        result = sock_listener_judge(&listener, memory);
     }
     (void)fclose(memory);
-    gw_folder_close(&listener.folder);
+    sock_folder_close(&listener.folder);
     return result;
 }
 
 /// Without the socket of those who may drive there is no start; without that of those who watch there is.
-static void judge_socket(const gw_listener_wish_t *wish, inspect_findings_t *findings) {
-    const inspect_verdict_t trouble = (wish->right == GW_DRIVE) ? INSPECT_FAIL : INSPECT_WARN;
+static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_t *findings) {
+    const inspect_verdict_t trouble = (wanted->right == SOCK_DRIVE) ? INSPECT_FAIL : INSPECT_WARN;
     char path[GATEWAY_PATH_SIZE];
     char text[INSPECT_TEXT_SIZE] = "";
     int error = 0;
-    gw_folder_of(wish->path, path, sizeof path);
+    sock_folder_of(wanted->path, path, sizeof path);
     const bool new = is_to_be_made(path, &error);
-    const int result = (new || error != 0) ? 0 : judge_place(wish, text, sizeof text, &error);
+    const int result = (new || error != 0) ? 0 : judge_place(wanted, text, sizeof text, &error);
     if (result != 0) {
         say_printed(text, trouble, findings);
     } else if (error != 0) {
-        inspect_say(findings, "socket", trouble, "socket %s: directory %s: %s", wish->path, path, strerror(error));
-        cure_directory(path, (wish->right == GW_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
+        inspect_say(findings, "socket", trouble, "socket %s: directory %s: %s", wanted->path, path, strerror(error));
+        cure_directory(path, (wanted->right == SOCK_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
                        findings);
     } else if (text[0] != '\0') {
         say_printed(text, INSPECT_WARN, findings);
@@ -166,7 +166,7 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
         inspect_say(findings, "record", INSPECT_OK, "record: directory %s will be made", path);
         return;
     }
-    const int directory = (error == 0) ? gw_folder_open_own(path) : -1;
+    const int directory = (error == 0) ? sock_folder_open_own(path) : -1;
     if (error == 0) {
         error = (directory < 0) ? errno : write_error(directory);
     }
@@ -179,7 +179,7 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
     }
     inspect_say(findings, "record", INSPECT_WARN,
                 "record: directory %s: %s: it starts, stops are not recorded, no assumption is stored", path,
-                gw_folder_fault(error));
+                sock_folder_fault(error));
     cure_directory(path, "[record] directory", error, findings);
 }
 
@@ -213,8 +213,8 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
 }
 
 static void judge_files(const gateway_config_t *config, inspect_findings_t *findings) {
-    const gw_listener_wish_t drive = gw_report_socket(config, GW_DRIVE);
-    const gw_listener_wish_t watch = gw_report_socket(config, GW_WATCH);
+    const sock_listener_config_t drive = gw_report_socket(config, SOCK_DRIVE);
+    const sock_listener_config_t watch = gw_report_socket(config, SOCK_WATCH);
     judge_socket(&drive, findings);
     if (strcmp(watch.path, "none") != 0) {
         judge_socket(&watch, findings);
@@ -225,25 +225,25 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
 
 /// The bus and the e-stop, as far as they can be opened.
 static void judge_machine(const gateway_config_t *config, inspect_findings_t *findings) {
-    static iw_linux_hal_t hal;
+    static iwl_hal_t hal;
     inspect_heard_t heard;
-    const iw_estop_wish_t line = gw_report_estop(config);
-    const inspect_wish_t wish = gw_report_wish(config);
+    const iwl_estop_config_t line = gw_report_estop(config);
+    const inspect_config_t wanted = gw_report_config(config);
     const inspect_opened_t opened = inspect_open(&hal, config->bus.interface, &line, findings);
     if (!opened.hal) {
         return;
     }
     inspect_listen(&hal, LISTEN_US, &heard);
     if (opened.bus) {
-        inspect_link(iw_linux_hal_link(&hal), &wish, findings);
-        inspect_room(iw_linux_hal_link(&hal), findings);
-        inspect_bus(iw_linux_hal_link(&hal), &heard, &wish, findings);
+        inspect_link(iwl_hal_link(&hal), &wanted, findings);
+        inspect_room(iwl_hal_link(&hal), findings);
+        inspect_bus(iwl_hal_link(&hal), &heard, &wanted, findings);
     }
     if (opened.estop) {
         const inspect_estop_t estop = inspect_estop_of(&hal, config->estop.line);
         inspect_estop(&estop, findings);
     }
-    iw_linux_hal_close(&hal);
+    iwl_hal_close(&hal);
 }
 
 int gw_report_check(const gateway_config_t *config, FILE *out) {

@@ -82,7 +82,7 @@ static bool take_option(int option, gw_options_t *options) {
 }
 
 int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FILE *err) {
-    gw_options_t options = {.log_level = GW_LOG_INFO};
+    gw_options_t options = {.log_level = SOCK_LOG_INFO};
     char what[256];
     int option;
     opterr = 0;
@@ -92,7 +92,7 @@ int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FIL
             return EX_USAGE;
         }
         if (option == OPTION_LOG) {
-            if (!gw_log_level_of(optarg, &options.log_level)) {
+            if (!sock_log_level_of(optarg, &options.log_level)) {
                 return misuse(err, "--log-level must be error, warning, info or debug");
             }
         } else if (!take_option(option, &options)) {

@@ -16,7 +16,7 @@ typedef struct {
     const char *socket;
     const char *watch_socket;
     const char *estop;
-    gw_log_level_t log_level;
+    sock_log_level_t log_level;
     bool listen_only;
 } gw_options_t;
 

@@ -8,19 +8,19 @@
 #include "inspect.h"
 
 struct gateway_config;
-struct gw_log;
+struct sock_log;
 
 /// Version, bus, e-stop, stop budget, what is not configured: to the log. `simulated`: the e-stop is; `watched`: there is a socket to
 /// watch by.
-void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct gw_log *log);
+void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct sock_log *log);
 
 /// What the bus, the e-stop and a socket are to be, by the configuration.
-inspect_wish_t gw_report_wish(const struct gateway_config *config);
-iw_estop_wish_t gw_report_estop(const struct gateway_config *config);
-gw_listener_wish_t gw_report_socket(const struct gateway_config *config, gw_right_t right);
+inspect_config_t gw_report_config(const struct gateway_config *config);
+iwl_estop_config_t gw_report_estop(const struct gateway_config *config);
+sock_listener_config_t gw_report_socket(const struct gateway_config *config, sock_right_t right);
 
 /// A bus or e-stop that cannot be opened: cause and cure.
-void gw_report_unopened(const struct gateway_config *config, const char *culprit, int error, FILE *err);
+void gw_report_unopened(const struct gateway_config *config, const char *cause, int error, FILE *err);
 
 /// Lines "ok", "warn", "fail" or "skip" on `out`, each with what mends it; listens to the bus for half a second, sends and makes
 /// nothing. 1 if something failed; else EX_UNAVAILABLE if something could not be looked at on this machine; else 0, also if

@@ -43,8 +43,8 @@ void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json) {
 
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted) {
     gw_tape_init(&self->tape, ring);
-    iw_motion_evidence_init(&self->evidence);
-    const iw_hal_t port = iw_linux_hal(&self->hal);
+    iw_observation_init(&self->observation);
+    const iw_hal_t port = iwl_hal(&self->hal);
     const iw_hal_t hal = gw_tape_hal(&self->tape, &port);
     const iw_config_fault_t fault = iw_gateway_init(&self->core, config, &hal, self->now_us, restarted);
     if (fault == IW_CONFIG_OK) {
@@ -69,7 +69,7 @@ void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us) {
 
 void gw_wheels_time_request(gw_wheels_t *self) {
     if (self->time_used) {
-        gw_wheels_time(self, iw_clock_now_us());
+        gw_wheels_time(self, iwl_clock_now_us());
     }
     self->time_used = true;
 }
@@ -114,15 +114,16 @@ void gw_wheels_leave(gw_wheels_t *self, iw_client_t client) {
     self->requested = true;
 }
 
-static void note_assumption(gw_wheels_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
-    gw_wheels_note(
-        self, (uint32_t)entry->evidence,
-        &(blackbox_entry_t){
-            .kind = BLACKBOX_LEDGER, .a = (uint8_t)item, .b = (uint8_t)entry->state, .as = {.value = entry->figure}});
+static void note_assumption(gw_wheels_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry) {
+    gw_wheels_note(self, (uint32_t)entry->source,
+                   &(blackbox_entry_t){.kind = BLACKBOX_ASSUMPTION,
+                                       .a = (uint8_t)item,
+                                       .b = (uint8_t)entry->state,
+                                       .as = {.value = entry->figure}});
 }
 
-void gw_wheels_know(gw_wheels_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
-    iw_gateway_know(&self->core, item, entry);
+void gw_wheels_set_assumption(gw_wheels_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry) {
+    iw_gateway_set_assumption(&self->core, item, entry);
     note_assumption(self, item, &gw_wheels_look(self).assumed[item]);
 }
 
@@ -154,7 +155,7 @@ void gw_wheels_note_again(gw_wheels_t *self) {
     if (gw_tape_again(&self->tape, self->now_us)) {
         const iw_snapshot_t seen = gw_wheels_look(self);
         gw_wheels_note_state(self, &seen, seen.state);
-        if (seen.doubt != IW_LEDGER_ITEMS) {
+        if (seen.doubt != IW_ASSUMPTION_ITEMS) {
             note_assumption(self, seen.doubt, &seen.assumed[seen.doubt]);
         }
     }

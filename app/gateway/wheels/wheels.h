@@ -11,8 +11,8 @@
 
 #include "inspect.h"
 
-#include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
+#include "iwheel/observation.h"
 #include "iwheel_linux/linux_hal.h"
 #include "iwheel_northbound/json_out.h"
 
@@ -46,11 +46,11 @@ void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json);
 
 typedef struct gw_wheels {
     iw_gateway_t core;
-    iw_linux_hal_t hal;
+    iwl_hal_t hal;
     gw_tape_t tape;
-    iw_motion_evidence_t evidence;
+    iw_observation_t observation;
     gw_gaps_t gaps;
-    inspect_wish_t bus;   ///< As configured.
+    inspect_config_t bus; ///< As configured.
     const char *estop;    ///< The line, as configured.
     const char *estop2;   ///< That of its second contact.
     iw_time_us_t now_us;  ///< Of the present cycle; never goes back.
@@ -97,7 +97,7 @@ void gw_wheels_stop(gw_wheels_t *self, iw_client_t client, iw_cause_t cause);
 void gw_wheels_leave(gw_wheels_t *self, iw_client_t client);
 
 /// The core is told of an assumption: it may refuse to arm for it.
-void gw_wheels_know(gw_wheels_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
+void gw_wheels_set_assumption(gw_wheels_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry);
 
 /// Notes what has gone into the core at `now_us`. `number` is that of the client, if one has asked for it.
 void gw_wheels_note(gw_wheels_t *self, uint32_t number, const blackbox_entry_t *entry);

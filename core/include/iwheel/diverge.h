@@ -43,7 +43,7 @@ typedef struct {
     const iw_config_t *config;       ///< The owner's.
     uint8_t side;                    ///< An iw_side_t: whose speed differs more. Of the last step that compared.
     int32_t applied_mm_s[IW_SIDES];  ///< For the next step, written by the owner.
-    int32_t measured_mm_s[IW_SIDES]; ///< The same, by `iw_diverge_hear`.
+    int32_t measured_mm_s[IW_SIDES]; ///< The same, by `iw_diverge_receive`.
     int32_t um_s_per_rpm;            ///< Speed in um/s at 1 rpm of telemetry, a step of it.
     int32_t expected_um_s[IW_SIDES]; ///< Where each wheel should be by now.
     int32_t path_um;                 ///< Right minus left: how far the pair has left its path, leaking.
@@ -63,7 +63,7 @@ void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us);
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us);
 
 /// How fast a wheel turns, in the machine's frame.
-void iw_diverge_hear(iw_diverge_t *self, size_t side, int32_t measured_mm_s);
+void iw_diverge_receive(iw_diverge_t *self, size_t side, int32_t measured_mm_s);
 
 /// Compares what is applied and measured since the last step.
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us);

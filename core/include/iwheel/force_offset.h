@@ -48,9 +48,9 @@
 #define IW_FORCE_OFFSET_MAX_mN 3276800
 /// Unit evidence needs a wheel offset of at least this. A smaller one only becomes IW_UNIT_UNCLEAR, if our own mean is
 /// further from it than IW_FORCE_LOADED_mN.
-#define IW_FORCE_EVIDENCE_MIN_dN 20
+#define IW_FORCE_OBSERVED_MIN_dN 20
 /// ... and a mean within this share of the ratio's prediction.
-#define IW_FORCE_EVIDENCE_PERCENT 15
+#define IW_FORCE_OBSERVED_PERCENT 15
 #define IW_FORCE_REMOVED_PERCENT  30 ///< For a removed offset: a mean below this share of the offset.
 /// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
 #define IW_FORCE_STALE_US 250000U
@@ -82,7 +82,7 @@ typedef enum {
     IW_UNIT_DN,
     IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at rest although the offset is not.
     IW_UNIT_UNCLEAR,        ///< None of these: somebody pressed during one of the two measurements.
-} iw_unit_evidence_t;
+} iw_unit_observation_t;
 
 /// What a tare came to.
 typedef enum {
@@ -97,7 +97,7 @@ typedef enum {
 /// Whether the net force means anything.
 typedef enum {
     IW_FORCE_VALID = 0,
-    IW_FORCE_NOT_HEARD,
+    IW_FORCE_NO_TELEMETRY,
     IW_FORCE_SATURATED, ///< Raw is -32768 or 32767.
     IW_FORCE_NO_OFFSET,
     IW_FORCE_UNIT_CONTRADICTED,
@@ -124,12 +124,12 @@ typedef struct {
     bool boot_seen;                          ///< The start of this run was observed.
     iw_force_unit_t unit;                    ///< Of `raw`.
     iw_offset_provenance_t provenance;       ///< Of the offset in force.
-    iw_unit_evidence_t evidence;             ///< Of the unit.
+    iw_unit_observation_t observation;       ///< Of the unit.
     iw_force_quality_t quality;              ///< Of the start-up window.
     iw_time_us_t raw_us;                     ///< When `raw` came; IW_NEVER: not yet.
     iw_time_us_t offset_us;                  ///< When that offset was taken; IW_NEVER: none, or by an earlier run.
     int32_t offset_mN;                       ///< The offset in force; 0 with IW_OFFSET_NONE.
-    int32_t evidence_permille;               ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
+    int32_t observed_permille;               ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
     int16_t wheel_offset_dN;                 ///< The wheel's own, as sent.
     int16_t raw;                             ///< The last one, as on the bus.
     int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
@@ -148,10 +148,10 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen);
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
 /// Takes a force frame. `still`: the wheel is at rest.
-void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still);
+void iw_force_receive(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still);
 
 /// Takes an offset frame.
-void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN);
+void iw_force_receive_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN);
 
 /// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED
 /// is not judged where the offset in force is itself in doubt.

@@ -20,8 +20,8 @@
 #include "iwheel/diverge.h"
 #include "iwheel/force_offset.h"
 #include "iwheel/hal.h"
+#include "iwheel/private/assumption_store.h"
 #include "iwheel/private/follow.h"
-#include "iwheel/private/ledger.h"
 #include "iwheel/private/permit.h"
 #include "iwheel/private/rolling.h"
 #include "iwheel/private/setpoint.h"
@@ -70,26 +70,26 @@ typedef struct iw_gateway {
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;
-    uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
-    iw_counters_t counters;          ///< Since init.
-    iw_config_t config;              ///< Copied at init.
-    iw_hal_t hal;                    ///< Copied at init.
-    iw_time_us_t now_us;             ///< Of the present step.
-    iw_time_us_t promised_us;        ///< When the last step asked to be called again.
-    iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
-    iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
-    iw_time_us_t pose_us;            ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t purged_us;          ///< When a purge was last tried in this silence; IW_NEVER: not yet.
-    iw_setpoint_t setpoint;          ///< Which pair is due.
-    iw_permit_t permit;              ///< Whether the wheels may move.
-    iw_sender_t sender;              ///< How a pair gets to the bus.
-    iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
-    iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
-    iw_diverge_t diverge;            ///< Whether both together do.
-    iw_rolling_t rolling;            ///< Whether they turn without a command.
-    iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
-    iw_force_t force[IW_SIDES];      ///< Its normal force.
-    iw_ledger_t ledger;              ///< What is assumed of the wheels.
+    uint32_t purged_stop;              ///< Number of the stop in whose zeros a purge was tried.
+    iw_counters_t counters;            ///< Since init.
+    iw_config_t config;                ///< Copied at init.
+    iw_hal_t hal;                      ///< Copied at init.
+    iw_time_us_t now_us;               ///< Of the present step.
+    iw_time_us_t promised_us;          ///< When the last step asked to be called again.
+    iw_time_us_t suspended_us;         ///< Reported by `iw_gateway_suspended` since the last step.
+    iw_time_us_t stalled_since_us;     ///< When the first of an unbroken run of stalled steps was due.
+    iw_time_us_t pose_us;              ///< When the last pose came; IW_NEVER: none.
+    iw_time_us_t purged_us;            ///< When a purge was last tried in this silence; IW_NEVER: not yet.
+    iw_setpoint_t setpoint;            ///< Which pair is due.
+    iw_permit_t permit;                ///< Whether the wheels may move.
+    iw_sender_t sender;                ///< How a pair gets to the bus.
+    iw_wheel_t wheel[IW_SIDES];        ///< What is known of each wheel.
+    iw_follow_t follow[IW_SIDES];      ///< Whether it does as told.
+    iw_diverge_t diverge;              ///< Whether both together do.
+    iw_rolling_t rolling;              ///< Whether they turn without a command.
+    iw_codec_wheel_t told[IW_SIDES];   ///< Each wheel's last telemetry, message by message.
+    iw_force_t force[IW_SIDES];        ///< Its normal force.
+    iw_assumption_store_t assumptions; ///< What is assumed of the wheels.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:
@@ -144,8 +144,8 @@ iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides
 void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_provenance_t provenance,
                                int32_t offset_mN);
 
-/// Enters what is known of an assumption from elsewhere: the operator's word, what an earlier run found, or evidence.h.
-/// What the bus shows directly the core enters itself. An entry that is only ASSUMED changes nothing.
-void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
+/// Enters what is known of an assumption from elsewhere: the operator's word, what an earlier run found, or
+/// observation.h. What the bus shows directly the core enters itself. An entry that is only ASSUMED changes nothing.
+void iw_gateway_set_assumption(iw_gateway_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry);
 
 #endif

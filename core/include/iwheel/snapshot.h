@@ -52,19 +52,19 @@ typedef struct {
 
 /// What can be known of a gateway at one time.
 typedef struct {
-    iw_time_us_t at_us;                  ///< The `now_us` of the call.
-    const iw_config_t *config;           ///< The one in force.
-    const iw_counters_t *counters;       ///< Since init.
-    const iw_sent_t *sent;               ///< Since init.
-    const iw_stop_t *stop;               ///< The last one; `number` is 0 if there was none.
-    const iw_ledger_entry_t *assumed;    ///< What is assumed of the wheels, by iw_ledger_item_t.
-    const iw_time_us_t *seen_us;         ///< When each iw_cause_t was last seen; IW_NEVER: never.
-    iw_snapshot_wheel_t wheel[IW_SIDES]; ///< By iw_side_t.
-    uint32_t stopped;                    ///< Frames that the envelope stopped. Nonzero means an error of ours.
-    uint32_t stray_echoes;               ///< Echoes that no unconfirmed setpoint matched.
-    iw_time_us_t pose_us;                ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t armed_us;               ///< When ARMED began or the lease was taken over.
-    iw_time_us_t lease_until_us;         ///< In ARMED: without another drive command the lease ends here.
+    iw_time_us_t at_us;                   ///< The `now_us` of the call.
+    const iw_config_t *config;            ///< The one in force.
+    const iw_counters_t *counters;        ///< Since init.
+    const iw_sent_t *sent;                ///< Since init.
+    const iw_stop_t *stop;                ///< The last one; `number` is 0 if there was none.
+    const iw_assumption_entry_t *assumed; ///< What is assumed of the wheels, by iw_assumption_item_t.
+    const iw_time_us_t *seen_us;          ///< When each iw_cause_t was last seen; IW_NEVER: never.
+    iw_snapshot_wheel_t wheel[IW_SIDES];  ///< By iw_side_t.
+    uint32_t stopped;                     ///< Frames that the envelope stopped. Nonzero means an error of ours.
+    uint32_t stray_echoes;                ///< Echoes that no unconfirmed setpoint matched.
+    iw_time_us_t pose_us;                 ///< When the last pose came; IW_NEVER: none.
+    iw_time_us_t armed_us;                ///< When ARMED began or the lease was taken over.
+    iw_time_us_t lease_until_us;          ///< In ARMED: without another drive command the lease ends here.
     iw_time_us_t stale_us;   ///< The last nonzero drive command of anybody, accepted or not; IW_NEVER: none.
     iw_time_us_t waiting_us; ///< Since when a setpoint waits for its TX confirmation; IW_NEVER: none does.
     /// Of each wheel's last confirmed setpoint: when the older of the two was sent; 0: not both wheels have one yet.
@@ -83,11 +83,12 @@ typedef struct {
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
     iw_demand_t demand;       ///< What the scheduler aims at since the last step.
     iw_bus_state_t bus;       ///< As the port reported it last.
-    iw_ledger_item_t doubt;   ///< The first contradicted assumption that keeps the wheels still; IW_LEDGER_ITEMS: none.
-    bool arming;              ///< An arm that was granted waits for its TX confirmation.
-    bool output_zero;         ///< The pair last sent was zero, or a stop without ramp has made the next one so.
-    bool echo_proven;         ///< See `iw_bus_facts_t`.
-    bool holding;             ///< Zeros are held without limit of time, in STOPPING or LATCHED: until release or arm.
+    iw_assumption_item_t
+        doubt;          ///< The first contradicted assumption that keeps the wheels still; IW_ASSUMPTION_ITEMS: none.
+    bool arming;        ///< An arm that was granted waits for its TX confirmation.
+    bool output_zero;   ///< The pair last sent was zero, or a stop without ramp has made the next one so.
+    bool echo_proven;   ///< See `iw_bus_facts_t`.
+    bool holding;       ///< Zeros are held without limit of time, in STOPPING or LATCHED: until release or arm.
     bool zeros_ending;  ///< A wheel still moves after a stop, and in 5 s at the latest nothing is sent to it any more.
     bool rolling;       ///< A wheel turns faster than 100 mm/s and nothing is sent to it.
     bool rolling_fault; ///< That began within 10 s after the last setpoint: the machine rolls away.

@@ -157,42 +157,42 @@ typedef struct {
 
 /// What the document leaves open, and is therefore assumed until it is found out.
 typedef enum {
-    IW_LEDGER_SETPOINT_TYPE,      ///< Byte 0 of a setpoint.
-    IW_LEDGER_CURRENT_ROLE,       ///< Limit or setpoint.
-    IW_LEDGER_FORCE_UNIT_LEFT,    ///< cN, as documented.
-    IW_LEDGER_FORCE_UNIT_RIGHT,   ///< dN, as documented.
-    IW_LEDGER_OFFSET_INCLUDED,    ///< The raw force still contains the offset, as documented.
-    IW_LEDGER_FEEDBACK_SIGN_LEFT, ///< A positive command is measured as a positive speed.
-    IW_LEDGER_FEEDBACK_SIGN_RIGHT,
-    IW_LEDGER_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
-    IW_LEDGER_MOUNT_SIGN_RIGHT,
-    IW_LEDGER_WHEEL_RADIUS,    ///< "Approximately 192 mm".
-    IW_LEDGER_TRACK,           ///< Distance between the wheels. It turns a twist into wheel speeds, and bounds yaw.
-    IW_LEDGER_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of them the rpm count.
-    IW_LEDGER_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
-    IW_LEDGER_DLC,             ///< Frames are as long as the table: the document does not state it.
-    IW_LEDGER_ITEMS,
-} iw_ledger_item_t;
+    IW_ASSUMPTION_SETPOINT_TYPE,      ///< Byte 0 of a setpoint.
+    IW_ASSUMPTION_CURRENT_ROLE,       ///< Limit or setpoint.
+    IW_ASSUMPTION_FORCE_UNIT_LEFT,    ///< cN, as documented.
+    IW_ASSUMPTION_FORCE_UNIT_RIGHT,   ///< dN, as documented.
+    IW_ASSUMPTION_OFFSET_INCLUDED,    ///< The raw force still contains the offset, as documented.
+    IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, ///< A positive command is measured as a positive speed.
+    IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
+    IW_ASSUMPTION_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
+    IW_ASSUMPTION_MOUNT_SIGN_RIGHT,
+    IW_ASSUMPTION_WHEEL_RADIUS,    ///< "Approximately 192 mm".
+    IW_ASSUMPTION_TRACK,           ///< Distance between the wheels. It turns a twist into wheel speeds, and bounds yaw.
+    IW_ASSUMPTION_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of them the rpm count.
+    IW_ASSUMPTION_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
+    IW_ASSUMPTION_DLC,             ///< Frames are as long as the table: the document does not state it.
+    IW_ASSUMPTION_ITEMS,
+} iw_assumption_item_t;
 
 /// What has become of an assumption.
-typedef enum { IW_LEDGER_ASSUMED = 0, IW_LEDGER_CONFIRMED, IW_LEDGER_CONTRADICTED } iw_ledger_state_t;
+typedef enum { IW_ASSUMED = 0, IW_CONFIRMED, IW_CONTRADICTED } iw_assumption_state_t;
 
 /// Where it is known from.
 typedef enum {
-    IW_EVIDENCE_NONE = 0,      ///< Nothing: not configured and not documented.
-    IW_EVIDENCE_DOCUMENT,      ///< The document says so.
-    IW_EVIDENCE_CONFIGURATION, ///< The operator configured it, nothing confirmed it.
-    IW_EVIDENCE_BUS,           ///< Measured; `figure` tells what.
-    IW_EVIDENCE_OPERATOR,      ///< The operator looked at the machine.
-} iw_evidence_t;
+    IW_SOURCE_NONE = 0,      ///< Nothing: not configured and not documented.
+    IW_SOURCE_DOCUMENT,      ///< The document says so.
+    IW_SOURCE_CONFIGURATION, ///< The operator configured it, nothing confirmed it.
+    IW_SOURCE_BUS,           ///< Measured; `figure` tells what.
+    IW_SOURCE_OPERATOR,      ///< The operator looked at the machine.
+} iw_source_t;
 
 /// What is known of an assumption.
 typedef struct {
-    iw_ledger_state_t state; ///< Assumed, confirmed or contradicted.
-    iw_evidence_t evidence;  ///< What that rests on.
-    int32_t figure; ///< Of IW_EVIDENCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
+    iw_assumption_state_t state; ///< Assumed, confirmed or contradicted.
+    iw_source_t source;          ///< What that rests on.
+    int32_t figure; ///< Of IW_SOURCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
         ///< positive command; DLC: the length received; setpoint type: 1000 x measured / applied speed; gear
         ///< ratio: 1000 x ticks moved / expected; pose: 1000 x way read byte-swapped / way as it is read.
-} iw_ledger_entry_t;
+} iw_assumption_entry_t;
 
 #endif

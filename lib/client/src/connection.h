@@ -67,10 +67,10 @@ void iwc_end(iwc_t *self, iwc_result_t result);
 /// Keeps name and words of a refusal.
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
 
-/// Sends a request that stops through a connection of its own, by one socket of the gateway or the other: stop.c.
+/// Sends a request that stops through a connection of its own, by one socket of the gateway or the other: client_stop.c.
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);
 
-// ---- the lines in the buffer: queue.c -----------------------------------------------------------------------------
+// ---- the lines in the buffer: client_queue.c -----------------------------------------------------------------------------
 
 /// Looks at what came since the last time. False: a line is no message, or too long; the good ones before it are kept.
 bool iwc_queue_admit(iwc_t *self);

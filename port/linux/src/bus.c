@@ -19,123 +19,123 @@
 /// The wheels' bit rate, where the kernel reports none.
 #define BITRATE_ASSUMED_HZ 1000000U
 
-static iw_bus_t *bus_of(iw_backend_store_t *store) {
-    return (iw_bus_t *)(void *)store;
+static iwl_bus_t *bus_of(iwl_backend_store_t *store) {
+    return (iwl_bus_t *)(void *)store;
 }
 
-static const iw_bus_t *seen(const iw_backend_store_t *store) {
-    return (const iw_bus_t *)(const void *)store;
+static const iwl_bus_t *seen(const iwl_backend_store_t *store) {
+    return (const iwl_bus_t *)(const void *)store;
 }
 
 /// The name alone decides. A name too long for an interface is refused here: cut off, it could name another one.
-static const iw_bus_kind_t *kind_of(const char *name) {
-    if (iw_unix_link_is_name(name)) {
-        return &iw_local_bus_kind;
+static const iwl_bus_kind_t *kind_of(const char *name) {
+    if (iwl_unix_link_is_name(name)) {
+        return &iwl_local_bus_kind;
     }
-    return (name[0] != '\0' && strlen(name) < IFNAMSIZ) ? iw_socketcan_kind : NULL;
+    return (name[0] != '\0' && strlen(name) < IFNAMSIZ) ? iwl_socketcan_kind : NULL;
 }
 
-int iw_bus_open(iw_backend_store_t *store, const char *name) {
-    iw_bus_t *bus = bus_of(store);
+int iwl_bus_open(iwl_backend_store_t *store, const char *name) {
+    iwl_bus_t *bus = bus_of(store);
     memset(store, 0, sizeof *store);
     bus->kind = kind_of(name);
     bus->present = IW_BUS_ACTIVE;
-    bus->unheeded = IW_BUS_ACTIVE;
+    bus->unhandled = IW_BUS_ACTIVE;
     bus->errors_left = ERROR_BATCHES_PER_STEP;
     bus->watch_fd = -1;
-    iw_socketcan_socket_init(&bus->ours);
-    iw_socketcan_socket_init(&bus->others);
+    iwl_socketcan_socket_init(&bus->ours);
+    iwl_socketcan_socket_init(&bus->others);
     return (bus->kind == NULL) ? ENOTSUP : bus->kind->open(bus, name);
 }
 
-void iw_bus_close(iw_backend_store_t *store) {
+void iwl_bus_close(iwl_backend_store_t *store) {
     bus_of(store)->kind->close(bus_of(store));
 }
 
-int iw_bus_fd(const iw_backend_store_t *store) {
+int iwl_bus_fd(const iwl_backend_store_t *store) {
     return seen(store)->watch_fd;
 }
 
-void iw_bus_waited(iw_backend_store_t *store, bool told) {
+void iwl_bus_waited(iwl_backend_store_t *store, bool told) {
     bus_of(store)->quiet = !told;
 }
 
-iw_time_us_t iw_bus_next_us(const iw_backend_store_t *store) {
+iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *store) {
     return seen(store)->look_us;
 }
 
-const iw_bus_link_t *iw_bus_link(const iw_backend_store_t *store) {
+const iwl_bus_link_t *iwl_bus_link(const iwl_backend_store_t *store) {
     return &seen(store)->link;
 }
 
-int iw_bus_purge(iw_backend_store_t *store) {
+int iwl_bus_purge(iwl_backend_store_t *store) {
     return bus_of(store)->kind->purge(bus_of(store));
 }
 
-void iw_bus_tend(iw_backend_store_t *store, iw_time_us_t now_us) {
-    iw_bus_t *bus = bus_of(store);
+void iwl_bus_poll(iwl_backend_store_t *store, iw_time_us_t now_us) {
+    iwl_bus_t *bus = bus_of(store);
     bus->now_us = now_us;
     bus->errors_left = ERROR_BATCHES_PER_STEP;
     if (now_us >= bus->others_us) {
         bus->others_us = now_us + OTHERS_EVERY_US;
         bus->others_left = OTHERS_AT_ONCE;
     }
-    bus->kind->tend(bus);
+    bus->kind->poll(bus);
 }
 
-void iw_bus_lose(iw_bus_t *bus, int error) {
+void iwl_bus_lose(iwl_bus_t *bus, int error) {
     bus->up = false;
-    bus->unheeded = IW_BUS_DOWN;
+    bus->unhandled = IW_BUS_DOWN;
     bus->look_us = bus->now_us;
-    iw_socketcan_socket_forget(&bus->ours);
-    iw_socketcan_socket_forget(&bus->others);
+    iwl_socketcan_socket_forget(&bus->ours);
+    iwl_socketcan_socket_forget(&bus->others);
     bus->kind->lost(bus, error);
 }
 
 /// It is looked at again while bus-off: with a forged or a lost error frame nothing else would end it.
-void iw_bus_note(iw_bus_t *bus, iw_bus_state_t state) {
+void iwl_bus_note(iwl_bus_t *bus, iw_bus_state_t state) {
     bus->present = state;
     if (state < IW_BUS_PASSIVE) {
-        bus->unheeded = state;
+        bus->unhandled = state;
     }
-    bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IW_BUS_RETRY_US : IW_NEVER;
+    bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IWL_BUS_RETRY_US : IW_NEVER;
 }
 
 /// `forged`: sent by a process of this machine, which any user may do (fault 19). A bus-off stops the wheels all the
 /// same; an end of bus-off is then not believed, and the carrier shows how long it really lasts.
-static void hear_error(iw_bus_t *bus, iw_can_error_t error, bool forged) {
-    if (error == IW_CAN_ERROR_BUS_OFF) {
-        bus->unheeded = IW_BUS_OFF;
+static void hear_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
+    if (error == IWL_CAN_ERROR_BUS_OFF) {
+        bus->unhandled = IW_BUS_OFF;
         if (!forged) {
             bus->present = IW_BUS_OFF;
         }
-        bus->look_us = bus->now_us + (forged ? 0U : IW_BUS_RETRY_US);
+        bus->look_us = bus->now_us + (forged ? 0U : IWL_BUS_RETRY_US);
     } else if (forged) {
         return;
-    } else if (error == IW_CAN_ERROR_RESTARTED) {
-        bus->unheeded = IW_BUS_OFF; // Also if that was not heard: the restart has emptied the queue.
+    } else if (error == IWL_CAN_ERROR_RESTARTED) {
+        bus->unhandled = IW_BUS_OFF; // Also if that was not heard: the restart has emptied the queue.
         bus->present = IW_BUS_ACTIVE;
-    } else if (bus->present >= IW_BUS_PASSIVE && (error == IW_CAN_ERROR_PASSIVE || error == IW_CAN_ERROR_ACTIVE)) {
-        bus->present = (error == IW_CAN_ERROR_PASSIVE) ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
+    } else if (bus->present >= IW_BUS_PASSIVE && (error == IWL_CAN_ERROR_PASSIVE || error == IWL_CAN_ERROR_ACTIVE)) {
+        bus->present = (error == IWL_CAN_ERROR_PASSIVE) ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
     }
 }
 
-void iw_bus_fill(iw_bus_t *bus) {
-    iw_socketcan_socket_t *ours = &bus->ours;
+void iwl_bus_fill(iwl_bus_t *bus) {
+    iwl_socketcan_socket_t *ours = &bus->ours;
     const uint32_t lost = ours->lost;
     uint32_t errors = 0;
-    const int error = iw_socketcan_socket_fill(ours);
+    const int error = iwl_socketcan_socket_fill(ours);
     if (error != 0) {
-        iw_bus_lose(bus, error);
+        iwl_bus_lose(bus, error);
         return;
     }
     for (uint32_t i = 0; i < ours->count; i++) {
         const struct can_frame *raw = &ours->frame[i];
         if ((raw->can_id & CAN_ERR_FLAG) != 0U) {
-            hear_error(bus, iw_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
+            hear_error(bus, iwl_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
             errors++;
         } else {
-            bus->load.bits += iw_socketcan_bits(raw);
+            bus->load.bits += iwl_socketcan_bits(raw);
         }
     }
     if (errors == ours->count && errors > 0U && bus->errors_left > 0U) {
@@ -149,14 +149,14 @@ void iw_bus_fill(iw_bus_t *bus) {
 
 /// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h). Between a bus-off and the
 /// call that tells of it nothing is sent: the core takes what was sent before that call for gone.
-int iw_bus_send(iw_backend_store_t *store, const iw_can_frame_t *frames, uint32_t count) {
-    iw_bus_t *bus = bus_of(store);
-    if (bus->up && bus->unheeded < IW_BUS_PASSIVE) {
+int iwl_bus_send(iwl_backend_store_t *store, const iw_can_frame_t *frames, uint32_t count) {
+    iwl_bus_t *bus = bus_of(store);
+    if (bus->up && bus->unhandled < IW_BUS_PASSIVE) {
         return 0;
     }
-    const int result = bus->up ? iw_socketcan_socket_send(&bus->ours, frames, count) : -1;
+    const int result = bus->up ? iwl_socketcan_socket_send(&bus->ours, frames, count) : -1;
     if (result < 0 && bus->up) {
-        iw_bus_lose(bus, ENETDOWN);
+        iwl_bus_lose(bus, ENETDOWN);
     }
     if (bus->others_us > bus->now_us + OTHERS_AFTER_SEND_US) {
         bus->others_us = bus->now_us + OTHERS_AFTER_SEND_US;
@@ -165,11 +165,11 @@ int iw_bus_send(iw_backend_store_t *store, const iw_can_frame_t *frames, uint32_
 }
 
 /// The next frame of the batch that is no error frame. False if there is none.
-static bool take(iw_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
-    while (!iw_socketcan_socket_is_empty(from)) {
+static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
+    while (!iwl_socketcan_socket_is_empty(from)) {
         const uint32_t i = from->next++;
         if ((from->frame[i].can_id & CAN_ERR_FLAG) == 0U) {
-            *out_frame = iw_socketcan_translate(&from->frame[i], from->flags[i]);
+            *out_frame = iwl_socketcan_translate(&from->frame[i], from->flags[i]);
             return true;
         }
     }
@@ -178,62 +178,62 @@ static bool take(iw_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
 
 /// `drained` ends the step's loop without one more call of the kernel; it counts once, so that the next step looks
 /// again.
-static bool take_ours(iw_bus_t *bus, iw_can_frame_t *out_frame) {
+static bool take_ours(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
     while (!take(&bus->ours, out_frame)) {
         if (!bus->up || bus->ours.drained || bus->errors_left == 0U) {
             bus->ours.drained = false;
             return false;
         }
-        iw_bus_fill(bus);
+        iwl_bus_fill(bus);
     }
     return true;
 }
 
-static bool take_others(iw_bus_t *bus, iw_can_frame_t *out_frame) {
-    iw_socketcan_socket_t *others = &bus->others;
+static bool take_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
+    iwl_socketcan_socket_t *others = &bus->others;
     if (!bus->up || others->fd < 0 || bus->others_left == 0U) {
         return false;
     }
-    if (iw_socketcan_socket_is_empty(others) && !others->drained) {
-        (void)iw_socketcan_socket_fill(others); // An error of the interface shows at the other socket too.
+    if (iwl_socketcan_socket_is_empty(others) && !others->drained) {
+        (void)iwl_socketcan_socket_fill(others); // An error of the interface shows at the other socket too.
     }
     if (!take(others, out_frame)) {
         others->drained = false;
         bus->others_left = 0;
         return false;
     }
-    bus->load.bits += iw_socketcan_bits(&others->frame[others->next - 1U]);
+    bus->load.bits += iwl_socketcan_bits(&others->frame[others->next - 1U]);
     bus->others_left--;
     return true;
 }
 
-int iw_bus_receive(iw_backend_store_t *store, iw_can_frame_t *out_frame) {
-    iw_bus_t *bus = bus_of(store);
+int iwl_bus_receive(iwl_backend_store_t *store, iw_can_frame_t *out_frame) {
+    iwl_bus_t *bus = bus_of(store);
     if (take_ours(bus, out_frame) || take_others(bus, out_frame)) {
         return 1;
     }
     return bus->up ? 0 : -1;
 }
 
-iw_bus_state_t iw_bus_state(iw_backend_store_t *store) {
-    iw_bus_t *bus = bus_of(store);
-    const iw_bus_state_t unheeded = bus->unheeded;
+iw_bus_state_t iwl_bus_state(iwl_backend_store_t *store) {
+    iwl_bus_t *bus = bus_of(store);
+    const iw_bus_state_t unhandled = bus->unhandled;
     const iw_bus_state_t now = bus->up ? bus->present : IW_BUS_DOWN;
-    bus->unheeded = IW_BUS_ACTIVE;
-    return (unheeded != IW_BUS_ACTIVE) ? unheeded : now;
+    bus->unhandled = IW_BUS_ACTIVE;
+    return (unhandled != IW_BUS_ACTIVE) ? unhandled : now;
 }
 
-void iw_bus_load_begin(iw_bus_load_t *self, iw_time_us_t now_us) {
-    *self = (iw_bus_load_t){.since_us = now_us};
+void iwl_bus_load_begin(iwl_bus_load_t *self, iw_time_us_t now_us) {
+    *self = (iwl_bus_load_t){.since_us = now_us};
 }
 
-bool iw_bus_load_take(iw_bus_load_t *self, iw_time_us_t now_us, uint32_t bitrate_hz, uint32_t *out_permille) {
+bool iwl_bus_load_take(iwl_bus_load_t *self, iw_time_us_t now_us, uint32_t bitrate_hz, uint32_t *out_permille) {
     const iw_time_us_t span_us = now_us - self->since_us;
     if (span_us < US_PER_S) {
         return false;
     }
     const uint64_t rate_hz = (bitrate_hz != 0U) ? bitrate_hz : BITRATE_ASSUMED_HZ;
     *out_permille = (uint32_t)(self->bits * US_PER_S / rate_hz * 1000U / span_us);
-    iw_bus_load_begin(self, now_us);
+    iwl_bus_load_begin(self, now_us);
     return true;
 }

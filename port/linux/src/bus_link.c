@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/bus_link.h"
 
-iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille) {
+iwl_timing_t iwl_timing_judge(const iwl_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille) {
     const uint16_t actual = link->sample_point_permille;
     const uint16_t off =
         (uint16_t)((actual > sample_point_permille) ? actual - sample_point_permille : sample_point_permille - actual);
     // The order is that of consequence: what is known to be wrong refuses arm even if the rest is not reported.
     if (link->is_virtual) {
-        return IW_TIMING_VIRTUAL;
+        return IWL_TIMING_VIRTUAL;
     }
     if (link->bitrate_hz != 0U && link->bitrate_hz != bitrate_hz) {
-        return IW_TIMING_WRONG;
+        return IWL_TIMING_WRONG;
     }
-    if (actual != 0U && off > IW_TIMING_WRONG_PERMILLE) {
-        return IW_TIMING_WRONG;
+    if (actual != 0U && off > IWL_TIMING_WRONG_PERMILLE) {
+        return IWL_TIMING_WRONG;
     }
     if (link->bitrate_hz == 0U || actual == 0U) {
-        return IW_TIMING_UNKNOWN;
+        return IWL_TIMING_UNKNOWN;
     }
-    return (off > IW_TIMING_NEAR_PERMILLE) ? IW_TIMING_NEAR : IW_TIMING_RIGHT;
+    return (off > IWL_TIMING_NEAR_PERMILLE) ? IWL_TIMING_NEAR : IWL_TIMING_RIGHT;
 }
 
-bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other) {
+bool iwl_bus_link_is_same(const iwl_bus_link_t *one, const iwl_bus_link_t *other) {
     return one->presence == other->presence && one->is_virtual == other->is_virtual &&
            one->echo_proven == other->echo_proven && one->is_mute == other->is_mute &&
            one->bitrate_hz == other->bitrate_hz && one->sample_point_permille == other->sample_point_permille &&

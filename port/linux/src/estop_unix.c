@@ -13,24 +13,24 @@
 #define FIRST_LEVEL_MS 100
 
 typedef struct {
-    iw_unix_link_t link;
+    iwl_unix_link_t link;
     bool known; ///< The button has told its level on this connection.
     bool level; ///< Pressed.
     bool edge;  ///< It changed since the last call of `pressed`.
 } unix_estop_t;
 
-IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iw_backend_store_t), unix_estop_fits);
+IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iwl_backend_store_t), unix_estop_fits);
 
 static void button_close(void *self) {
-    iw_unix_link_close(&((unix_estop_t *)self)->link);
+    iwl_unix_link_close(&((unix_estop_t *)self)->link);
 }
 
 static int button_watch_fd(const void *self) {
     return ((const unix_estop_t *)self)->link.watch_fd;
 }
 
-static void button_tend(void *self, iw_time_us_t now_us) {
-    (void)iw_unix_link_tend(&((unix_estop_t *)self)->link, now_us);
+static void button_poll(void *self, iw_time_us_t now_us) {
+    (void)iwl_unix_link_poll(&((unix_estop_t *)self)->link, now_us);
 }
 
 static iw_time_us_t button_next_us(const void *self) {
@@ -49,23 +49,23 @@ static void take_levels(unix_estop_t *button, const char *levels, size_t count) 
 /// A broken connection is noticed here and nowhere else: this look finds it unreadable, however soon it is back.
 static void listen_to(unix_estop_t *button) {
     char levels[BURST_MAX];
-    if (!iw_unix_link_is_up(&button->link)) {
+    if (!iwl_unix_link_is_up(&button->link)) {
         return;
     }
     const ssize_t count = recv(button->link.fd, levels, sizeof levels, MSG_DONTWAIT);
     if (count > 0) {
         take_levels(button, levels, (size_t)count);
     } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
-        iw_unix_link_lose(&button->link);
+        iwl_unix_link_lose(&button->link);
         button->known = false;
     }
 }
 
-static int button_open(void *self, const iw_estop_wish_t *wish) {
+static int button_open(void *self, const iwl_estop_config_t *config) {
     unix_estop_t *button = (unix_estop_t *)self;
     *button = (unix_estop_t){.level = true};
-    const int error = iw_unix_link_open(&button->link, wish->name, SOCK_STREAM);
-    if (error == 0 && iw_unix_link_is_up(&button->link)) {
+    const int error = iwl_unix_link_open(&button->link, config->name, SOCK_STREAM);
+    if (error == 0 && iwl_unix_link_is_up(&button->link)) {
         struct pollfd level = {.fd = button->link.fd, .events = POLLIN};
         (void)poll(&level, 1, FIRST_LEVEL_MS);
         listen_to(button);
@@ -87,11 +87,11 @@ static int button_trouble(const void *self) {
     return ((const unix_estop_t *)self)->known ? 0 : ENOTCONN;
 }
 
-const iw_estop_ops_t iw_unix_estop_ops = {
+const iwl_estop_ops_t iwl_unix_estop_ops = {
     .open = button_open,
     .close = button_close,
     .watch_fd = button_watch_fd,
-    .tend = button_tend,
+    .poll = button_poll,
     .next_us = button_next_us,
     .pressed = button_pressed,
     .trouble = button_trouble,

@@ -23,9 +23,9 @@ static const char *read_number(const char *text, char end, unsigned *out_number)
     return digit;
 }
 
-int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
-    iw_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
-                                              strchr(text, ':') != NULL};
+int iwl_gpio_address_parse(const char *text, iwl_gpio_address_t *out_address) {
+    iwl_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
+                                               strchr(text, ':') != NULL};
     size_t length = strlen(text);
     // Lines may be named with a colon too; only a name that also begins like a chip's is an address by offset.
     if (address.by_offset) {
@@ -47,7 +47,7 @@ int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
     return 0;
 }
 
-void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line) {
+void iwl_gpio_note(iwl_estop_seen_t *out_seen, const char *chip, const char *line) {
     const struct {
         char *to;
         const char *from;
@@ -55,28 +55,28 @@ void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line)
     memset(out_seen, 0, sizeof *out_seen);
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         const size_t length = (names[i].from != NULL) ? strlen(names[i].from) : 0U;
-        memcpy(names[i].to, (length > 0U) ? names[i].from : "", (length < IW_GPIO_NAME_SIZE) ? length : 0U);
+        memcpy(names[i].to, (length > 0U) ? names[i].from : "", (length < IWL_GPIO_NAME_SIZE) ? length : 0U);
     }
 }
 
-void iw_gpio_place(iw_estop_seen_t *out_seen, const char *node, unsigned offset) {
+void iwl_gpio_place(iwl_estop_seen_t *out_seen, const char *node, unsigned offset) {
     const size_t length = (node != NULL) ? strlen(node) : 0U;
-    memcpy(out_seen->node, (length > 0U) ? node : "", (length < IW_GPIO_NAME_SIZE) ? length : 0U);
+    memcpy(out_seen->node, (length > 0U) ? node : "", (length < IWL_GPIO_NAME_SIZE) ? length : 0U);
     out_seen->offset = offset;
 }
 
-bool iw_gpio_is_expected(const iw_gpio_address_t *address, const iw_estop_seen_t *seen) {
-    const iw_estop_seen_t *expected = &address->expected;
+bool iwl_gpio_is_expected(const iwl_gpio_address_t *address, const iwl_estop_seen_t *seen) {
+    const iwl_estop_seen_t *expected = &address->expected;
     return (expected->chip[0] == '\0' || strcmp(expected->chip, seen->chip) == 0) &&
            (expected->line[0] == '\0' || strcmp(expected->line, seen->line) == 0);
 }
 
-void iw_gpio_release_init(iw_gpio_release_t *self, uint32_t debounce_us) {
-    *self = (iw_gpio_release_t){.debounce_us = debounce_us};
+void iwl_gpio_release_init(iwl_gpio_release_t *self, uint32_t debounce_us) {
+    *self = (iwl_gpio_release_t){.debounce_us = debounce_us};
 }
 
 /// A change of level without an edge counts as one: the kernel drops edges when its buffer is full.
-void iw_gpio_release_see(iw_gpio_release_t *self, iw_time_us_t now_us, bool active, bool edge) {
+void iwl_gpio_release_see(iwl_gpio_release_t *self, iw_time_us_t now_us, bool active, bool edge) {
     const bool disturbed = active || edge || self->active;
     self->edge = self->edge || edge || active != self->active;
     self->active = active;
@@ -85,12 +85,12 @@ void iw_gpio_release_see(iw_gpio_release_t *self, iw_time_us_t now_us, bool acti
     }
 }
 
-bool iw_gpio_release_take_pressed(iw_gpio_release_t *self, iw_time_us_t now_us) {
+bool iwl_gpio_release_take_pressed(iwl_gpio_release_t *self, iw_time_us_t now_us) {
     const bool pressed = self->active || self->edge || now_us < self->released_us;
     self->edge = false;
     return pressed;
 }
 
-iw_time_us_t iw_gpio_release_next_us(const iw_gpio_release_t *self, iw_time_us_t now_us) {
+iw_time_us_t iwl_gpio_release_next_us(const iwl_gpio_release_t *self, iw_time_us_t now_us) {
     return (!self->active && now_us < self->released_us) ? self->released_us : IW_NEVER;
 }

@@ -12,10 +12,10 @@
 #define RETRY_US 200000U
 
 typedef struct {
-    iw_gpio_line_t line;
-    iw_gpio_address_t address;
-    iw_gpio_release_t release;
-    iw_time_us_t now_us;   ///< Of the last `tend`.
+    iwl_gpio_line_t line;
+    iwl_gpio_address_t address;
+    iwl_gpio_release_t release;
+    iw_time_us_t now_us;   ///< Of the last `poll`.
     iw_time_us_t retry_us; ///< IW_NEVER while open.
     uint32_t debounce_us;
     int trouble; ///< Why it is closed.
@@ -23,7 +23,7 @@ typedef struct {
     bool active_high;
 } gpio_estop_t;
 
-IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iw_backend_store_t), gpio_estop_fits);
+IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iwl_backend_store_t), gpio_estop_fits);
 
 static bool is_open(const gpio_estop_t *estop) {
     return estop->line.fd >= 0;
@@ -31,14 +31,14 @@ static bool is_open(const gpio_estop_t *estop) {
 
 /// A line that cannot be read counts as pressed (R2, fault 14).
 static void lose(gpio_estop_t *estop, int trouble) {
-    iw_gpio_line_close(&estop->line);
+    iwl_gpio_line_close(&estop->line);
     estop->trouble = trouble;
     estop->retry_us = estop->now_us + RETRY_US;
 }
 
 static void try_open(gpio_estop_t *estop) {
     struct epoll_event interest = {.events = EPOLLIN};
-    int error = iw_gpio_line_open(&estop->line, &estop->address);
+    int error = iwl_gpio_line_open(&estop->line, &estop->address);
     if (error == 0 && epoll_ctl(estop->watch_fd, EPOLL_CTL_ADD, estop->line.fd, &interest) != 0) {
         error = errno;
     }
@@ -48,13 +48,13 @@ static void try_open(gpio_estop_t *estop) {
     }
     estop->trouble = 0;
     estop->retry_us = IW_NEVER;
-    iw_gpio_release_init(&estop->release, estop->debounce_us);
+    iwl_gpio_release_init(&estop->release, estop->debounce_us);
 }
 
 /// An expectation as configured. "any": there is none.
 static int expect(char *out_name, const char *name) {
     const size_t length = (name == NULL || strcmp(name, "any") == 0) ? 0U : strlen(name);
-    if (length >= IW_GPIO_NAME_SIZE) {
+    if (length >= IWL_GPIO_NAME_SIZE) {
         return ENAMETOOLONG;
     }
     memcpy(out_name, (length > 0U) ? name : "", length + 1U);
@@ -62,17 +62,17 @@ static int expect(char *out_name, const char *name) {
 }
 
 /// Only a malformed name is an error. A line that is absent or busy is retried: until then it counts as pressed.
-static int gpio_open(void *self, const iw_estop_wish_t *wish) {
+static int gpio_open(void *self, const iwl_estop_config_t *config) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     *estop = (gpio_estop_t){.line = {.fd = -1},
-                            .debounce_us = (uint32_t)wish->debounce_ms * IW_US_PER_MS,
-                            .active_high = wish->active_high};
-    int error = iw_gpio_address_parse(wish->name, &estop->address);
+                            .debounce_us = (uint32_t)config->debounce_ms * IW_US_PER_MS,
+                            .active_high = config->active_high};
+    int error = iwl_gpio_address_parse(config->name, &estop->address);
     if (error == 0) {
-        error = expect(estop->address.expected.chip, wish->chip);
+        error = expect(estop->address.expected.chip, config->chip);
     }
     if (error == 0) {
-        error = expect(estop->address.expected.line, wish->chip_line);
+        error = expect(estop->address.expected.line, config->chip_line);
     }
     if (error != 0) {
         return error;
@@ -87,7 +87,7 @@ static int gpio_open(void *self, const iw_estop_wish_t *wish) {
 
 static void gpio_close(void *self) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
-    iw_gpio_line_close(&estop->line);
+    iwl_gpio_line_close(&estop->line);
     (void)close(estop->watch_fd);
 }
 
@@ -95,7 +95,7 @@ static int gpio_watch_fd(const void *self) {
     return ((const gpio_estop_t *)self)->watch_fd;
 }
 
-static void gpio_tend(void *self, iw_time_us_t now_us) {
+static void gpio_poll(void *self, iw_time_us_t now_us) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     estop->now_us = now_us;
     if (!is_open(estop) && now_us >= estop->retry_us) {
@@ -105,7 +105,7 @@ static void gpio_tend(void *self, iw_time_us_t now_us) {
 
 static iw_time_us_t gpio_next_us(const void *self) {
     const gpio_estop_t *estop = (const gpio_estop_t *)self;
-    return is_open(estop) ? iw_gpio_release_next_us(&estop->release, estop->now_us) : estop->retry_us;
+    return is_open(estop) ? iwl_gpio_release_next_us(&estop->release, estop->now_us) : estop->retry_us;
 }
 
 /// Edges first, then the level: an edge between the two wakes us again, the other order would lose it.
@@ -113,14 +113,14 @@ static void look(gpio_estop_t *estop, bool quiet) {
     if (!is_open(estop)) {
         return;
     }
-    const int edges = quiet ? 0 : iw_gpio_line_take_edges(&estop->line);
-    const int level = iw_gpio_line_level(&estop->line);
+    const int edges = quiet ? 0 : iwl_gpio_line_take_edges(&estop->line);
+    const int level = iwl_gpio_line_level(&estop->line);
     // A chip that was unplugged still has a descriptor; only the reads fail.
     if (edges < 0 || level < 0) {
         lose(estop, ENODEV);
         return;
     }
-    iw_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
+    iwl_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
 }
 
 /// A line is lost in such a look or before the first: it is told, however soon it is back.
@@ -130,32 +130,32 @@ static int gpio_pressed(void *self, bool quiet) {
     if (!is_open(estop)) {
         return -1;
     }
-    return iw_gpio_release_take_pressed(&estop->release, estop->now_us) ? 1 : 0;
+    return iwl_gpio_release_take_pressed(&estop->release, estop->now_us) ? 1 : 0;
 }
 
 static int gpio_trouble(const void *self) {
     return ((const gpio_estop_t *)self)->trouble;
 }
 
-static const iw_estop_seen_t *gpio_seen(const void *self) {
+static const iwl_estop_seen_t *gpio_seen(const void *self) {
     const gpio_estop_t *estop = (const gpio_estop_t *)self;
     return is_open(estop) ? &estop->line.seen : NULL;
 }
 
-int iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
-    iw_gpio_address_t address;
+int iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen) {
+    iwl_gpio_address_t address;
     if (strncmp(name, "unix:", 5U) == 0) {
         return ENOTSUP;
     }
-    const int error = iw_gpio_address_parse(name, &address);
-    return (error != 0) ? error : iw_gpio_line_see(&address, out_seen);
+    const int error = iwl_gpio_address_parse(name, &address);
+    return (error != 0) ? error : iwl_gpio_line_see(&address, out_seen);
 }
 
-static const iw_estop_ops_t ops = {
+static const iwl_estop_ops_t ops = {
     .open = gpio_open,
     .close = gpio_close,
     .watch_fd = gpio_watch_fd,
-    .tend = gpio_tend,
+    .poll = gpio_poll,
     .next_us = gpio_next_us,
     .pressed = gpio_pressed,
     .trouble = gpio_trouble,
@@ -164,4 +164,4 @@ static const iw_estop_ops_t ops = {
     .present = true,
 };
 
-const iw_estop_ops_t *const iw_gpio_estop_ops = &ops;
+const iwl_estop_ops_t *const iwl_gpio_estop_ops = &ops;

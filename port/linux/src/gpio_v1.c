@@ -52,7 +52,7 @@ static struct gpiod_line *find_by_name(const char *name) {
     return second ? NULL : found;
 }
 
-static struct gpiod_line *find(const iw_gpio_address_t *address) {
+static struct gpiod_line *find(const iwl_gpio_address_t *address) {
     if (!address->by_offset) {
         return find_by_name(address->name);
     }
@@ -66,18 +66,18 @@ static struct gpiod_line *find(const iw_gpio_address_t *address) {
 }
 
 /// The line with what it is called; NULL with an errno.
-static struct gpiod_line *find_and_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+static struct gpiod_line *find_and_see(const iwl_gpio_address_t *address, iwl_estop_seen_t *out_seen) {
     errno = ENOENT; // Unless a call below says otherwise.
     struct gpiod_line *line = find(address);
     if (line == NULL) {
         return NULL;
     }
-    iw_gpio_note(out_seen, gpiod_chip_label(gpiod_line_get_chip(line)), gpiod_line_name(line));
-    iw_gpio_place(out_seen, gpiod_chip_name(gpiod_line_get_chip(line)), gpiod_line_offset(line));
+    iwl_gpio_note(out_seen, gpiod_chip_label(gpiod_line_get_chip(line)), gpiod_line_name(line));
+    iwl_gpio_place(out_seen, gpiod_chip_name(gpiod_line_get_chip(line)), gpiod_line_offset(line));
     return line;
 }
 
-int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+int iwl_gpio_line_see(const iwl_gpio_address_t *address, iwl_estop_seen_t *out_seen) {
     struct gpiod_line *line = find_and_see(address, out_seen);
     if (line == NULL) {
         return errno;
@@ -86,15 +86,15 @@ int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen
     return 0;
 }
 
-int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
-    *self = (iw_gpio_line_t){.fd = -1};
+int iwl_gpio_line_open(iwl_gpio_line_t *self, const iwl_gpio_address_t *address) {
+    *self = (iwl_gpio_line_t){.fd = -1};
     struct gpiod_line *line = find_and_see(address, &self->seen);
     if (line == NULL) {
         return errno;
     }
     self->line = line;
-    if (!iw_gpio_is_expected(address, &self->seen)) {
-        iw_gpio_line_close(self);
+    if (!iwl_gpio_is_expected(address, &self->seen)) {
+        iwl_gpio_line_close(self);
         return EREMCHG;
     }
     if (gpiod_line_request_both_edges_events_flags(line, "iwheel-gateway e-stop",
@@ -103,27 +103,27 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     }
     if (self->fd < 0 || fcntl(self->fd, F_SETFL, O_NONBLOCK) != 0) {
         const int error = errno;
-        iw_gpio_line_close(self);
+        iwl_gpio_line_close(self);
         return error;
     }
     return 0;
 }
 
-void iw_gpio_line_close(iw_gpio_line_t *self) {
+void iwl_gpio_line_close(iwl_gpio_line_t *self) {
     if (self->line != NULL) {
         gpiod_line_close_chip((struct gpiod_line *)self->line);
     }
-    *self = (iw_gpio_line_t){.fd = -1};
+    *self = (iwl_gpio_line_t){.fd = -1};
 }
 
-int iw_gpio_line_level(const iw_gpio_line_t *self) {
+int iwl_gpio_line_level(const iwl_gpio_line_t *self) {
     return gpiod_line_get_value((struct gpiod_line *)self->line);
 }
 
-int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
+int iwl_gpio_line_take_edges(iwl_gpio_line_t *self) {
     struct gpiod_line_event events[EVENTS];
     int taken = 0;
-    while (taken < IW_GPIO_EDGES_MAX) {
+    while (taken < IWL_GPIO_EDGES_MAX) {
         const int count = gpiod_line_event_read_fd_multiple(self->fd, events, EVENTS);
         if (count < 0) {
             return (errno == EAGAIN || errno == EINTR) ? taken : -1;

@@ -78,7 +78,7 @@ static struct gpiod_chip *search(const char *name, unsigned *out_offset) {
     return found;
 }
 
-static struct gpiod_chip *find(const iw_gpio_address_t *address, unsigned *out_offset) {
+static struct gpiod_chip *find(const iwl_gpio_address_t *address, unsigned *out_offset) {
     char path[PATH_SIZE];
     if (!address->by_offset) {
         return search(address->name, out_offset);
@@ -100,33 +100,33 @@ static struct gpiod_line_request *request(struct gpiod_chip *chip, unsigned offs
     struct gpiod_line_request *line = NULL;
     struct gpiod_line_settings *settings = gpiod_line_settings_new();
     struct gpiod_line_config *lines = gpiod_line_config_new();
-    struct gpiod_request_config *wish = gpiod_request_config_new();
-    if (settings != NULL && lines != NULL && wish != NULL && configure(settings, lines, offset)) {
-        gpiod_request_config_set_consumer(wish, "iwheel-gateway e-stop");
-        gpiod_request_config_set_event_buffer_size(wish, EVENTS);
-        line = gpiod_chip_request_lines(chip, wish, lines);
+    struct gpiod_request_config *config = gpiod_request_config_new();
+    if (settings != NULL && lines != NULL && config != NULL && configure(settings, lines, offset)) {
+        gpiod_request_config_set_consumer(config, "iwheel-gateway e-stop");
+        gpiod_request_config_set_event_buffer_size(config, EVENTS);
+        line = gpiod_chip_request_lines(chip, config, lines);
     }
     const int error = errno;
-    gpiod_request_config_free(wish);
+    gpiod_request_config_free(config);
     gpiod_line_config_free(lines);
     gpiod_line_settings_free(settings);
     errno = error;
     return line;
 }
 
-static void see(struct gpiod_chip *chip, unsigned offset, iw_estop_seen_t *out_seen) {
+static void see(struct gpiod_chip *chip, unsigned offset, iwl_estop_seen_t *out_seen) {
     struct gpiod_chip_info *chip_info = gpiod_chip_get_info(chip);
     struct gpiod_line_info *info = gpiod_chip_get_line_info(chip, offset);
-    iw_gpio_note(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_label(chip_info),
-                 (info == NULL) ? NULL : gpiod_line_info_get_name(info));
-    iw_gpio_place(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_name(chip_info), offset);
+    iwl_gpio_note(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_label(chip_info),
+                  (info == NULL) ? NULL : gpiod_line_info_get_name(info));
+    iwl_gpio_place(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_name(chip_info), offset);
     gpiod_line_info_free(info);
     gpiod_chip_info_free(chip_info);
 }
 
 /// The chip with what the line is called; NULL with an errno.
-static struct gpiod_chip *find_and_see(const iw_gpio_address_t *address, unsigned *out_offset,
-                                       iw_estop_seen_t *out_seen) {
+static struct gpiod_chip *find_and_see(const iwl_gpio_address_t *address, unsigned *out_offset,
+                                       iwl_estop_seen_t *out_seen) {
     errno = ENOENT; // Unless a call below says otherwise.
     struct gpiod_chip *chip = find(address, out_offset);
     if (chip == NULL) {
@@ -136,7 +136,7 @@ static struct gpiod_chip *find_and_see(const iw_gpio_address_t *address, unsigne
     return chip;
 }
 
-int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+int iwl_gpio_line_see(const iwl_gpio_address_t *address, iwl_estop_seen_t *out_seen) {
     unsigned offset = 0;
     struct gpiod_chip *chip = find_and_see(address, &offset, out_seen);
     if (chip == NULL) {
@@ -146,15 +146,15 @@ int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen
     return 0;
 }
 
-int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+int iwl_gpio_line_open(iwl_gpio_line_t *self, const iwl_gpio_address_t *address) {
     unsigned offset = 0;
-    *self = (iw_gpio_line_t){.fd = -1};
+    *self = (iwl_gpio_line_t){.fd = -1};
     self->chip = find_and_see(address, &offset, &self->seen);
     if (self->chip == NULL) {
         return errno;
     }
-    if (!iw_gpio_is_expected(address, &self->seen)) {
-        iw_gpio_line_close(self);
+    if (!iwl_gpio_is_expected(address, &self->seen)) {
+        iwl_gpio_line_close(self);
         return EREMCHG;
     }
     errno = 0;
@@ -163,13 +163,13 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     self->fd = (self->events == NULL) ? -1 : gpiod_line_request_get_fd((struct gpiod_line_request *)self->line);
     if (self->fd < 0 || fcntl(self->fd, F_SETFL, O_NONBLOCK) != 0) {
         const int error = (errno != 0) ? errno : ENOMEM;
-        iw_gpio_line_close(self);
+        iwl_gpio_line_close(self);
         return error;
     }
     return 0;
 }
 
-void iw_gpio_line_close(iw_gpio_line_t *self) {
+void iwl_gpio_line_close(iwl_gpio_line_t *self) {
     gpiod_edge_event_buffer_free((struct gpiod_edge_event_buffer *)self->events);
     if (self->line != NULL) {
         gpiod_line_request_release((struct gpiod_line_request *)self->line);
@@ -177,10 +177,10 @@ void iw_gpio_line_close(iw_gpio_line_t *self) {
     if (self->chip != NULL) {
         gpiod_chip_close((struct gpiod_chip *)self->chip);
     }
-    *self = (iw_gpio_line_t){.fd = -1};
+    *self = (iwl_gpio_line_t){.fd = -1};
 }
 
-int iw_gpio_line_level(const iw_gpio_line_t *self) {
+int iwl_gpio_line_level(const iwl_gpio_line_t *self) {
     unsigned offset;
     struct gpiod_line_request *line = (struct gpiod_line_request *)self->line;
     if (gpiod_line_request_get_requested_offsets(line, &offset, 1) != 1U) {
@@ -190,9 +190,9 @@ int iw_gpio_line_level(const iw_gpio_line_t *self) {
     return (value == GPIOD_LINE_VALUE_ERROR) ? -1 : (int)(value == GPIOD_LINE_VALUE_ACTIVE);
 }
 
-int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
+int iwl_gpio_line_take_edges(iwl_gpio_line_t *self) {
     int taken = 0;
-    while (taken < IW_GPIO_EDGES_MAX) {
+    while (taken < IWL_GPIO_EDGES_MAX) {
         const int count = gpiod_line_request_read_edge_events((struct gpiod_line_request *)self->line,
                                                               (struct gpiod_edge_event_buffer *)self->events, EVENTS);
         if (count < 0) {

@@ -4,13 +4,13 @@
 
 #include <errno.h>
 
-#ifdef IW_WITHOUT_LIBMNL // Without it the bus timing could not be verified.
-const iw_bus_kind_t *const iw_socketcan_kind = NULL;
+#ifdef IWL_WITHOUT_LIBMNL // Without it the bus timing could not be verified.
+const iwl_bus_kind_t *const iwl_socketcan_kind = NULL;
 #endif
-#ifdef IW_WITHOUT_LIBGPIOD
-const iw_estop_ops_t *const iw_gpio_estop_ops = NULL;
+#ifdef IWL_WITHOUT_LIBGPIOD
+const iwl_estop_ops_t *const iwl_gpio_estop_ops = NULL;
 
-int iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+int iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen) {
     (void)name;
     (void)out_seen;
     return ENOTSUP;

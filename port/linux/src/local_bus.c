@@ -8,65 +8,65 @@
 #include <sys/socket.h>
 
 typedef struct {
-    iw_bus_t bus;
-    iw_unix_link_t hub;
+    iwl_bus_t bus;
+    iwl_unix_link_t hub;
 } local_bus_t;
 
-IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iw_backend_store_t), local_bus_fits);
+IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iwl_backend_store_t), local_bus_fits);
 
 /// As the connection is now.
 static void follow(local_bus_t *local) {
-    local->bus.up = iw_unix_link_is_up(&local->hub);
+    local->bus.up = iwl_unix_link_is_up(&local->hub);
     local->bus.look_us = local->hub.retry_us;
     local->bus.ours.fd = local->hub.fd;
 }
 
-static int local_open(iw_bus_t *self, const char *name) {
+static int local_open(iwl_bus_t *self, const char *name) {
     local_bus_t *local = (local_bus_t *)(void *)self;
-    self->link = (iw_bus_link_t){.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
-    const int error = iw_unix_link_open(&local->hub, name, SOCK_SEQPACKET);
+    self->link = (iwl_bus_link_t){.presence = IWL_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
+    const int error = iwl_unix_link_open(&local->hub, name, SOCK_SEQPACKET);
     if (error == 0) {
         self->watch_fd = local->hub.watch_fd;
-        iw_socketcan_socket_use(&self->ours, -1, true);
+        iwl_socketcan_socket_use(&self->ours, -1, true);
         follow(local);
     }
     return error;
 }
 
-static void local_close(iw_bus_t *self) {
-    iw_unix_link_close(&((local_bus_t *)(void *)self)->hub);
+static void local_close(iwl_bus_t *self) {
+    iwl_unix_link_close(&((local_bus_t *)(void *)self)->hub);
 }
 
-static void local_tend(iw_bus_t *self) {
+static void local_poll(iwl_bus_t *self) {
     local_bus_t *local = (local_bus_t *)(void *)self;
-    if (iw_unix_link_tend(&local->hub, self->now_us)) {
+    if (iwl_unix_link_poll(&local->hub, self->now_us)) {
         self->present = IW_BUS_ACTIVE;
     }
     follow(local);
 }
 
 /// The hub is gone, and with it every frame of ours that it had not sent.
-static void local_lost(iw_bus_t *self, int error) {
+static void local_lost(iwl_bus_t *self, int error) {
     local_bus_t *local = (local_bus_t *)(void *)self;
     (void)error;
-    iw_unix_link_lose(&local->hub);
+    iwl_unix_link_lose(&local->hub);
     follow(local);
 }
 
-/// Unsent frames are held by the hub, which drops them with the connection. The next `tend` connects anew.
-static int local_purge(iw_bus_t *self) {
+/// Unsent frames are held by the hub, which drops them with the connection. The next `poll` connects anew.
+static int local_purge(iwl_bus_t *self) {
     if (self->up) {
-        iw_bus_lose(self, ENOTCONN);
-        self->link.purge = IW_LINK_PURGE_DONE;
+        iwl_bus_lose(self, ENOTCONN);
+        self->link.purge = IWL_LINK_PURGE_DONE;
         self->link.changes++;
     }
     return 0;
 }
 
-const iw_bus_kind_t iw_local_bus_kind = {
+const iwl_bus_kind_t iwl_local_bus_kind = {
     .open = local_open,
     .close = local_close,
-    .tend = local_tend,
+    .poll = local_poll,
     .purge = local_purge,
     .lost = local_lost,
 };

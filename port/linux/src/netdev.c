@@ -14,28 +14,28 @@
 #endif
 
 /// Three questions by name: in between the interface may vanish, which each of them then reports as absent.
-iw_link_presence_t iw_netdev_presence(int fd, const char *name, int *out_index) {
+iwl_link_presence_t iwl_netdev_presence(int fd, const char *name, int *out_index) {
     struct ifreq request = {.ifr_name = ""};
     (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", name);
     if (ioctl(fd, SIOCGIFINDEX, &request) != 0) {
-        return IW_LINK_ABSENT;
+        return IWL_LINK_ABSENT;
     }
     const int index = request.ifr_ifindex;
     if (ioctl(fd, SIOCGIFHWADDR, &request) != 0) {
-        return IW_LINK_ABSENT;
+        return IWL_LINK_ABSENT;
     }
     const bool is_can = request.ifr_hwaddr.sa_family == ARPHRD_CAN;
     if (ioctl(fd, SIOCGIFFLAGS, &request) != 0) {
-        return IW_LINK_ABSENT;
+        return IWL_LINK_ABSENT;
     }
     *out_index = index;
     if (!is_can) {
-        return IW_LINK_NOT_CAN;
+        return IWL_LINK_NOT_CAN;
     }
-    return (((unsigned)request.ifr_flags & (unsigned)IFF_UP) != 0U) ? IW_LINK_UP : IW_LINK_DOWN;
+    return (((unsigned)request.ifr_flags & (unsigned)IFF_UP) != 0U) ? IWL_LINK_UP : IWL_LINK_DOWN;
 }
 
-int iw_netdev_carrier(const char *name) {
+int iwl_netdev_carrier(const char *name) {
     char path[64];
     char digit = '\0';
     (void)snprintf(path, sizeof path, "/sys/class/net/%s/carrier", name);

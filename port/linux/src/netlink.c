@@ -24,36 +24,36 @@
 #define TRIES_MAX 60
 #define PAUSE_S   1U
 
-static int open_for(iw_netlink_t *self, unsigned groups) {
-    *self = (iw_netlink_t){.socket = mnl_socket_open2(NETLINK_ROUTE, SOCK_NONBLOCK | SOCK_CLOEXEC)};
+static int open_for(iwl_netlink_t *self, unsigned groups) {
+    *self = (iwl_netlink_t){.socket = mnl_socket_open2(NETLINK_ROUTE, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (self->socket == NULL) {
         return errno;
     }
     if (mnl_socket_bind(self->socket, groups, MNL_SOCKET_AUTOPID) != 0) {
         const int error = errno;
-        iw_netlink_close(self);
+        iwl_netlink_close(self);
         return error;
     }
     return 0;
 }
 
-int iw_netlink_open(iw_netlink_t *self) {
+int iwl_netlink_open(iwl_netlink_t *self) {
     return open_for(self, 0);
 }
 
-int iw_netlink_open_events(iw_netlink_t *self) {
+int iwl_netlink_open_events(iwl_netlink_t *self) {
     return open_for(self, RTMGRP_LINK);
 }
 
-int iw_netlink_fd(const iw_netlink_t *self) {
+int iwl_netlink_fd(const iwl_netlink_t *self) {
     return mnl_socket_get_fd(self->socket);
 }
 
-bool iw_netlink_take_events(iw_netlink_t *self) {
+bool iwl_netlink_take_events(iwl_netlink_t *self) {
     char first[64]; // Only that there is one counts; the rest of the message is dropped.
     bool any = false;
     for (int i = 0; i < EVENTS_MAX; i++) {
-        if (recv(iw_netlink_fd(self), first, sizeof first, 0) < 0 && errno != ENOBUFS) {
+        if (recv(iwl_netlink_fd(self), first, sizeof first, 0) < 0 && errno != ENOBUFS) {
             break;
         }
         any = true;
@@ -61,14 +61,14 @@ bool iw_netlink_take_events(iw_netlink_t *self) {
     return any;
 }
 
-void iw_netlink_close(iw_netlink_t *self) {
+void iwl_netlink_close(iwl_netlink_t *self) {
     if (self->socket != NULL) {
         (void)mnl_socket_close(self->socket);
         self->socket = NULL;
     }
 }
 
-static struct nlmsghdr *begin(iw_netlink_t *self, void *buffer, uint16_t type, uint16_t flags) {
+static struct nlmsghdr *begin(iwl_netlink_t *self, void *buffer, uint16_t type, uint16_t flags) {
     struct nlmsghdr *message = mnl_nlmsg_put_header(buffer);
     message->nlmsg_type = type;
     message->nlmsg_flags = (uint16_t)(NLM_F_REQUEST | flags);
@@ -77,7 +77,7 @@ static struct nlmsghdr *begin(iw_netlink_t *self, void *buffer, uint16_t type, u
 }
 
 /// What the reply to our request `sequence` is: -1 not an answer to it, 0 taken, else an errno.
-static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netlink_reading_t *out_reading) {
+static int take(const iwl_netlink_t *self, const struct nlmsghdr *reply, iwl_netlink_reading_t *out_reading) {
     if (reply->nlmsg_seq != self->sequence) {
         return -1;
     }
@@ -85,11 +85,11 @@ static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netli
         const struct nlmsgerr *verdict = (const struct nlmsgerr *)mnl_nlmsg_get_payload(reply);
         return (mnl_nlmsg_get_payload_len(reply) < sizeof *verdict) ? EBADMSG : -verdict->error;
     }
-    return (out_reading != NULL && iw_netlink_parse(reply, out_reading)) ? 0 : EBADMSG;
+    return (out_reading != NULL && iwl_netlink_parse(reply, out_reading)) ? 0 : EBADMSG;
 }
 
 /// Sends the request and takes its reply, which is there as soon as the kernel has taken the request.
-static int ask(iw_netlink_t *self, const struct nlmsghdr *request, iw_netlink_reading_t *out_reading) {
+static int ask(iwl_netlink_t *self, const struct nlmsghdr *request, iwl_netlink_reading_t *out_reading) {
     static _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE]; // Too large for a stack.
     if (mnl_socket_sendto(self->socket, request, request->nlmsg_len) < 0) {
         return errno;
@@ -108,7 +108,7 @@ static int ask(iw_netlink_t *self, const struct nlmsghdr *request, iw_netlink_re
     return EBADMSG;
 }
 
-int iw_netlink_read(iw_netlink_t *self, const char *name, iw_netlink_reading_t *out_reading) {
+int iwl_netlink_read(iwl_netlink_t *self, const char *name, iwl_netlink_reading_t *out_reading) {
     _Alignas(struct nlmsghdr) char buffer[256];
     struct nlmsghdr *request = begin(self, buffer, RTM_GETLINK, 0);
     struct ifinfomsg *interface = (struct ifinfomsg *)mnl_nlmsg_put_extra_header(request, sizeof *interface);
@@ -116,12 +116,12 @@ int iw_netlink_read(iw_netlink_t *self, const char *name, iw_netlink_reading_t *
     mnl_attr_put_strz(request, IFLA_IFNAME, name);
     const int error = ask(self, request, out_reading);
     if (error != 0) {
-        *out_reading = (iw_netlink_reading_t){.link = {.presence = IW_LINK_ABSENT}, .state = IW_BUS_DOWN};
+        *out_reading = (iwl_netlink_reading_t){.link = {.presence = IWL_LINK_ABSENT}, .state = IW_BUS_DOWN};
     }
     return (error == ENODEV) ? 0 : error;
 }
 
-int iw_netlink_set_up(iw_netlink_t *self, int index, bool up) {
+int iwl_netlink_set_up(iwl_netlink_t *self, int index, bool up) {
     _Alignas(struct nlmsghdr) char buffer[128];
     struct nlmsghdr *request = begin(self, buffer, RTM_NEWLINK, NLM_F_ACK);
     struct ifinfomsg *interface = (struct ifinfomsg *)mnl_nlmsg_put_extra_header(request, sizeof *interface);
@@ -135,25 +135,25 @@ int iw_netlink_set_up(iw_netlink_t *self, int index, bool up) {
 /// An interface that we took down must not stay down because its adapter is slow to answer: setting it up is tried
 /// again. ENODEV: it is gone, there is nothing to bring up.
 static int restart(int interface) {
-    iw_netlink_t netlink;
-    int error = iw_netlink_open(&netlink);
+    iwl_netlink_t netlink;
+    int error = iwl_netlink_open(&netlink);
     if (error == 0) {
-        error = iw_netlink_set_up(&netlink, interface, false);
+        error = iwl_netlink_set_up(&netlink, interface, false);
     }
     if (error != 0) {
         return error;
     }
-    error = iw_netlink_set_up(&netlink, interface, true);
+    error = iwl_netlink_set_up(&netlink, interface, true);
     for (int i = 1; i < TRIES_MAX && error != 0 && error != ENODEV; i++) {
         (void)sleep(PAUSE_S);
-        error = iw_netlink_set_up(&netlink, interface, true);
+        error = iwl_netlink_set_up(&netlink, interface, true);
     }
     return error;
 }
 
 /// A process and not a thread: the kernel's lock on interface configuration can hold it for seconds, and it must
 /// outlive a gateway that is killed between down and up.
-int iw_netlink_restart_start(int interface, pid_t *out_process) {
+int iwl_netlink_restart_start(int interface, pid_t *out_process) {
     const pid_t process = fork();
     if (process < 0) {
         return errno;
@@ -167,11 +167,11 @@ int iw_netlink_restart_start(int interface, pid_t *out_process) {
     return 0;
 }
 
-int iw_netlink_restart_poll(pid_t process) {
+int iwl_netlink_restart_poll(pid_t process) {
     int status = 0;
     const pid_t ended = waitpid(process, &status, WNOHANG);
     if (ended == 0) {
-        return IW_NETLINK_RESTART_RUNNING;
+        return IWL_NETLINK_RESTART_RUNNING;
     }
     if (ended < 0) {
         return 0; // Somebody else has taken its status; whether the interface is up will be seen.
@@ -230,11 +230,11 @@ static iw_bus_state_t state_of(uint32_t state) {
 }
 
 /// The data of an interface of kind "can": a real controller.
-static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
+static void parse_controller(attributes_t data, iwl_netlink_reading_t *reading) {
     struct can_bittiming timing;
     struct can_ctrlmode mode;
     uint32_t state;
-    iw_bus_link_t *link = &reading->link;
+    iwl_bus_link_t *link = &reading->link;
     if (get(data, IFLA_CAN_BITTIMING, &timing, sizeof timing)) {
         link->bitrate_hz = timing.bitrate;
         link->sample_point_permille = (uint16_t)((timing.sample_point <= 1000U) ? timing.sample_point : 0U);
@@ -245,14 +245,14 @@ static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
         link->echo_proven =
             link->echo_proven && (mode.flags & (CAN_CTRLMODE_LOOPBACK | CAN_CTRLMODE_PRESUME_ACK)) == 0U;
     }
-    if (get(data, IFLA_CAN_STATE, &state, sizeof state) && link->presence == IW_LINK_UP) {
+    if (get(data, IFLA_CAN_STATE, &state, sizeof state) && link->presence == IWL_LINK_UP) {
         reading->state = state_of(state);
     }
     (void)get(data, IFLA_CAN_RESTART_MS, &link->restart_ms, sizeof link->restart_ms);
 }
 
 /// vcan is of another kind: there is no controller, so no bit timing and no error states.
-static void parse_kind(attributes_t info, iw_netlink_reading_t *reading) {
+static void parse_kind(attributes_t info, iwl_netlink_reading_t *reading) {
     static const char controller[] = "can";
     char kind[sizeof controller] = "";
     const struct nlattr *data = find(info, IFLA_INFO_DATA);
@@ -263,22 +263,22 @@ static void parse_kind(attributes_t info, iw_netlink_reading_t *reading) {
     }
 }
 
-bool iw_netlink_parse(const struct nlmsghdr *message, iw_netlink_reading_t *out_reading) {
+bool iwl_netlink_parse(const struct nlmsghdr *message, iwl_netlink_reading_t *out_reading) {
     if (message->nlmsg_type != RTM_NEWLINK || mnl_nlmsg_get_payload_len(message) < sizeof(struct ifinfomsg)) {
         return false;
     }
     const struct ifinfomsg *interface = (const struct ifinfomsg *)mnl_nlmsg_get_payload(message);
     const attributes_t all = {mnl_nlmsg_get_payload_offset(message, sizeof *interface),
                               (uint32_t)(mnl_nlmsg_get_payload_len(message) - sizeof *interface)};
-    iw_bus_link_t *link = &out_reading->link;
-    *out_reading = (iw_netlink_reading_t){.index = interface->ifi_index, .state = IW_BUS_DOWN};
-    link->presence = ((interface->ifi_flags & IFF_UP) != 0U) ? IW_LINK_UP : IW_LINK_DOWN;
+    iwl_bus_link_t *link = &out_reading->link;
+    *out_reading = (iwl_netlink_reading_t){.index = interface->ifi_index, .state = IW_BUS_DOWN};
+    link->presence = ((interface->ifi_flags & IFF_UP) != 0U) ? IWL_LINK_UP : IWL_LINK_DOWN;
     if (interface->ifi_type != ARPHRD_CAN) {
-        link->presence = IW_LINK_NOT_CAN;
+        link->presence = IWL_LINK_NOT_CAN;
         return true;
     }
     link->echo_proven = (interface->ifi_flags & IFF_ECHO) != 0U;
-    out_reading->state = (link->presence == IW_LINK_UP) ? IW_BUS_ACTIVE : IW_BUS_DOWN;
+    out_reading->state = (link->presence == IWL_LINK_UP) ? IW_BUS_ACTIVE : IW_BUS_DOWN;
     (void)get(all, IFLA_TXQLEN, &link->queue_length, sizeof link->queue_length);
     const struct nlattr *info = find(all, IFLA_LINKINFO);
     if (info != NULL) {

@@ -22,38 +22,38 @@
 #include <unistd.h>
 
 typedef struct {
-    iw_bus_t bus;
+    iwl_bus_t bus;
     const char *name;
-    iw_netlink_t netlink;
-    iw_netlink_t events; ///< Wakes us when an interface comes.
-    pid_t restarting;    ///< The process that purges; 0: none.
-    int probe_fd;        ///< For looking at interfaces.
-    int interface;       ///< That the sockets are bound to; 0: none, they are closed or dead.
+    iwl_netlink_t netlink;
+    iwl_netlink_t events; ///< Wakes us when an interface comes.
+    pid_t restarting;     ///< The process that purges; 0: none.
+    int probe_fd;         ///< For looking at interfaces.
+    int interface;        ///< That the sockets are bound to; 0: none, they are closed or dead.
 } socketcan_t;
 
-IW_STATIC_ASSERT(sizeof(socketcan_t) <= sizeof(iw_backend_store_t), socketcan_fits);
+IW_STATIC_ASSERT(sizeof(socketcan_t) <= sizeof(iwl_backend_store_t), socketcan_fits);
 
-static socketcan_t *can_of(iw_bus_t *bus) {
+static socketcan_t *can_of(iwl_bus_t *bus) {
     return (socketcan_t *)(void *)bus;
 }
 
 static void close_sockets(socketcan_t *can) {
-    iw_socketcan_socket_close(&can->bus.ours);
-    iw_socketcan_socket_close(&can->bus.others);
+    iwl_socketcan_socket_close(&can->bus.ours);
+    iwl_socketcan_socket_close(&can->bus.others);
     can->interface = 0;
 }
 
 /// The interface is gone or was down. Going down, the kernel emptied its queue; what our sockets still hold is old.
-static void can_lost(iw_bus_t *bus, int error) {
+static void can_lost(iwl_bus_t *bus, int error) {
     if (error == ENODEV) {
         can_of(bus)->interface = 0;
     }
 }
 
 /// Takes over what the kernel reports; what this file counts itself stays.
-static void note_link(iw_bus_t *bus, const iw_bus_link_t *reading) {
-    const iw_bus_link_t before = bus->link;
-    if (iw_bus_link_is_same(&before, reading)) {
+static void note_link(iwl_bus_t *bus, const iwl_bus_link_t *reading) {
+    const iwl_bus_link_t before = bus->link;
+    if (iwl_bus_link_is_same(&before, reading)) {
         return;
     }
     bus->link = *reading;
@@ -66,9 +66,9 @@ static void note_link(iw_bus_t *bus, const iw_bus_link_t *reading) {
 
 /// The kernel's answer to how the interface is set; unanswered, only that it is there is known.
 static iw_bus_state_t read_link(socketcan_t *can) {
-    iw_netlink_reading_t reading;
-    if (iw_netlink_read(&can->netlink, can->name, &reading) != 0) {
-        reading = (iw_netlink_reading_t){.link = {.presence = IW_LINK_UP}, .state = IW_BUS_ACTIVE};
+    iwl_netlink_reading_t reading;
+    if (iwl_netlink_read(&can->netlink, can->name, &reading) != 0) {
+        reading = (iwl_netlink_reading_t){.link = {.presence = IWL_LINK_UP}, .state = IW_BUS_ACTIVE};
     }
     note_link(&can->bus, &reading.link);
     return reading.state;
@@ -77,11 +77,11 @@ static iw_bus_state_t read_link(socketcan_t *can) {
 static bool open_sockets(socketcan_t *can, int interface) {
     struct epoll_event interest = {.events = EPOLLIN};
     close_sockets(can);
-    if (iw_socketcan_socket_open(&can->bus.ours, interface, IW_SOCKETCAN_OURS) == 0 &&
-        iw_socketcan_socket_open(&can->bus.others, interface, IW_SOCKETCAN_OTHERS) == 0 &&
+    if (iwl_socketcan_socket_open(&can->bus.ours, interface, IWL_SOCKETCAN_OURS) == 0 &&
+        iwl_socketcan_socket_open(&can->bus.others, interface, IWL_SOCKETCAN_OTHERS) == 0 &&
         epoll_ctl(can->bus.watch_fd, EPOLL_CTL_ADD, can->bus.ours.fd, &interest) == 0) {
         can->interface = interface;
-        can->bus.link.room_bytes = iw_socketcan_socket_room(&can->bus.ours);
+        can->bus.link.room_bytes = iwl_socketcan_socket_room(&can->bus.ours);
         return true;
     }
     close_sockets(can);
@@ -93,8 +93,8 @@ static void drop_old(socketcan_t *can) {
     if (can->bus.ours.fd < 0) {
         return;
     }
-    const int error = iw_socketcan_socket_drop(&can->bus.ours);
-    (void)iw_socketcan_socket_drop(&can->bus.others);
+    const int error = iwl_socketcan_socket_drop(&can->bus.ours);
+    (void)iwl_socketcan_socket_drop(&can->bus.others);
     if (error == ENODEV) {
         can->interface = 0;
     }
@@ -103,10 +103,10 @@ static void drop_old(socketcan_t *can) {
 /// Looks whether the interface is back, and if so goes on with the sockets there are, or opens new ones.
 static void try_up(socketcan_t *can) {
     int interface = 0;
-    iw_bus_link_t link = can->bus.link;
-    can->bus.look_us = can->bus.now_us + IW_BUS_RETRY_US;
-    link.presence = iw_netdev_presence(can->probe_fd, can->name, &interface);
-    if (link.presence != IW_LINK_UP) {
+    iwl_bus_link_t link = can->bus.link;
+    can->bus.look_us = can->bus.now_us + IWL_BUS_RETRY_US;
+    link.presence = iwl_netdev_presence(can->probe_fd, can->name, &interface);
+    if (link.presence != IWL_LINK_UP) {
         note_link(&can->bus, &link);
         return;
     }
@@ -116,17 +116,17 @@ static void try_up(socketcan_t *can) {
     }
     can->bus.up = true;
     can->bus.link.lost = can->bus.ours.lost;
-    iw_bus_load_begin(&can->bus.load, can->bus.now_us);
-    iw_bus_note(&can->bus, read_link(can));
+    iwl_bus_load_begin(&can->bus.load, can->bus.now_us);
+    iwl_bus_note(&can->bus, read_link(can));
 }
 
 /// While up: is the controller really bus-off, or no longer?
 static void look_at_carrier(socketcan_t *can) {
-    const int carrier = iw_netdev_carrier(can->name);
+    const int carrier = iwl_netdev_carrier(can->name);
     if (carrier == 0) {
-        iw_bus_note(&can->bus, IW_BUS_OFF);
+        iwl_bus_note(&can->bus, IW_BUS_OFF);
     } else {
-        iw_bus_note(&can->bus, (can->bus.present < IW_BUS_PASSIVE) ? IW_BUS_ACTIVE : can->bus.present);
+        iwl_bus_note(&can->bus, (can->bus.present < IW_BUS_PASSIVE) ? IW_BUS_ACTIVE : can->bus.present);
     }
 }
 
@@ -135,9 +135,9 @@ static int open_descriptors(socketcan_t *can) {
     if (can->probe_fd < 0) {
         return errno;
     }
-    int error = iw_netlink_open(&can->netlink);
+    int error = iwl_netlink_open(&can->netlink);
     if (error == 0) {
-        error = iw_netlink_open_events(&can->events);
+        error = iwl_netlink_open_events(&can->events);
     }
     if (error != 0) {
         return error;
@@ -145,17 +145,17 @@ static int open_descriptors(socketcan_t *can) {
     struct epoll_event interest = {.events = EPOLLIN};
     can->bus.watch_fd = epoll_create1(EPOLL_CLOEXEC);
     if (can->bus.watch_fd < 0 ||
-        epoll_ctl(can->bus.watch_fd, EPOLL_CTL_ADD, iw_netlink_fd(&can->events), &interest) != 0) {
+        epoll_ctl(can->bus.watch_fd, EPOLL_CTL_ADD, iwl_netlink_fd(&can->events), &interest) != 0) {
         return errno;
     }
     return 0;
 }
 
-static void can_close(iw_bus_t *bus) {
+static void can_close(iwl_bus_t *bus) {
     socketcan_t *can = can_of(bus);
     close_sockets(can);
-    iw_netlink_close(&can->netlink);
-    iw_netlink_close(&can->events);
+    iwl_netlink_close(&can->netlink);
+    iwl_netlink_close(&can->events);
     if (can->bus.watch_fd >= 0) {
         (void)close(can->bus.watch_fd);
     }
@@ -164,11 +164,11 @@ static void can_close(iw_bus_t *bus) {
     }
 }
 
-static int can_open(iw_bus_t *bus, const char *name) {
+static int can_open(iwl_bus_t *bus, const char *name) {
     socketcan_t *can = can_of(bus);
     can->name = name;
     can->probe_fd = -1;
-    bus->link.presence = IW_LINK_ABSENT;
+    bus->link.presence = IWL_LINK_ABSENT;
     const int error = open_descriptors(can);
     if (error != 0) {
         can_close(bus);
@@ -180,62 +180,62 @@ static int can_open(iw_bus_t *bus, const char *name) {
 }
 
 static void follow_restart(socketcan_t *can) {
-    const int result = iw_netlink_restart_poll(can->restarting);
-    if (result == IW_NETLINK_RESTART_RUNNING) {
+    const int result = iwl_netlink_restart_poll(can->restarting);
+    if (result == IWL_NETLINK_RESTART_RUNNING) {
         return;
     }
     can->restarting = 0;
-    can->bus.link.purge = (result == 0)                           ? IW_LINK_PURGE_DONE
-                          : (result == EPERM || result == EACCES) ? IW_LINK_PURGE_NOT_ALLOWED
-                                                                  : IW_LINK_PURGE_FAILED;
+    can->bus.link.purge = (result == 0)                           ? IWL_LINK_PURGE_DONE
+                          : (result == EPERM || result == EACCES) ? IWL_LINK_PURGE_NOT_ALLOWED
+                                                                  : IWL_LINK_PURGE_FAILED;
     can->bus.link.changes++;
 }
 
-static void can_tend(iw_bus_t *bus) {
+static void can_poll(iwl_bus_t *bus) {
     socketcan_t *can = can_of(bus);
     if (can->restarting > 0) {
         follow_restart(can);
     }
     if (!bus->up) {
         drop_old(can);
-        if (iw_netlink_take_events(&can->events) || bus->now_us >= bus->look_us) {
+        if (iwl_netlink_take_events(&can->events) || bus->now_us >= bus->look_us) {
             try_up(can);
         }
     }
-    if (bus->up && iw_socketcan_socket_is_empty(&bus->ours)) {
-        iw_bus_fill(bus);
+    if (bus->up && iwl_socketcan_socket_is_empty(&bus->ours)) {
+        iwl_bus_fill(bus);
         if (bus->up && bus->ours.count == 0U && !bus->quiet) {
-            (void)iw_netlink_take_events(&can->events); // Not needed while up, but unread they would wake us for ever.
+            (void)iwl_netlink_take_events(&can->events); // Not needed while up, but unread they would wake us for ever.
         }
     }
     if (bus->up && bus->now_us >= bus->look_us) {
         look_at_carrier(can);
     }
-    (void)iw_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);
+    (void)iwl_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);
 }
 
 /// Has the link taken down and up: that empties the queue and the controller. It may take seconds, so the answer is
 /// "begun"; the loss of the bus tells the core that it is done. Not where the echo is unproven: an slcan adapter keeps
 /// the old frames that it has, and only the zeros in the queue behind them would be lost.
-static int can_purge(iw_bus_t *bus) {
+static int can_purge(iwl_bus_t *bus) {
     socketcan_t *can = can_of(bus);
-    if (bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {
+    if (bus->link.purge == IWL_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {
         return -1;
     }
-    if (can->restarting == 0 && bus->up && iw_netlink_restart_start(can->interface, &can->restarting) != 0) {
+    if (can->restarting == 0 && bus->up && iwl_netlink_restart_start(can->interface, &can->restarting) != 0) {
         can->restarting = 0;
-        bus->link.purge = IW_LINK_PURGE_FAILED;
+        bus->link.purge = IWL_LINK_PURGE_FAILED;
         bus->link.changes++;
     }
     return 0;
 }
 
-static const iw_bus_kind_t kind = {
+static const iwl_bus_kind_t kind = {
     .open = can_open,
     .close = can_close,
-    .tend = can_tend,
+    .poll = can_poll,
     .purge = can_purge,
     .lost = can_lost,
 };
 
-const iw_bus_kind_t *const iw_socketcan_kind = &kind;
+const iwl_bus_kind_t *const iwl_socketcan_kind = &kind;

@@ -10,14 +10,14 @@ IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLA
 IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, socketcan_frame_size);
 
 /// CAN_EFF_MASK compares the whole number and no format bit: every format with a known number passes, to be counted.
-void iw_socketcan_filters(iw_socketcan_share_t share, struct can_filter *out_filters) {
-    const canid_t invert = (share == IW_SOCKETCAN_OTHERS) ? CAN_INV_FILTER : 0U;
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
+void iwl_socketcan_filters(iwl_socketcan_share_t share, struct can_filter *out_filters) {
+    const canid_t invert = (share == IWL_SOCKETCAN_OTHERS) ? CAN_INV_FILTER : 0U;
+    for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         out_filters[i] = (struct can_filter){.can_id = iw_codec_rows[i].id | invert, .can_mask = CAN_EFF_MASK};
     }
 }
 
-iw_can_frame_t iw_socketcan_translate(const struct can_frame *raw, int flags) {
+iw_can_frame_t iwl_socketcan_translate(const struct can_frame *raw, int flags) {
     const bool extended = (raw->can_id & CAN_EFF_FLAG) != 0U;
     iw_can_frame_t frame = {
         .id = raw->can_id & (extended ? CAN_EFF_MASK | CAN_EFF_FLAG : CAN_SFF_MASK),
@@ -31,23 +31,23 @@ iw_can_frame_t iw_socketcan_translate(const struct can_frame *raw, int flags) {
 }
 
 /// Bus errors (CAN_ERR_BUSERROR) are left out: a disturbed bus brings thousands a second, and the states say enough.
-uint32_t iw_can_error_mask(void) {
+uint32_t iwl_can_error_mask(void) {
     return CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
 }
 
-iw_can_error_t iw_can_error_of(const struct can_frame *raw) {
+iwl_can_error_t iwl_can_error_of(const struct can_frame *raw) {
     const uint8_t controller = ((raw->can_id & CAN_ERR_CRTL) != 0U) ? raw->data[1] : 0U;
     if ((raw->can_id & CAN_ERR_BUSOFF) != 0U) {
-        return IW_CAN_ERROR_BUS_OFF;
+        return IWL_CAN_ERROR_BUS_OFF;
     }
     if ((raw->can_id & CAN_ERR_RESTARTED) != 0U) {
-        return IW_CAN_ERROR_RESTARTED;
+        return IWL_CAN_ERROR_RESTARTED;
     }
     if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0U) {
-        return IW_CAN_ERROR_PASSIVE;
+        return IWL_CAN_ERROR_PASSIVE;
     }
     if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE)) != 0U) {
-        return IW_CAN_ERROR_ACTIVE;
+        return IWL_CAN_ERROR_ACTIVE;
     }
-    return IW_CAN_ERROR_NOTHING;
+    return IWL_CAN_ERROR_NOTHING;
 }

@@ -13,17 +13,17 @@
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
 
-void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
+void iwl_socketcan_socket_init(iwl_socketcan_socket_t *self) {
     memset(self, 0, sizeof *self);
     self->fd = -1;
 }
 
 /// All frames are told beside into one place: the kernel's count is a running total, so that the last one tells all.
-void iw_socketcan_socket_use(iw_socketcan_socket_t *self, int fd, bool is_hub) {
-    iw_socketcan_socket_init(self);
+void iwl_socketcan_socket_use(iwl_socketcan_socket_t *self, int fd, bool is_hub) {
+    iwl_socketcan_socket_init(self);
     self->fd = fd;
     self->is_hub = is_hub;
-    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; i++) {
+    for (uint32_t i = 0; i < IWL_SOCKETCAN_BATCH; i++) {
         self->part[i] = (struct iovec){.iov_base = &self->frame[i], .iov_len = sizeof self->frame[i]};
         self->message[i].msg_hdr = (struct msghdr){.msg_iov = &self->part[i],
                                                    .msg_iovlen = 1,
@@ -37,56 +37,56 @@ static bool set(int fd, int level, int name, int value) {
 }
 
 /// Loopback stays on (the default): it is what echoes our frames and what lets other programs see them.
-static bool ask_for(int fd, iw_socketcan_share_t share) {
-    const can_err_mask_t errors = iw_can_error_mask();
-    struct can_filter filters[IW_SOCKETCAN_IDS];
-    iw_socketcan_filters(share, filters);
-    if (share == IW_SOCKETCAN_OTHERS && !set(fd, SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1)) {
+static bool ask_for(int fd, iwl_socketcan_share_t share) {
+    const can_err_mask_t errors = iwl_can_error_mask();
+    struct can_filter filters[IWL_SOCKETCAN_IDS];
+    iwl_socketcan_filters(share, filters);
+    if (share == IWL_SOCKETCAN_OTHERS && !set(fd, SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1)) {
         return false;
     }
     if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0) {
         return false;
     }
-    if (share == IW_SOCKETCAN_OTHERS) {
+    if (share == IWL_SOCKETCAN_OTHERS) {
         return true;
     }
     return setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) == 0 &&
            set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1) && set(fd, SOL_SOCKET, SO_RXQ_OVFL, 1);
 }
 
-int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_socketcan_share_t share) {
+int iwl_socketcan_socket_open(iwl_socketcan_socket_t *self, int interface, iwl_socketcan_share_t share) {
     const struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = interface};
-    iw_socketcan_socket_init(self);
+    iwl_socketcan_socket_init(self);
     const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
     if (fd < 0) {
         return errno;
     }
     (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
-    (void)set(fd, SOL_SOCKET, SO_RCVBUF, (int)IW_LINK_ROOM_BYTES);
+    (void)set(fd, SOL_SOCKET, SO_RCVBUF, (int)IWL_LINK_ROOM_BYTES);
     if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
         (void)close(fd);
         return error;
     }
-    iw_socketcan_socket_use(self, fd, false);
+    iwl_socketcan_socket_use(self, fd, false);
     return 0;
 }
 
-uint32_t iw_socketcan_socket_room(const iw_socketcan_socket_t *self) {
+uint32_t iwl_socketcan_socket_room(const iwl_socketcan_socket_t *self) {
     int room = 0;
     socklen_t length = sizeof room;
     return (getsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &room, &length) == 0) ? (uint32_t)room : 0U;
 }
 
-void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {
+void iwl_socketcan_socket_close(iwl_socketcan_socket_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
     }
-    iw_socketcan_socket_init(self);
+    iwl_socketcan_socket_init(self);
 }
 
 /// Of the last message, which has the latest count.
-static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
+static void note_drops(iwl_socketcan_socket_t *self, struct msghdr *message) {
     const struct cmsghdr *part = CMSG_FIRSTHDR(message);
     if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
         memcpy(&self->lost, CMSG_DATA(part), sizeof self->lost);
@@ -95,7 +95,7 @@ static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
 
 /// Keeps what is a frame, and turns the hub's marks into flags. ENOTCONN: it is gone. Frames before the end are still
 /// good; the next call meets the end once more.
-static int sieve(iw_socketcan_socket_t *self) {
+static int sieve(iwl_socketcan_socket_t *self) {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < self->count; i++) {
         const struct can_frame *raw = &self->frame[i];
@@ -114,12 +114,12 @@ static int sieve(iw_socketcan_socket_t *self) {
     return 0;
 }
 
-int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
-    const int count = recvmmsg(self->fd, self->message, IW_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
+int iwl_socketcan_socket_fill(iwl_socketcan_socket_t *self) {
+    const int count = recvmmsg(self->fd, self->message, IWL_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
     const int error = (count < 0) ? errno : 0;
     self->next = 0;
     self->count = (count > 0) ? (uint32_t)count : 0U;
-    self->drained = self->count < IW_SOCKETCAN_BATCH;
+    self->drained = self->count < IWL_SOCKETCAN_BATCH;
     if (count > 0) {
         note_drops(self, &self->message[count - 1].msg_hdr);
     }
@@ -133,16 +133,16 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
     return (error == EAGAIN || error == EINTR) ? 0 : error; // ENETDOWN, ENODEV: the interface went down or away.
 }
 
-void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {
+void iwl_socketcan_socket_forget(iwl_socketcan_socket_t *self) {
     self->count = 0;
     self->next = 0;
     self->drained = false;
 }
 
-int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
+int iwl_socketcan_socket_drop(iwl_socketcan_socket_t *self) {
     int last = 0;
     for (int i = 0; i < DROP_BATCHES_MAX; i++) {
-        const int error = iw_socketcan_socket_fill(self);
+        const int error = iwl_socketcan_socket_fill(self);
         if (error != 0) {
             last = error;
         }
@@ -150,12 +150,12 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
             break;
         }
     }
-    iw_socketcan_socket_forget(self);
+    iwl_socketcan_socket_forget(self);
     return last;
 }
 
 /// ENOBUFS: the interface's queue is full. Nothing is retried here: a newer setpoint replaces this one (R6).
-int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count) {
+int iwl_socketcan_socket_send(const iwl_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count) {
     struct can_frame raw[IW_SIDES];
     struct iovec part[IW_SIDES];
     struct mmsghdr message[IW_SIDES];

@@ -10,12 +10,12 @@
 
 static const char prefix[] = "unix:";
 
-bool iw_unix_link_is_name(const char *name) {
+bool iwl_unix_link_is_name(const char *name) {
     return strncmp(name, prefix, sizeof prefix - 1U) == 0;
 }
 
 /// Non-blocking also while connecting: a hub that does not accept must not hold up the loop.
-static bool try_connect(iw_unix_link_t *self) {
+static bool try_connect(iwl_unix_link_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     memcpy(address.sun_path, self->path, strlen(self->path) + 1U);
     const int fd = socket(AF_UNIX, self->type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -30,11 +30,11 @@ static bool try_connect(iw_unix_link_t *self) {
     }
     self->fd = fd;
     self->retry_us = IW_NEVER;
-    self->backoff_us = IW_UNIX_LINK_RETRY_MIN_US;
+    self->backoff_us = IWL_UNIX_LINK_RETRY_MIN_US;
     return true;
 }
 
-int iw_unix_link_open(iw_unix_link_t *self, const char *name, int type) {
+int iwl_unix_link_open(iwl_unix_link_t *self, const char *name, int type) {
     const char *path = name + sizeof prefix - 1U;
     if (*path == '\0') {
         return ENOENT;
@@ -47,17 +47,17 @@ int iw_unix_link_open(iw_unix_link_t *self, const char *name, int type) {
         return errno;
     }
     // Nobody listening is no error: the simulator may be started later.
-    *self = (iw_unix_link_t){.path = path,
-                             .retry_us = 0,
-                             .backoff_us = IW_UNIX_LINK_RETRY_MIN_US,
-                             .type = type,
-                             .watch_fd = watch_fd,
-                             .fd = -1};
+    *self = (iwl_unix_link_t){.path = path,
+                              .retry_us = 0,
+                              .backoff_us = IWL_UNIX_LINK_RETRY_MIN_US,
+                              .type = type,
+                              .watch_fd = watch_fd,
+                              .fd = -1};
     (void)try_connect(self);
     return 0;
 }
 
-void iw_unix_link_close(iw_unix_link_t *self) {
+void iwl_unix_link_close(iwl_unix_link_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
     }
@@ -66,11 +66,11 @@ void iw_unix_link_close(iw_unix_link_t *self) {
     self->watch_fd = -1;
 }
 
-bool iw_unix_link_is_up(const iw_unix_link_t *self) {
+bool iwl_unix_link_is_up(const iwl_unix_link_t *self) {
     return self->fd >= 0;
 }
 
-void iw_unix_link_lose(iw_unix_link_t *self) {
+void iwl_unix_link_lose(iwl_unix_link_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
         self->fd = -1;
@@ -78,7 +78,7 @@ void iw_unix_link_lose(iw_unix_link_t *self) {
     }
 }
 
-bool iw_unix_link_tend(iw_unix_link_t *self, iw_time_us_t now_us) {
+bool iwl_unix_link_poll(iwl_unix_link_t *self, iw_time_us_t now_us) {
     if (self->fd >= 0 || now_us < self->retry_us) {
         return false;
     }
@@ -87,6 +87,6 @@ bool iw_unix_link_tend(iw_unix_link_t *self, iw_time_us_t now_us) {
     }
     self->retry_us = now_us + self->backoff_us;
     const uint32_t longer_us = self->backoff_us * 2U;
-    self->backoff_us = (longer_us < IW_UNIX_LINK_RETRY_MAX_US) ? longer_us : IW_UNIX_LINK_RETRY_MAX_US;
+    self->backoff_us = (longer_us < IWL_UNIX_LINK_RETRY_MAX_US) ? longer_us : IWL_UNIX_LINK_RETRY_MAX_US;
     return false;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// The C source that cantools generates from share/iwheel.dbc at the time of the run, with the choice by id that its user has to write.
-#include "codec.h"
+#include "bench_codec.h"
 #include "iwheel.h"
 
 static struct {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The leanest program that reads these frames: ids compared in the order of how often they come, values stored where they are wanted, no
 /// word about side, kind or remote frames. What a codec costs beyond this is the price of being one.
-#include "codec.h"
+#include "bench_codec.h"
 
 typedef struct {
     int16_t first;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "codec.h"
+#include "bench_codec.h"
 #include "iwheel/codec.h"
 
 static iw_codec_wheel_t seen[IW_SIDES]; // The latest of each message, kept per wheel, as a program needs them.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The loops of the benchmark around nothing: each frame is passed by, a setpoint's three values and its side are taken. What they count is
 /// not the codec's and is subtracted.
-#include "codec.h"
+#include "bench_codec.h"
 
 uint32_t bench_decode(uint32_t rounds) {
     for (uint32_t round = 0; round < rounds; round++) {

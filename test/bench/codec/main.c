@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// usage: codec decode|encode ROUNDS
-#include "codec.h"
+#include "bench_codec.h"
 
 #include <stdio.h>
 #include <stdlib.h>

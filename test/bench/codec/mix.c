@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "codec.h"
+#include "bench_codec.h"
 
 #define MULTIPLIER 1103515245U
 #define INCREMENT  12345U

@@ -7,7 +7,7 @@
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
 #include "answers/answers.h"
 #include "daemon_rig.h"
-#include "sockets/clients.h"
+#include "sockets/sock_clients.h"
 
 #include "unity.h"
 
@@ -38,7 +38,7 @@ static void bench_status(void) {
     const int client = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
-    iw_ledger_entry_t *const entry = &daemon->wheels.core.ledger.entry[IW_LEDGER_GEAR_RATIO];
+    iw_assumption_entry_t *const entry = &daemon->wheels.core.assumptions.entry[IW_ASSUMPTION_GEAR_RATIO];
     for (unsigned i = 0; i < rounds; i++) {
         entry->figure += anew ? 1 : 0;
         TEST_ASSERT_GREATER_THAN_size_t(0, write_event(daemon));

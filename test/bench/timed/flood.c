@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include "timed.h"
 
-#include "codec.h"
+#include "bench_codec.h"
 
 #include <stdio.h>
 #include <stdlib.h>

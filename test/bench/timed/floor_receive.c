@@ -4,7 +4,7 @@
 #define _GNU_SOURCE
 #include "timed.h"
 
-#include "codec.h"
+#include "bench_codec.h"
 
 #include <signal.h>
 #include <stdio.h>

@@ -102,10 +102,10 @@ void gpiod_line_info_free(struct gpiod_line_info *info) {
     given -= (info != NULL) ? 1U : 0U;
 }
 
-struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *wish,
+struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *config,
                                                     struct gpiod_line_config *lines) {
     (void)chip;
-    (void)wish;
+    (void)config;
     (void)lines;
     errno = (fake_gpio.busy_error != 0) ? fake_gpio.busy_error : EINVAL;
     if (fake_gpio.busy_error != 0 || fake_gpio.offset != FAKE_GPIO_OFFSET || pipe(fake_gpio.ends) != 0) {
@@ -167,17 +167,17 @@ struct gpiod_request_config *gpiod_request_config_new(void) {
     return (struct gpiod_request_config *)(void *)&one;
 }
 
-void gpiod_request_config_free(struct gpiod_request_config *wish) {
-    given -= (wish != NULL) ? 1U : 0U;
+void gpiod_request_config_free(struct gpiod_request_config *config) {
+    given -= (config != NULL) ? 1U : 0U;
 }
 
-void gpiod_request_config_set_consumer(struct gpiod_request_config *wish, const char *consumer) {
-    (void)wish;
+void gpiod_request_config_set_consumer(struct gpiod_request_config *config, const char *consumer) {
+    (void)config;
     (void)consumer;
 }
 
-void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *wish, size_t size) {
-    (void)wish;
+void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *config, size_t size) {
+    (void)config;
     wished_room = (unsigned)size;
 }
 

@@ -42,7 +42,7 @@ void gpiod_chip_info_free(struct gpiod_chip_info *info);
 struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset);
 const char *gpiod_line_info_get_name(struct gpiod_line_info *info);
 void gpiod_line_info_free(struct gpiod_line_info *info);
-struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *wish,
+struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *config,
                                                     struct gpiod_line_config *lines);
 struct gpiod_line_settings *gpiod_line_settings_new(void);
 void gpiod_line_settings_free(struct gpiod_line_settings *settings);
@@ -54,9 +54,9 @@ void gpiod_line_config_free(struct gpiod_line_config *lines);
 int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const unsigned *offsets, size_t count,
                                         struct gpiod_line_settings *settings);
 struct gpiod_request_config *gpiod_request_config_new(void);
-void gpiod_request_config_free(struct gpiod_request_config *wish);
-void gpiod_request_config_set_consumer(struct gpiod_request_config *wish, const char *consumer);
-void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *wish, size_t size);
+void gpiod_request_config_free(struct gpiod_request_config *config);
+void gpiod_request_config_set_consumer(struct gpiod_request_config *config, const char *consumer);
+void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *config, size_t size);
 void gpiod_line_request_release(struct gpiod_line_request *line);
 int gpiod_line_request_get_fd(struct gpiod_line_request *line);
 size_t gpiod_line_request_get_requested_offsets(struct gpiod_line_request *line, unsigned *offsets, size_t max);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 /// Takes the place of the port's file of the same name: every access to a register of the bus controller goes to a model. The
-/// addresses are those of an `iw_bxcan_registers_t` that was told by `register_access_connect`; its memory is never touched.
-#ifndef IW_STM32_REGISTER_ACCESS_H
-#define IW_STM32_REGISTER_ACCESS_H
+/// addresses are those of an `brd_bxcan_registers_t` that was told by `register_access_connect`; its memory is never touched.
+#ifndef BRD_REGISTER_ACCESS_H
+#define BRD_REGISTER_ACCESS_H
 
 #include <stdint.h>
 
-typedef volatile uint32_t iw_register_t;
+typedef volatile uint32_t brd_register_t;
 
-uint32_t iw_register_read(const iw_register_t *address);
-void iw_register_write(iw_register_t *address, uint32_t value);
+uint32_t brd_register_read(const brd_register_t *address);
+void brd_register_write(brd_register_t *address, uint32_t value);
 
 #endif

@@ -19,27 +19,27 @@ static char *ring;
 static uint32_t ring_length, ring_left, outgoing_left;
 static const char *outgoing;
 
-void iw_serial_dma_start(volatile uint32_t *data, char *buffer, uint32_t length) {
+void brd_serial_dma_start(volatile uint32_t *data, char *buffer, uint32_t length) {
     data_register = data;
     ring = buffer;
     ring_length = ring_left = length;
 }
 
-uint32_t iw_serial_dma_left(void) {
+uint32_t brd_serial_dma_left(void) {
     return ring_left;
 }
 
-void iw_serial_dma_send(volatile uint32_t *data, const char *bytes, uint32_t length) {
+void brd_serial_dma_send(volatile uint32_t *data, const char *bytes, uint32_t length) {
     data_register = data;
     outgoing = bytes;
     outgoing_left = length;
 }
 
-bool iw_serial_dma_sends(void) {
+bool brd_serial_dma_sends(void) {
     return outgoing_left > 0U;
 }
 
-void iw_serial_dma_acknowledge(void) {}
+void brd_serial_dma_acknowledge(void) {}
 
 static void move_bytes(void) {
     if ((SR & RXNE) != 0U) {
@@ -55,19 +55,19 @@ static void move_bytes(void) {
 // ---- the program --------------------------------------------------------------------------------------------------
 
 static void console(void) {
-    iw_console_start(HZ);
-    iw_console_text("console ");
-    iw_console_number(115200);
-    iw_console_text("\n");
-    while (iw_console_step()) {
+    brd_console_start(HZ);
+    brd_console_text("console ");
+    brd_console_number(115200);
+    brd_console_text("\n");
+    while (brd_console_step()) {
     }
-    while (!iw_console_asked()) { // Any character.
+    while (!brd_console_asked()) { // Any character.
     }
 }
 
 static void step(void) {
     move_bytes();
-    iw_serial_step();
+    brd_serial_step();
 }
 
 /// Each line comes back, from the ring and from a buffer that is lent, in that order; "end" ends it.
@@ -76,25 +76,25 @@ int main(void) {
     static char copy[600];
     size_t length = 0;
     console();
-    iw_serial_start(HZ);
-    (void)iw_serial_write("serial\n", 7);
+    brd_serial_start(HZ);
+    (void)brd_serial_write("serial\n", 7);
     for (;;) {
         step();
-        if (iw_serial_read(&line[length], 1) == 0U || line[length++] != '\n') {
+        if (brd_serial_read(&line[length], 1) == 0U || line[length++] != '\n') {
             length %= sizeof line;
             continue;
         }
-        while (iw_serial_lends() || iw_serial_room() < length) {
+        while (brd_serial_lends() || brd_serial_room() < length) {
             step();
         }
         memcpy(copy, line, length);
-        (void)iw_serial_write(line, length);
-        (void)iw_serial_lend(copy, length);
-        while (!iw_serial_is_idle()) {
+        (void)brd_serial_write(line, length);
+        (void)brd_serial_lend(copy, length);
+        while (!brd_serial_is_idle()) {
             step();
         }
         if (strncmp(line, "end\n", 4) == 0) {
-            exit(iw_serial_had_error() ? 1 : 0);
+            exit(brd_serial_had_error() ? 1 : 0);
         }
         length = 0;
     }

@@ -26,7 +26,7 @@ void sim_motion_default(sim_motion_config_t *out_config) {
 }
 
 void sim_motion_init(sim_motion_t *self, const sim_motion_config_t *config, iw_time_us_t now_us) {
-    *self = (sim_motion_t){.config = *config, .now_us = now_us, .heard_us = IW_NEVER};
+    *self = (sim_motion_t){.config = *config, .now_us = now_us, .received_us = IW_NEVER};
 }
 
 static int64_t clamp(int64_t value, int64_t bound) {
@@ -139,8 +139,8 @@ static void integrate(sim_motion_t *self, int64_t dt_us) {
 /// Where the next step of integration ends: nothing changes in the middle of one.
 static iw_time_us_t step_end_us(const sim_motion_t *self, iw_time_us_t to_us) {
     iw_time_us_t end_us = to_us;
-    if (self->driven && self->heard_us + IW_WHEEL_WATCHDOG_US < end_us) {
-        end_us = self->heard_us + IW_WHEEL_WATCHDOG_US;
+    if (self->driven && self->received_us + IW_WHEEL_WATCHDOG_US < end_us) {
+        end_us = self->received_us + IW_WHEEL_WATCHDOG_US;
     }
     return (end_us - self->now_us > STEP_MAX_US) ? self->now_us + STEP_MAX_US : end_us;
 }
@@ -158,19 +158,19 @@ void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
             integrate(self, (int64_t)(end_us - self->now_us));
         }
         self->now_us = end_us;
-        if (self->driven && end_us - self->heard_us >= IW_WHEEL_WATCHDOG_US) {
+        if (self->driven && end_us - self->received_us >= IW_WHEEL_WATCHDOG_US) {
             self->driven = false;
         }
     }
 }
 
-bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
+bool sim_motion_receive(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
     sim_motion_advance(self, now_us);
     if (self->config.accepted_type != SIM_TYPE_ANY && self->config.accepted_type != setpoint->type) {
         return false;
     }
     self->setpoint = *setpoint;
-    self->heard_us = now_us;
+    self->received_us = now_us;
     self->driven = true;
     self->setpoints += 1U;
     return true;

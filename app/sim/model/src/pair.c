@@ -88,16 +88,16 @@ static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_code
     if (self->wheel[IW_RIGHT].state == SIM_WHEEL_RUNNING) {
         int64_t const milli_rpm = (int64_t)speed->speed_rpm * 1000;
         sim_motion_config_t const *const config = &self->wheel[IW_RIGHT].motion.config;
-        sim_pose_hear_left(&self->pose, now_us, sim_motion_um_s_of_milli_rpm(config, milli_rpm));
+        sim_pose_receive_left(&self->pose, now_us, sim_motion_um_s_of_milli_rpm(config, milli_rpm));
     }
 }
 
-void sim_pair_hear(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+void sim_pair_receive(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     iw_codec_wheel_t told[IW_SIDES];
     iw_codec_kind_t const kind = iw_codec_decode(frame, told);
     iw_side_t const side = iw_codec_side(frame->id);
     if (kind == IW_CODEC_SETPOINT) {
-        sim_wheel_hear(&self->wheel[side], now_us, &told[side].setpoint);
+        sim_wheel_receive(&self->wheel[side], now_us, &told[side].setpoint);
     } else if (kind == IW_CODEC_SPEED && side == IW_LEFT) {
         hear_left_speed(self, now_us, &told[IW_LEFT].speed);
     }

@@ -20,7 +20,7 @@ static void follow_left(sim_pose_t *self, iw_time_us_t now_us) {
     self->now_us = now_us;
 }
 
-void sim_pose_hear_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s) {
+void sim_pose_receive_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s) {
     follow_left(self, now_us);
     self->left_heard_us = now_us;
     self->left_um_s = speed_um_s;

@@ -113,19 +113,19 @@ static bool lose(sim_wheel_t *self) {
 static void obey_late(sim_wheel_t *self, iw_time_us_t now_us) {
     while (self->late_count > 0U && self->late[self->late_first].at_us <= now_us) {
         sim_late_t const *const late = &self->late[self->late_first];
-        (void)sim_motion_hear(&self->motion, late->at_us, &late->setpoint);
+        (void)sim_motion_receive(&self->motion, late->at_us, &late->setpoint);
         self->late_first = (self->late_first + 1U) % SIM_WHEEL_LATE_MAX;
         self->late_count -= 1U;
     }
 }
 
-void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
+void sim_wheel_receive(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
     if (self->state != SIM_WHEEL_RUNNING || lose(self)) {
         return;
     }
     obey_late(self, now_us);
     if (self->late_us == 0U && self->late_count == 0U) {
-        (void)sim_motion_hear(&self->motion, now_us, setpoint);
+        (void)sim_motion_receive(&self->motion, now_us, setpoint);
     } else if (self->late_count < SIM_WHEEL_LATE_MAX) {
         uint32_t const place = (self->late_first + self->late_count) % SIM_WHEEL_LATE_MAX;
         self->late[place] = (sim_late_t){now_us + self->late_us, *setpoint};

@@ -107,7 +107,7 @@ bool sim_world_step(sim_world_t *self, iw_time_us_t now_us, sim_delivery_t *out_
         }
         step_senders(self, at_us);
         if (sim_bus_step(&self->bus, at_us, out_delivery)) {
-            sim_pair_hear(&self->pair, at_us, &out_delivery->frame);
+            sim_pair_receive(&self->pair, at_us, &out_delivery->frame);
             return true;
         }
     }

@@ -44,20 +44,20 @@ typedef enum {
 
 /// What is known of a wheel. What is short stands first: a Cortex-M reaches it by shorter instructions.
 typedef struct {
-    const iw_config_t *config;   ///< The owner's.
-    iw_side_t side;              ///< Which wheel this is.
-    iw_reboot_t pending_reboot;  ///< Not yet taken.
-    bool boot_seen;              ///< This run of the wheel began while we were listening, not before.
-    iw_time_us_t first_us;       ///< First heard; IW_NEVER: not yet.
-    iw_time_us_t offset_us;      ///< Last offset frame of this run, or its start.
-    iw_time_us_t any_us;         ///< Last frame of any kind, or the end of our own stall, or the start.
-    iw_time_us_t heard_us;       ///< Last speed frame that counted for liveness; IW_NEVER: none yet.
-    iw_time_us_t heard_until_us; ///< Without another one it is heard until here; 0: none yet.
-    iw_time_us_t speed_us;       ///< Last speed frame.
-    iw_time_us_t status_us;      ///< Last status frame.
-    iw_time_us_t rest_since_us;  ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
-    iw_time_us_t excused_us;     ///< Our own stall ended here: silence before it is not the wheel's.
-    int64_t ticks;               ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
+    const iw_config_t *config;      ///< The owner's.
+    iw_side_t side;                 ///< Which wheel this is.
+    iw_reboot_t pending_reboot;     ///< Not yet taken.
+    bool boot_seen;                 ///< This run of the wheel began while we were listening, not before.
+    iw_time_us_t first_us;          ///< First heard; IW_NEVER: not yet.
+    iw_time_us_t offset_us;         ///< Last offset frame of this run, or its start.
+    iw_time_us_t any_us;            ///< Last frame of any kind, or the end of our own stall, or the start.
+    iw_time_us_t received_us;       ///< Last speed frame that counted for liveness; IW_NEVER: none yet.
+    iw_time_us_t received_until_us; ///< Without another one it is heard until here; 0: none yet.
+    iw_time_us_t speed_us;          ///< Last speed frame.
+    iw_time_us_t status_us;         ///< Last status frame.
+    iw_time_us_t rest_since_us;     ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
+    iw_time_us_t excused_us;        ///< Our own stall ended here: silence before it is not the wheel's.
+    int64_t ticks;                  ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
     /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
     int32_t nm_per_tick;
     uint32_t um_s_per_rpm;    ///< Speed in um/s at 1 rpm of its telemetry.
@@ -72,16 +72,16 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
 
 /// Takes a message from this wheel: `told` has its values. `fresh` is false in a late step, when the time of reception
 /// is unknown: values are then taken, but the wheel's silence does not end and no run of rest begins.
-void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
-                   bool fresh);
+void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+                      bool fresh);
 
 /// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
 /// a fresh speed frame in between it extends nothing.
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us);
 
 /// True if its speed was heard less than `wheel_silent_ms` ago.
-static inline bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us) {
-    return now_us < self->heard_until_us;
+static inline bool iw_wheel_online(const iw_wheel_t *self, iw_time_us_t now_us) {
+    return now_us < self->received_until_us;
 }
 
 /// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.

@@ -152,10 +152,10 @@ static bool read_side(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refu
     return true;
 }
 
-static bool read_item(iwn_json_t value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        if (iwn_json_is(value, iwn_ledger_item_name((iw_ledger_item_t)item))) {
-            *target = (iw_ledger_item_t)item;
+static bool read_item(iwn_json_t value, iw_assumption_item_t *target, iwn_refusal_t *out_refusal) {
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        if (iwn_json_is(value, iwn_assumption_item_name((iw_assumption_item_t)item))) {
+            *target = (iw_assumption_item_t)item;
             return true;
         }
     }
@@ -192,7 +192,7 @@ static bool read_field(const field_t *field, iwn_json_t value, iwn_request_t *re
     case SIDE:
         return read_side(value, (uint8_t *)target, out_refusal);
     case ITEM:
-        return read_item(value, (iw_ledger_item_t *)target, out_refusal);
+        return read_item(value, (iw_assumption_item_t *)target, out_refusal);
     case VALUE:
         return read_value(field, value, (char *)target, out_refusal);
     case INTEGER:

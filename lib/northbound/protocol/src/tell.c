@@ -12,18 +12,18 @@ static bool is_fresh(iw_time_us_t now_us, iw_time_us_t then_us) {
     return then_us != IW_NEVER && now_us - then_us < IWN_STATUS_STALE_US;
 }
 
-static bool contradicted(const iw_snapshot_t *seen, iw_ledger_item_t item) {
-    return seen->assumed[item].state == IW_LEDGER_CONTRADICTED;
+static bool contradicted(const iw_snapshot_t *seen, iw_assumption_item_t item) {
+    return seen->assumed[item].state == IW_CONTRADICTED;
 }
 
 /// Whether speeds in mm/s, or distances, mean anything: they rest on radius and gear ratio.
 static bool is_speed_known(const iw_snapshot_t *seen) {
-    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) &&
-           !(seen->config->rpm_of_rotor && contradicted(seen, IW_LEDGER_GEAR_RATIO));
+    return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) &&
+           !(seen->config->rpm_of_rotor && contradicted(seen, IW_ASSUMPTION_GEAR_RATIO));
 }
 
 static bool is_distance_known(const iw_snapshot_t *seen) {
-    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) && !contradicted(seen, IW_LEDGER_GEAR_RATIO);
+    return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) && !contradicted(seen, IW_ASSUMPTION_GEAR_RATIO);
 }
 
 static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
@@ -91,7 +91,7 @@ static bool at_limit(int16_t value) {
 
 static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
-    const bool fresh = is_fresh(seen->at_us, seen->pose_us) && !contradicted(seen, IW_LEDGER_POSE_BYTE_ORDER);
+    const bool fresh = is_fresh(seen->at_us, seen->pose_us) && !contradicted(seen, IW_ASSUMPTION_POSE_BYTE_ORDER);
     iwn_out_open(json, "pose", '{');
     iwn_out_known32(json, "x_mm", fresh, pose->x_mm);
     iwn_out_known32(json, "y_mm", fresh, pose->y_mm);

@@ -47,8 +47,8 @@ static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t 
         zero.judged = true;
         zero.contaminated = false;
     } else if (force->provenance == IW_OFFSET_WHEEL) { // We judge what we saw: its first two seconds, or its rest now.
-        const bool doubted = force->evidence == IW_UNIT_UNCLEAR;
-        zero.judged = doubted || force->evidence != IW_UNIT_UNKNOWN || (force->boot_seen && window);
+        const bool doubted = force->observation == IW_UNIT_UNCLEAR;
+        zero.judged = doubted || force->observation != IW_UNIT_UNKNOWN || (force->boot_seen && window);
         zero.contaminated = doubted;
     }
     return zero;
@@ -98,7 +98,7 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
     if (!alone) {
         iwn_out_known32(json, "offset_drift_mN", zero.measured, zero.drift_mN);
         iwn_out_known32(json, "wheel_offset_mN", force->wheel_offset_heard, (int32_t)force->wheel_offset_dN * 100);
-        iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
+        iwn_out_text(json, "unit_evidence", iwn_unit_observation_name(force->observation));
     }
 }
 

@@ -108,19 +108,19 @@ const char *iwn_window_name(iw_window_t window) {
     return PICK(names, window);
 }
 
-const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence) {
+const char *iwn_unit_observation_name(iw_unit_observation_t observation) {
     static const char *const names[] = {
         [IW_UNIT_UNKNOWN] = "unknown", [IW_UNIT_CN] = "cN",
         [IW_UNIT_DN] = "dN",           [IW_UNIT_OFFSET_REMOVED] = "offset_removed",
         [IW_UNIT_UNCLEAR] = "unclear",
     };
-    return PICK(names, evidence);
+    return PICK(names, observation);
 }
 
 const char *iwn_force_validity_name(iw_force_validity_t validity) {
     static const char *const names[] = {
         [IW_FORCE_VALID] = "valid",
-        [IW_FORCE_NOT_HEARD] = "not_heard",
+        [IW_FORCE_NO_TELEMETRY] = "not_heard",
         [IW_FORCE_SATURATED] = "saturated",
         [IW_FORCE_NO_OFFSET] = "no_offset",
         [IW_FORCE_UNIT_CONTRADICTED] = "unit_contradicted",
@@ -130,45 +130,45 @@ const char *iwn_force_validity_name(iw_force_validity_t validity) {
     return PICK(names, validity);
 }
 
-const char *iwn_ledger_item_name(iw_ledger_item_t item) {
-    static const char *const names[IW_LEDGER_ITEMS] = {
-        [IW_LEDGER_SETPOINT_TYPE] = "setpoint_type",
-        [IW_LEDGER_CURRENT_ROLE] = "current_role",
-        [IW_LEDGER_FORCE_UNIT_LEFT] = "force_unit_left",
-        [IW_LEDGER_FORCE_UNIT_RIGHT] = "force_unit_right",
-        [IW_LEDGER_OFFSET_INCLUDED] = "offset_included",
-        [IW_LEDGER_FEEDBACK_SIGN_LEFT] = "feedback_sign_left",
-        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] = "feedback_sign_right",
-        [IW_LEDGER_MOUNT_SIGN_LEFT] = "mount_sign_left",
-        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "mount_sign_right",
-        [IW_LEDGER_WHEEL_RADIUS] = "wheel_radius",
-        [IW_LEDGER_TRACK] = "track",
-        [IW_LEDGER_GEAR_RATIO] = "gear_ratio",
-        [IW_LEDGER_POSE_BYTE_ORDER] = "pose_byte_order",
-        [IW_LEDGER_DLC] = "dlc",
+const char *iwn_assumption_item_name(iw_assumption_item_t item) {
+    static const char *const names[IW_ASSUMPTION_ITEMS] = {
+        [IW_ASSUMPTION_SETPOINT_TYPE] = "setpoint_type",
+        [IW_ASSUMPTION_CURRENT_ROLE] = "current_role",
+        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = "force_unit_left",
+        [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = "force_unit_right",
+        [IW_ASSUMPTION_OFFSET_INCLUDED] = "offset_included",
+        [IW_ASSUMPTION_FEEDBACK_SIGN_LEFT] = "feedback_sign_left",
+        [IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT] = "feedback_sign_right",
+        [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "mount_sign_left",
+        [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "mount_sign_right",
+        [IW_ASSUMPTION_WHEEL_RADIUS] = "wheel_radius",
+        [IW_ASSUMPTION_TRACK] = "track",
+        [IW_ASSUMPTION_GEAR_RATIO] = "gear_ratio",
+        [IW_ASSUMPTION_POSE_BYTE_ORDER] = "pose_byte_order",
+        [IW_ASSUMPTION_DLC] = "dlc",
     };
     return PICK(names, item);
 }
 
-bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
-            *out_item = (iw_ledger_item_t)item;
+bool iwn_assumption_item_of(const char *name, iw_assumption_item_t *out_item) {
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        if (strcmp(name, iwn_assumption_item_name((iw_assumption_item_t)item)) == 0) {
+            *out_item = (iw_assumption_item_t)item;
             return true;
         }
     }
     return false;
 }
 
-const char *iwn_ledger_state_name(iw_ledger_state_t state) {
+const char *iwn_assumption_state_name(iw_assumption_state_t state) {
     static const char *const names[] = {"assumed", "confirmed", "contradicted"};
     return PICK(names, state);
 }
 
-const char *iwn_evidence_name(iw_evidence_t evidence) {
+const char *iwn_source_name(iw_source_t source) {
     static const char *const names[] = {
-        [IW_EVIDENCE_NONE] = "none", [IW_EVIDENCE_DOCUMENT] = "document", [IW_EVIDENCE_CONFIGURATION] = "configuration",
-        [IW_EVIDENCE_BUS] = "bus",   [IW_EVIDENCE_OPERATOR] = "operator",
+        [IW_SOURCE_NONE] = "none", [IW_SOURCE_DOCUMENT] = "document", [IW_SOURCE_CONFIGURATION] = "configuration",
+        [IW_SOURCE_BUS] = "bus",   [IW_SOURCE_OPERATOR] = "operator",
     };
-    return PICK(names, evidence);
+    return PICK(names, source);
 }

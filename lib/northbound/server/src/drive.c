@@ -70,7 +70,7 @@ void iwn_server_drive(iwn_server_t *self, iwn_client_t *client) {
 static void refuse_turn(iwn_server_t *self, iwn_client_t *client) {
     const iw_drive_t turn = {.speed_mm_s = {-1, 1}};
     self->refusal.error = IWN_DENIED;
-    iwn_target_contradiction(self, IW_LEDGER_TRACK, self->refusal.message, sizeof self->refusal.message);
+    iwn_target_contradiction(self, IW_ASSUMPTION_TRACK, self->refusal.message, sizeof self->refusal.message);
     refuse_unjudged(self, client, &turn);
 }
 
@@ -83,7 +83,7 @@ void iwn_server_twist(iwn_server_t *self, iwn_client_t *client) {
     const int64_t v_mm_s = limit(self->request.v_mm_s);
     const int64_t yaw_mrad_s = limit(self->request.yaw_mrad_s);
     const iw_snapshot_t *const seen = iwn_server_look(self);
-    if (yaw_mrad_s != 0 && seen->assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
+    if (yaw_mrad_s != 0 && seen->assumed[IW_ASSUMPTION_TRACK].state == IW_CONTRADICTED) {
         refuse_turn(self, client);
         return;
     }

@@ -59,7 +59,7 @@ static uint32_t faults_of(const iwn_server_t *self, const iw_snapshot_t *seen) {
 
 /// Not a fault `rolling` that begins too soon after the last one.
 static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen) {
-    iwn_told_t *const told = &self->told;
+    iwn_reported_t *const told = &self->told;
     const bool again = told->rolling_us != 0U && self->now_us - told->rolling_us < IWN_ROLLING_FAULT_US;
     if (seen->rolling_fault == told->rolling_fault || (seen->rolling_fault && again)) {
         return;
@@ -74,7 +74,7 @@ static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen)
 
 /// While armed or stopping a cause makes a stop, which is reported as such; these are the others.
 static void observe_faults(iwn_server_t *self, const iw_snapshot_t *seen) {
-    iwn_told_t *const told = &self->told;
+    iwn_reported_t *const told = &self->told;
     const uint32_t present = faults_of(self, seen);
     const uint32_t changed = present ^ told->present;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; cause++) {
@@ -157,7 +157,7 @@ static void observe_lease(iwn_server_t *self, const iw_snapshot_t *seen) {
 }
 
 static void observe_state(iwn_server_t *self, const iw_snapshot_t *seen, bool first) {
-    iwn_told_t *const told = &self->told;
+    iwn_reported_t *const told = &self->told;
     const bool changed = seen->state != told->state || first;
     if (!changed && seen->holding == told->holding) {
         return;

@@ -90,7 +90,7 @@ void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
     iwn_tell_machine(seen, &around, json);
-    iwn_target_write_learnt(self, seen, json);
+    iwn_target_write_assumptions(self, seen, json);
     iwn_tell_rest(seen, &around, json);
 }
 

@@ -44,12 +44,12 @@ typedef struct {
 
 typedef struct {
     sim_motion_config_t config;
-    iw_time_us_t now_us;   ///< Advanced to here.
-    iw_time_us_t heard_us; ///< When the last setpoint was taken; IW_NEVER: never.
-    int64_t position_nm;   ///< At the firmware's radius, since the start of the simulation.
-    int64_t tick_rest;     ///< Way not yet counted as a tick.
-    int64_t push_nm;       ///< Way that a hand still turns the wheel, whatever it is told; at the firmware's radius.
-    int32_t speed_um_s;    ///< At the firmware's radius, in the wheel's own sense of rotation.
+    iw_time_us_t now_us;      ///< Advanced to here.
+    iw_time_us_t received_us; ///< When the last setpoint was taken; IW_NEVER: never.
+    int64_t position_nm;      ///< At the firmware's radius, since the start of the simulation.
+    int64_t tick_rest;        ///< Way not yet counted as a tick.
+    int64_t push_nm;          ///< Way that a hand still turns the wheel, whatever it is told; at the firmware's radius.
+    int32_t speed_um_s;       ///< At the firmware's radius, in the wheel's own sense of rotation.
     int32_t accel_mm_s2;
     int32_t motor_mm_s2;       ///< What its own motor adds.
     int32_t other_motor_mm_s2; ///< The same of the other wheel: written by the pair.
@@ -75,7 +75,7 @@ void sim_motion_init(sim_motion_t *self, const sim_motion_config_t *config, iw_t
 void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us);
 
 /// Takes a setpoint at `now_us`. False: not of the accepted type, ignored.
-bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
+bool sim_motion_receive(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
 
 /// Forgets the setpoint: no power, or the firmware starts anew. The wheel coasts.
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us);

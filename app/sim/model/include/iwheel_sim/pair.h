@@ -9,7 +9,7 @@
 ///
 ///     sim_pair_init(&pair, NULL, now_us, seed);
 ///     while (sim_pair_step(&pair, now_us, &sent)) { put sent.frame on the bus; }
-///     for each frame that was on the bus, the pair's own too: sim_pair_hear(&pair, now_us, &frame);
+///     for each frame that was on the bus, the pair's own too: sim_pair_receive(&pair, now_us, &frame);
 ///     sleep until sim_pair_next_us(&pair) or the next frame
 ///
 /// The pair hears its own frames because the right wheel needs the left one's speed for the pose.
@@ -62,7 +62,7 @@ iw_time_us_t sim_pair_next_us(const sim_pair_t *self);
 
 /// A frame was on the bus. All that is due before `now_us` must have been taken with `step`. Frames that mean nothing
 /// to the wheels are ignored: other ids, remote, extended, FD, error, too short.
-void sim_pair_hear(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
+void sim_pair_receive(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 
 /// True if a wheel is there to acknowledge frames.
 bool sim_pair_acknowledges(const sim_pair_t *self);

@@ -31,7 +31,7 @@ typedef struct {
 void sim_pose_restart(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);
 
 /// The left wheel's speed was heard.
-void sim_pose_hear_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s);
+void sim_pose_receive_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s);
 
 /// Brings the pose up to now and tells it.
 iw_codec_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);

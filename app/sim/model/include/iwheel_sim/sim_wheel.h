@@ -94,7 +94,7 @@ void sim_wheel_age(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us);
 void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 
 /// A setpoint for this wheel was on the bus.
-void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
+void sim_wheel_receive(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
 
 /// A message that a wheel sends: `told` has its values.
 typedef struct {

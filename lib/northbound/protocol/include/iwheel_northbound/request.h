@@ -81,7 +81,7 @@ typedef struct {
     bool commit;                            ///< Of config, with `has_commit`.
     uint8_t topics;                         ///< Bit per iwn_topic_t.
     uint8_t sides;                          ///< IW_SIDES_..., of tare.
-    iw_ledger_item_t item;                  ///< Of confirm.
+    iw_assumption_item_t item;              ///< Of confirm.
     char value[IWN_VALUE_SIZE];             ///< Of confirm and config, a number in decimal digits; empty: not given.
     char how[IWN_HOW_SIZE];                 ///< Of confirm; empty: not given.
     char name[IWN_NAME_MAX + 1U];           ///< Empty: not given.

@@ -81,16 +81,16 @@ const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offs
 /// Such as "good".
 const char *iwn_window_name(iw_window_t window);
 /// Such as "cN".
-const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence);
+const char *iwn_unit_observation_name(iw_unit_observation_t source);
 /// Such as "valid".
 const char *iwn_force_validity_name(iw_force_validity_t validity);
 /// Such as "setpoint_type".
-const char *iwn_ledger_item_name(iw_ledger_item_t item);
+const char *iwn_assumption_item_name(iw_assumption_item_t item);
 /// False if no item has that name.
-bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item);
+bool iwn_assumption_item_of(const char *name, iw_assumption_item_t *out_item);
 /// Such as "assumed".
-const char *iwn_ledger_state_name(iw_ledger_state_t state);
+const char *iwn_assumption_state_name(iw_assumption_state_t state);
 /// Such as "document".
-const char *iwn_evidence_name(iw_evidence_t evidence);
+const char *iwn_source_name(iw_source_t source);
 
 #endif

@@ -54,7 +54,7 @@ typedef struct {
     bool holding;
     bool rolling;
     bool rolling_fault;
-} iwn_told_t;
+} iwn_reported_t;
 
 /// Small members first: a microcontroller reaches them by shorter instructions.
 typedef struct iwn_server {
@@ -76,7 +76,7 @@ typedef struct iwn_server {
     // Read by the caller.
     iw_time_us_t stopped_us, estopped_us; ///< When a client asked last; 0: never.
     iw_client_t stopped_by, estopped_by;  ///< Which client that was.
-    iwn_told_t told;
+    iwn_reported_t told;
     iw_snapshot_t seen;        ///< Of iwn_server_look.
     iwn_request_t request;     ///< Set by the caller before iwn_server_request.
     iwn_stop_note_t last_stop; ///< The last stop, with its sentence.

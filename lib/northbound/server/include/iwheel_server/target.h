@@ -99,10 +99,10 @@ iwn_surroundings_t iwn_target_around(iwn_server_t *self, const iw_snapshot_t *se
 void iwn_target_describe(iwn_server_t *self, iw_refusal_t refusal, iwn_refuse_context_t *context);
 
 /// What contradicts the assumption, and what it costs, as a message.
-void iwn_target_contradiction(iwn_server_t *self, iw_ledger_item_t item, char *out_text, size_t size);
+void iwn_target_contradiction(iwn_server_t *self, iw_assumption_item_t item, char *out_text, size_t size);
 
 /// The objects `ledger`, `memory` and `gaps` of a status.
-void iwn_target_write_learnt(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json);
+void iwn_target_write_assumptions(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json);
 
 /// More fields of the reply to `arm`.
 void iwn_target_write_terms(iwn_server_t *self, const iwn_client_t *client, iwn_out_t *json);

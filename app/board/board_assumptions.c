@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "board_assumptions.h"
+
+#include <string.h>
+
+#define STATE(item)    ((iw_assumption_state_t)((item)&15U))
+#define EVIDENCE(item) ((iw_source_t)((item) >> 4))
+/// The furthest raw force in cN that is not saturated: no wheel's zero lies beyond.
+#define ZERO_MAX_mN 327660
+
+const char *brd_assumptions_key(iw_assumption_item_t item) {
+    static const char *const keys[IW_ASSUMPTION_ITEMS] = {
+        [IW_ASSUMPTION_SETPOINT_TYPE] = "wheels.setpoint_type", [IW_ASSUMPTION_CURRENT_ROLE] = "wheels.current_role",
+        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = "left.force_unit",    [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = "right.force_unit",
+        [IW_ASSUMPTION_MOUNT_SIGN_LEFT] = "left.invert",        [IW_ASSUMPTION_MOUNT_SIGN_RIGHT] = "right.invert",
+        [IW_ASSUMPTION_WHEEL_RADIUS] = "wheels.radius_mm",      [IW_ASSUMPTION_TRACK] = "wheels.track_mm",
+        [IW_ASSUMPTION_GEAR_RATIO] = "wheels.gear_ratio",
+    };
+    return keys[item];
+}
+
+static bool has_value(const char *key, const brd_settings_t *one, const brd_settings_t *other) {
+    char value[BRD_SETTINGS_TEXT];
+    char wanted[BRD_SETTINGS_TEXT];
+    return brd_settings_value(one, key, value) && brd_settings_value(other, key, wanted) && strcmp(value, wanted) == 0;
+}
+
+/// Evidence for another value than the one in force is worth nothing.
+static bool is_for(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *now) {
+    const char *const key = brd_assumptions_key(item);
+    return (key == NULL || has_value(key, found, now)) &&
+           (item != IW_ASSUMPTION_GEAR_RATIO || has_value("wheels.rpm_of", found, now));
+}
+
+static iw_assumption_item_t unit_of(unsigned side) {
+    return (side == (unsigned)IW_LEFT) ? IW_ASSUMPTION_FORCE_UNIT_LEFT : IW_ASSUMPTION_FORCE_UNIT_RIGHT;
+}
+
+brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window) {
+    return (brd_assumptions_zero_t){.offset_mN = force->offset_mN,
+                                    .drift_mN = (int16_t)window->drift_mN, // A window that gives a zero is a quiet one.
+                                    .deviation_mN = (uint16_t)window->deviation_mN,
+                                    .from = (uint8_t)force->provenance};
+}
+
+void brd_assumptions_note(brd_assumptions_t *self, const iw_snapshot_t *seen, const brd_settings_t *settings,
+                          const brd_assumptions_zero_t zero[IW_SIDES]) {
+    memset(self, 0, sizeof *self);
+    self->settings = *settings;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        self->zero[side] = zero[side];
+    }
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        const iw_assumption_entry_t *const entry = &seen->assumed[item];
+        if (entry->state != IW_ASSUMED) {
+            self->item[item] = (uint8_t)((unsigned)entry->state | (unsigned)entry->source << 4);
+            self->figure[item] = entry->figure;
+        }
+    }
+}
+
+void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t *settings, iw_gateway_t *gateway,
+                             brd_assumptions_zero_t out_zero[IW_SIDES]) {
+    for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {
+        const iw_assumption_item_t item = (iw_assumption_item_t)i;
+        const iw_assumption_entry_t entry = {STATE(self->item[i]), EVIDENCE(self->item[i]), self->figure[i]};
+        if (is_for(item, &self->settings, settings)) {
+            iw_gateway_set_assumption(gateway, item, &entry);
+        }
+    }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const brd_assumptions_zero_t *const zero = &self->zero[side];
+        const bool can_be = zero->from > IW_OFFSET_STORED && zero->from <= IW_OFFSET_OPERATOR &&
+                            zero->offset_mN >= -ZERO_MAX_mN && zero->offset_mN <= ZERO_MAX_mN;
+        out_zero[side] = (brd_assumptions_zero_t){.from = IW_OFFSET_NONE};
+        if (can_be && is_for(unit_of(side), &self->settings, settings)) {
+            out_zero[side] = *zero;
+            iw_gateway_restore_offset(gateway, (iw_side_t)side,
+                                      (zero->from == IW_OFFSET_OPERATOR) ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
+                                      zero->offset_mN);
+        }
+    }
+}
+
+static bool is_another_zero(const brd_assumptions_zero_t *now, const brd_assumptions_zero_t *kept) {
+    const int32_t moved = now->offset_mN - kept->offset_mN;
+    const bool tared = now->from == IW_OFFSET_OPERATOR || kept->from == IW_OFFSET_OPERATOR;
+    return (now->from == IW_OFFSET_NONE) != (kept->from == IW_OFFSET_NONE) || moved > BRD_ASSUMPTIONS_MOVED_mN ||
+           moved < -BRD_ASSUMPTIONS_MOVED_mN || (tared && (now->from != kept->from || moved != 0));
+}
+
+bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *kept) {
+    bool differs = memcmp(now->item, kept->item, sizeof now->item) != 0;
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        differs =
+            differs || (now->item[item] != 0U && !is_for((iw_assumption_item_t)item, &now->settings, &kept->settings));
+    }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        differs = differs || is_another_zero(&now->zero[side], &kept->zero[side]) ||
+                  (now->zero[side].from != IW_OFFSET_NONE && !is_for(unit_of(side), &now->settings, &kept->settings));
+    }
+    return differs;
+}

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+#include "slots.h"
+
+#include "log.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+const sock_part_t sock_parts[SOCK_PARTS] = {
+    [SOCK_DRIVE] = {0U, SOCK_DRIVERS_MAX},
+    [SOCK_WATCH] = {SOCK_DRIVERS_MAX, SOCK_WATCHERS_MAX},
+    [SOCK_STOP] = {SOCK_DRIVERS_MAX + SOCK_WATCHERS_MAX, SOCK_RIGHTS *SOCK_STOP_SLOTS},
+};
+
+/// A line of anything else is not worth reading any more.
+static bool may_stop(const char *line, size_t length) {
+    return memmem(line, length, "stop", 4U) != NULL || memmem(line, length, "disarm", 6U) != NULL;
+}
+
+/// What it had said already and nobody has looked at: of that the stops are carried out still.
+static void hear_out(sock_clients_t *self, sock_client_t *client) {
+    const char *line = client->in;
+    size_t left = client->in_length;
+    unsigned heard = 0;
+    const char *end;
+    while (heard < SOCK_LAST_LINES && (end = (const char *)memchr(line, '\n', left)) != NULL) {
+        const size_t length = (size_t)(end - line);
+        if (may_stop(line, length)) {
+            self->handler.carry_out(self->handler.context, client, line, length);
+            heard++;
+        }
+        left -= length + 1U;
+        line = end + 1;
+    }
+    client->in_length = 0;
+}
+
+void sock_service_finish(sock_clients_t *self, sock_client_t *client) {
+    const iw_time_us_t until_us = client->close_us;
+    sock_client_finish(client, self->now_us);
+    if (client->right == SOCK_STOP) {
+        client->close_us = until_us;
+    }
+    hear_out(self, client);
+    self->handler.leave(self->handler.context, client);
+}
+
+void sock_service_release(sock_clients_t *self, sock_client_t *client) {
+    sock_log(self->log, SOCK_LOG_DEBUG, "client %u (pid %d) closed", (unsigned)client->id, client->pid);
+    (void)close(client->fd);
+    client->id = IW_CLIENT_NONE;
+    self->count[client->right]--;
+    self->open[client->right] &=
+        ~(UINT64_C(1) << ((uint32_t)(client - self->client) - sock_parts[client->right].first));
+}
+
+static void refuse_long_line(sock_clients_t *self, sock_client_t *client) {
+    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    iwn_refusal_t refusal = {.error = IWN_LINE_TOO_LONG};
+    (void)snprintf(refusal.message, sizeof refusal.message,
+                   "a request has at most %u bytes and ends with a newline; the connection is closed", IWN_LINE_MAX);
+    sock_clients_refuse(self, client, &nobody, &refusal);
+    sock_service_finish(self, client);
+}
+
+static bool has_line(const sock_client_t *client) {
+    size_t length;
+    return !sock_client_is_closing(client) && !client->held && !client->said &&
+           sock_client_line(client, &length) != NULL;
+}
+
+/// A line of it may be carried out now. One that has hung up is done with at once.
+static bool has_turn(const sock_clients_t *self, const sock_client_t *client) {
+    const bool in_time = client->right != SOCK_WATCH || client->hung_up || self->now_us >= client->line_us;
+    return in_time && has_line(client);
+}
+
+/// After a pause as many as fit into one turn are carried out together.
+static void pace(sock_client_t *client, iw_time_us_t now_us) {
+    const iw_time_us_t saved_us = (iw_time_us_t)(SOCK_LINES_PER_CYCLE - 1U) * SOCK_WATCHER_LINE_US;
+    const bool rested = now_us >= client->line_us + saved_us;
+    client->line_us = (rested ? now_us - saved_us : client->line_us) + SOCK_WATCHER_LINE_US;
+}
+
+static void carry_out_lines(sock_clients_t *self, sock_client_t *client) {
+    for (unsigned i = 0; i < SOCK_LINES_PER_CYCLE && !sock_client_is_broken(client) && has_turn(self, client); i++) {
+        size_t length;
+        const char *line = sock_client_line(client, &length);
+        self->handler.carry_out(self->handler.context, client, line, length);
+        sock_client_drop_line(client, length);
+        client->said = client->right == SOCK_STOP;
+        pace(client, self->now_us);
+    }
+}
+
+/// Nothing of it is left to be done, but for a recording that it waits for and can take.
+static bool has_ended(const sock_client_t *client) {
+    const bool waits = client->owed && !client->hung_up;
+    return client->phase == SOCK_ENDED && (client->held || (!has_line(client) && !waits));
+}
+
+void sock_service_serve(sock_clients_t *self, sock_client_t *client) {
+    if (client->leaving) {
+        self->handler.leave(self->handler.context, client); // At once, whatever it has sent before.
+    }
+    if (client->readable || client->hung_up) {
+        sock_client_read(client);
+    }
+    carry_out_lines(self, client);
+    if (!sock_client_is_closing(client) && !client->held && sock_client_line_too_long(client)) {
+        refuse_long_line(self, client);
+    }
+    const bool done = client->said && !client->owed; // Its one line is answered.
+    const bool over = client->phase == SOCK_BROKEN || done || has_ended(client);
+    if (over && !sock_client_is_closing(client)) {
+        sock_service_finish(self, client);
+    }
+    if (client->hung_up && client->phase == SOCK_CLOSING) {
+        sock_client_break(client); // Nobody reads any more.
+    }
+    client->readable = false;
+}
+
+/// Somebody served in a round, and whether there was anything to do.
+typedef bool (*service_t)(sock_clients_t *self, sock_client_t *client);
+
+/// One round of all, and how far it came.
+typedef struct {
+    service_t service;
+    const sock_client_t *holder;
+    iw_time_us_t end_us; ///< Of the time for all but the first; 0: nobody had anything to do yet.
+} round_t;
+
+/// Those with one right, from where their last round ended, until the time is up. At least one of them is served. True if all
+/// were.
+static bool go_among(sock_clients_t *self, round_t *round, sock_right_t right, uint32_t *next) {
+    const uint64_t behind = UINT64_MAX << *next;
+    uint64_t left = self->open[right];
+    bool worked = false;
+    while (left != 0U) {
+        const uint32_t slot = (uint32_t)__builtin_ctzll(((left & behind) != 0U) ? left & behind : left);
+        left &= ~(UINT64_C(1) << slot);
+        sock_client_t *client = &self->client[sock_parts[right].first + slot];
+        const iw_time_us_t now_us = worked ? iwl_clock_now_us() : 0U;
+        if (round->end_us == 0U && worked) {
+            round->end_us = now_us + SOCK_ROUND_US;
+        }
+        if (worked && now_us >= round->end_us) {
+            *next = slot;
+            return false;
+        }
+        worked = (client != round->holder && round->service(self, client)) || worked;
+    }
+    return true;
+}
+
+/// Who has come only to stop first, then the holder of the lease, then who else may drive, then the watchers. True if all were
+/// served.
+static bool go_round(sock_clients_t *self, iw_client_t holder_id, service_t service, uint32_t next[SOCK_PARTS]) {
+    if ((self->open[SOCK_DRIVE] | self->open[SOCK_WATCH] | self->open[SOCK_STOP]) == 0U) {
+        return true; // Nobody is connected: most of a gateway's life.
+    }
+    sock_client_t *holder = sock_clients_find(self, holder_id);
+    round_t round = {.service = service, .holder = holder};
+    const bool stops = go_among(self, &round, SOCK_STOP, &next[SOCK_STOP]);
+    if (holder != NULL) {
+        (void)service(self, holder);
+    }
+    const bool all = go_among(self, &round, SOCK_DRIVE, &next[SOCK_DRIVE]);
+    return go_among(self, &round, SOCK_WATCH, &next[SOCK_WATCH]) && all && stops;
+}
+
+static bool serve_if_wanted(sock_clients_t *self, sock_client_t *client) {
+    const bool wanted = client->readable || client->hung_up || has_turn(self, client);
+    if (wanted) {
+        sock_service_serve(self, client);
+    }
+    return wanted;
+}
+
+void sock_service_first(sock_clients_t *self, sock_client_t *client) {
+    (void)serve_if_wanted(self, client);
+}
+
+void sock_service_clients(sock_clients_t *self, iw_client_t holder) {
+    self->some_wait = !go_round(self, holder, serve_if_wanted, self->next_served);
+    for (uint32_t i = sock_clients_from(self, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(self, i + 1U)) {
+        sock_client_t *client = &self->client[i];
+        if (!client->readable) {
+            sock_client_note_caught_up(client, self->now_us);
+        }
+    }
+    sock_service_poll_arrivals(self);
+}
+
+/// Reading is wanted unless there is no room or no use (a watcher whose next line has to wait wakes nobody with more of them);
+/// writing only while something waits.
+static void update_interest(sock_clients_t *self, sock_client_t *client) {
+    const bool reading = client->phase == SOCK_OPEN && client->in_length < sizeof client->in &&
+                         (client->right != SOCK_WATCH || !has_line(client));
+    const uint32_t wanted =
+        (reading ? (uint32_t)(EPOLLIN | EPOLLRDHUP) : 0U) | (sock_client_flushed(client) ? 0U : (uint32_t)EPOLLOUT);
+    if (wanted == client->interest) {
+        return;
+    }
+    struct epoll_event interest = {.events = wanted,
+                                   .data = {.u64 = SOCK_TAG_CLIENT + (uint64_t)(client - self->client)}};
+    client->interest = wanted;
+    (void)epoll_ctl(self->epoll_fd, EPOLL_CTL_MOD, client->fd, &interest);
+}
+
+bool sock_service_flush_one(sock_clients_t *self, sock_client_t *client) {
+    const bool waiting = !sock_client_flushed(client);
+    sock_client_flush(client);
+    if (client->phase == SOCK_BROKEN) {
+        sock_service_finish(self, client);
+    }
+    if (sock_client_is_closing(client) && (sock_client_flushed(client) || self->now_us >= client->close_us)) {
+        sock_service_release(self, client);
+    } else {
+        update_interest(self, client);
+    }
+    return waiting;
+}
+
+void sock_service_flush(sock_clients_t *self, iw_client_t holder) {
+    self->lines_wait = !go_round(self, holder, sock_service_flush_one, self->next_flushed);
+}
+
+bool sock_service_is_busy(const sock_clients_t *self) {
+    for (uint32_t i = sock_clients_from(self, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(self, i + 1U)) {
+        if (has_turn(self, &self->client[i])) {
+            return true;
+        }
+    }
+    return self->some_wait || self->lines_wait;
+}
+
+iw_time_us_t sock_service_next_us(const sock_clients_t *self) {
+    iw_time_us_t next_us = IW_NEVER;
+    for (unsigned right = 0; right < SOCK_RIGHTS; right++) {
+        const iw_time_us_t from_us = self->listener[right].from_us;
+        if (from_us != 0U && from_us < next_us) {
+            next_us = from_us;
+        }
+    }
+    for (uint32_t i = sock_clients_from(self, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(self, i + 1U)) {
+        const sock_client_t *client = &self->client[i];
+        if ((sock_client_is_closing(client) || client->right == SOCK_STOP) && client->close_us < next_us) {
+            next_us = client->close_us;
+        }
+        if (client->right == SOCK_WATCH && client->line_us < next_us && has_line(client)) {
+            next_us = client->line_us;
+        }
+    }
+    return next_us;
+}
+
+void sock_service_close_all(sock_clients_t *self) {
+    for (uint32_t i = sock_clients_from(self, 0U); i < SOCK_CLIENTS_MAX; i = sock_clients_from(self, i + 1U)) {
+        sock_service_release(self, &self->client[i]);
+    }
+}

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// Sections are those of RM0008 and RM0090: 7 reset and clock control. What is used here means the same in both.
+#include "board_clock.h"
+
+#include "board.h"
+
+#define REGISTER(address) (*(volatile uint32_t *)(address))
+
+#define RCC_CR   REGISTER(BRD_RCC_ADDRESS)
+#define RCC_CFGR REGISTER(BRD_RCC_CFGR_ADDRESS)
+#define RCC_CSR  REGISTER(BRD_RCC_CSR_ADDRESS)
+
+#define HSEON   (1U << 16) // 7.3.1 RCC_CR
+#define HSERDY  (1U << 17)
+#define HSEBYP  (1U << 18)
+#define CSSON   (1U << 19)
+#define PLLON   (1U << 24)
+#define PLLRDY  (1U << 25)
+#define SW      3U // RCC_CFGR: 7.3.2, F4 7.3.3
+#define SW_PLL  2U
+#define SWS     (3U << 2)
+#define SWS_PLL (2U << 2)
+#define RMVF    (1U << 24) // RCC_CSR: 7.3.10, F4 7.3.21
+#define PORRSTF (1U << 27)
+
+#define CRYSTAL_INPUT (BRD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
+
+// A poll takes 8 cycles at the least, on the internal oscillator: 1 ms. The PLL needs 0.3 ms at the most; the crystal
+// goes on starting between the calls.
+#define POLLS_MAX (BRD_INTERNAL_HZ / 8U / 1000U)
+
+bool brd_clock_wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t value) {
+    for (uint32_t poll = 0; poll < POLLS_MAX; poll++) {
+        if ((*flags & mask) == value) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool try_start(void) {
+    RCC_CR |= CRYSTAL_INPUT; // 7.2.1: the input's kind only while it is off.
+    RCC_CR |= HSEON;
+    if (!brd_clock_wait_for(&RCC_CR, HSERDY, HSERDY) || !brd_clock_prepare()) {
+        return false;
+    }
+    RCC_CR |= PLLON;
+    if (!brd_clock_wait_for(&RCC_CR, PLLRDY, PLLRDY)) {
+        return false;
+    }
+    RCC_CFGR |= SW_PLL;
+    return brd_clock_wait_for(&RCC_CFGR, SWS, SWS_PLL);
+}
+
+/// The crystal stays on after a failure: one that needs longer goes on starting while the call is repeated.
+bool brd_clock_start(void) {
+    if (try_start()) {
+        RCC_CR |= CSSON; // 7.2.7: a failing crystal raises the NMI and the internal oscillator takes over.
+        return true;
+    }
+    RCC_CFGR &= ~SW;
+    RCC_CR &= ~PLLON;
+    return false;
+}
+
+bool brd_clock_was_power_on(void) {
+    const bool was = (RCC_CSR & PORRSTF) != 0U;
+    RCC_CSR |= RMVF;
+    return was;
+}

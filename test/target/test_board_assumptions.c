@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: MIT
+// What a board keeps of its wheels: which of it comes back, which is forgotten, and what a power cut leaves.
+#include "gateway_rig.h"
+#include "unity.h"
+
+#include "board_records.h"
+#include "flash.h"
+
+#include <stddef.h>
+#include <string.h>
+
+static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
+static unsigned operations, cut_after, erasures;
+static gateway_rig_t rig;
+
+const volatile uint32_t *brd_flash_page(unsigned page) {
+    return flash[page];
+}
+
+bool brd_flash_erase(unsigned page) {
+    if (operations++ >= cut_after) {
+        return false;
+    }
+    erasures++;
+    memset(flash[page], 0xFF, sizeof flash[page]);
+    return true;
+}
+
+bool brd_flash_write(unsigned page, unsigned word, uint32_t value) {
+    if (operations++ >= cut_after) {
+        return false;
+    }
+    flash[page][word] = value;
+    return true;
+}
+
+void setUp(void) {
+    memset(flash, 0xFF, sizeof flash);
+    operations = erasures = 0;
+    cut_after = UINT32_MAX;
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+static brd_settings_t settings_of(const char *key, const char *value) {
+    char why[200];
+    iwn_text_t text = iwn_text_begin(why, sizeof why);
+    brd_settings_t settings = brd_settings_from(&rig.config);
+    TEST_ASSERT_TRUE_MESSAGE(key == NULL || brd_settings_set(&settings, key, value, &text), why);
+    return settings;
+}
+
+/// An operator's word, evidence of the bus, a tare on the left, the right wheel's own zero.
+static brd_assumptions_t something(void) {
+    static const iw_assumption_entry_t said = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
+    static const iw_assumption_entry_t seen = {IW_CONTRADICTED, IW_SOURCE_BUS, 10012};
+    static const brd_assumptions_zero_t zero[IW_SIDES] = {{12300, 3, 110, IW_OFFSET_OPERATOR},
+                                                          {-4500, 0, 0, IW_OFFSET_WHEEL}};
+    brd_assumptions_t learned;
+    const brd_settings_t settings = settings_of(NULL, NULL);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_TRACK, &said);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &said);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_DLC, &said);
+    iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_FORCE_UNIT_RIGHT, &seen);
+    const iw_snapshot_t now = gateway_rig_look(&rig);
+    brd_assumptions_note(&learned, &now, &settings, zero);
+    return learned;
+}
+
+/// Another run, with these settings. The gateway that knows what was kept.
+static iw_snapshot_t run_again(const brd_assumptions_t *learned, const brd_settings_t *settings,
+                               brd_assumptions_zero_t zero[IW_SIDES]) {
+    gateway_rig_begin(&rig, false);
+    brd_assumptions_restore(learned, settings, &rig.gateway, zero);
+    return gateway_rig_look(&rig);
+}
+
+static void test_learnt_same_settings_comes_back_with_its_provenance(void) {
+    const brd_assumptions_t learned = something();
+    const brd_settings_t settings = settings_of(NULL, NULL);
+    brd_assumptions_zero_t zero[IW_SIDES];
+    const iw_snapshot_t seen = run_again(&learned, &settings, zero);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, seen.assumed[IW_ASSUMPTION_TRACK].state);
+    TEST_ASSERT_EQUAL_INT(IW_SOURCE_OPERATOR, seen.assumed[IW_ASSUMPTION_TRACK].source);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, seen.assumed[IW_ASSUMPTION_FORCE_UNIT_RIGHT].state);
+    TEST_ASSERT_EQUAL_INT(10012, seen.assumed[IW_ASSUMPTION_FORCE_UNIT_RIGHT].figure);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, seen.assumed[IW_ASSUMPTION_WHEEL_RADIUS].state);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, seen.wheel[IW_LEFT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(12300, seen.wheel[IW_LEFT].force->offset_mN);
+    TEST_ASSERT_TRUE(seen.wheel[IW_LEFT].force->offset_us == IW_NEVER);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, seen.wheel[IW_RIGHT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(-4500, seen.wheel[IW_RIGHT].force->offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, zero[IW_RIGHT].from);
+    brd_assumptions_t again;
+    brd_assumptions_note(&again, &seen, &settings, zero);
+    TEST_ASSERT_FALSE_MESSAGE(brd_assumptions_differs(&again, &learned), "each start would write the same once more");
+}
+
+static void test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else(void) {
+    static const struct {
+        const char *key;
+        const char *value;
+        iw_assumption_item_t item;
+    } cases[] = {{"wheels.track_mm", "600", IW_ASSUMPTION_TRACK},
+                 {"wheels.gear_ratio", "2", IW_ASSUMPTION_GEAR_RATIO},
+                 {"wheels.rpm_of", "rotor", IW_ASSUMPTION_GEAR_RATIO},
+                 {"right.force_unit", "cN", IW_ASSUMPTION_FORCE_UNIT_RIGHT}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        const brd_assumptions_t learned = something();
+        const brd_settings_t settings = settings_of(cases[i].key, cases[i].value);
+        brd_assumptions_zero_t zero[IW_SIDES];
+        const iw_snapshot_t seen = run_again(&learned, &settings, zero);
+        unsigned known = 0;
+        for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+            known += (seen.assumed[item].state != IW_ASSUMED) ? 1U : 0U;
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IW_ASSUMED, seen.assumed[cases[i].item].state, cases[i].key);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(3, known, cases[i].key);
+        const bool unit = cases[i].item == IW_ASSUMPTION_FORCE_UNIT_RIGHT;
+        TEST_ASSERT_EQUAL_INT(unit ? IW_OFFSET_NONE : IW_OFFSET_STORED, seen.wheel[IW_RIGHT].force->provenance);
+        brd_assumptions_t again;
+        brd_assumptions_note(&again, &seen, &settings, zero);
+        TEST_ASSERT_TRUE(brd_assumptions_differs(&again, &learned));
+    }
+}
+
+static void test_learnt_zero_that_no_wheel_has_is_not_restored(void) {
+    brd_assumptions_t learned = something();
+    const brd_settings_t settings = settings_of(NULL, NULL);
+    brd_assumptions_zero_t zero[IW_SIDES];
+    learned.zero[IW_LEFT].offset_mN = 327661;
+    learned.zero[IW_RIGHT].from = 200;
+    const iw_snapshot_t seen = run_again(&learned, &settings, zero);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, seen.wheel[IW_LEFT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, seen.wheel[IW_RIGHT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, zero[IW_LEFT].from);
+}
+
+static void test_learnt_small_changes_are_not_worth_a_record(void) {
+    const brd_assumptions_t kept = something();
+    brd_assumptions_t now = kept;
+    now.figure[IW_ASSUMPTION_FORCE_UNIT_RIGHT]++;
+    now.zero[IW_RIGHT].offset_mN += BRD_ASSUMPTIONS_MOVED_mN;
+    now.zero[IW_RIGHT].from = IW_OFFSET_ESTIMATED;
+    TEST_ASSERT_FALSE(brd_assumptions_differs(&now, &kept));
+    now.zero[IW_RIGHT].offset_mN++;
+    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
+    now = kept;
+    now.zero[IW_LEFT].offset_mN++; // Of a tare every millinewton is.
+    TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
+}
+
+static brd_records_t power_on(void) {
+    brd_records_t kept = {.power_ons = 0};
+    cut_after = UINT32_MAX;
+    brd_records_open(&kept, true, false);
+    return kept;
+}
+
+static void test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was(void) {
+    const brd_settings_t settings = settings_of("wheels.track_mm", "540");
+    brd_assumptions_t learned = something();
+    brd_settings_t found;
+    brd_assumptions_t read;
+    brd_records_t kept = power_on();
+    TEST_ASSERT_FALSE(brd_records_assumptions(&kept, &read));
+    TEST_ASSERT_TRUE(brd_records_commit(&kept, &settings));
+    learned.zero[IW_LEFT].offset_mN = 0;
+    kept = power_on();
+    TEST_ASSERT_TRUE(brd_records_write_assumptions(&kept, &learned));
+    for (unsigned cut = 0; cut <= 64U; cut++) {
+        kept = power_on();
+        TEST_ASSERT_TRUE(brd_records_assumptions(&kept, &read));
+        const int32_t before = read.zero[IW_LEFT].offset_mN;
+        learned.zero[IW_LEFT].offset_mN = before + 1;
+        operations = 0;
+        cut_after = cut;
+        const bool done = brd_records_write_assumptions(&kept, &learned);
+        kept = power_on();
+        TEST_ASSERT_TRUE(brd_records_settings(&kept, &found) && brd_records_assumptions(&kept, &read));
+        TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
+        TEST_ASSERT_EQUAL_INT(done ? before + 1 : before, read.zero[IW_LEFT].offset_mN);
+        TEST_ASSERT_TRUE_MESSAGE(done == (cut >= 62U), "sequence, payload and CRC are written, and nothing else");
+    }
+}
+
+static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
+    const brd_settings_t settings = settings_of(NULL, NULL);
+    const brd_assumptions_t learned = something();
+    brd_records_t kept = power_on();
+    while (brd_records_write_assumptions(&kept, &learned)) {
+    }
+    TEST_ASSERT_EQUAL_UINT(1, brd_store_blank(&kept.store));
+    TEST_ASSERT_TRUE(brd_records_commit(&kept, &settings));
+    TEST_ASSERT_EQUAL_UINT(0, erasures);
+    const uint32_t power_ons = kept.power_ons;
+    brd_records_open(&kept, false, true); // Wheels may be turning: nothing takes long.
+    TEST_ASSERT_EQUAL_UINT(0, erasures);
+    brd_records_open(&kept, false, false);
+    TEST_ASSERT_EQUAL_UINT(1, erasures);
+    TEST_ASSERT_EQUAL_UINT(3, brd_store_blank(&kept.store));
+    TEST_ASSERT_EQUAL_UINT32(power_ons, kept.power_ons);
+    brd_assumptions_t read;
+    brd_settings_t found;
+    TEST_ASSERT_TRUE(brd_records_assumptions(&kept, &read) && brd_records_settings(&kept, &found));
+    brd_records_open(&kept, false, false);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
+}
+
+/// A record of version 0.2 has 26 values: its 18 numbers, type, role, five switches, track. The rest of its keys came later.
+static void put_as_before(uint8_t *place, const brd_settings_t *settings) {
+    iw_config_t config;
+    iw_config_default(&config);
+    brd_settings_to(settings, &config);
+    const uint16_t value[26] = {config.period_ms,
+                                config.lease_ms,
+                                config.accel_mm_s2,
+                                config.decel_mm_s2,
+                                config.max_speed_mm_s,
+                                config.max_current_mA,
+                                config.zero_hold_ms,
+                                config.wheel_silent_ms,
+                                config.echo_ms,
+                                config.rest_rpm,
+                                config.rest_ms,
+                                config.follow_mm_s,
+                                config.follow_ms,
+                                config.blocked_ms,
+                                config.radius_mm,
+                                config.gear_turns,
+                                config.gear_per,
+                                config.setpoint_dlc,
+                                config.setpoint_type_set ? config.setpoint_type : 0xFFFFU,
+                                (uint16_t)config.current_role,
+                                config.rpm_of_rotor,
+                                config.invert[IW_LEFT],
+                                config.invert[IW_RIGHT],
+                                (uint16_t)config.force_unit[IW_LEFT],
+                                (uint16_t)config.force_unit[IW_RIGHT],
+                                config.track_mm};
+    memcpy(place, value, sizeof value);
+}
+
+/// As version 0.2 wrote it: settings, whether something is learnt, and that.
+static void write_as_before(brd_records_t *kept, const brd_settings_t *settings, const brd_assumptions_t *learned) {
+    uint32_t words[BRD_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
+    uint8_t *const rest = (uint8_t *)&words[2];
+    if (settings != NULL) {
+        put_as_before(rest, settings);
+    }
+    if (learned != NULL) {
+        words[15] = 1U;
+        put_as_before(rest + 56U, &learned->settings);
+        memcpy(rest + 108U, learned->zero, sizeof *learned - offsetof(brd_assumptions_t, zero));
+    }
+    TEST_ASSERT_TRUE(brd_store_write(&kept->store, words, false));
+}
+
+static void test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair(void) {
+    const brd_settings_t settings = settings_of("wheels.track_mm", "777");
+    brd_assumptions_t learned = something();
+    brd_settings_t found;
+    brd_assumptions_t read;
+    brd_records_t kept = power_on();
+    write_as_before(&kept, &settings, &learned);
+    for (unsigned start = 0; start < 2U; start++) { // The second one reads what the first has written anew.
+        kept = power_on();
+        TEST_ASSERT_EQUAL_UINT32(8U + start, kept.power_ons);
+        TEST_ASSERT_TRUE(brd_records_settings(&kept, &found) && brd_records_assumptions(&kept, &read));
+        TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
+        TEST_ASSERT_EQUAL_MEMORY(&learned.settings, &read.settings, sizeof read.settings);
+        TEST_ASSERT_EQUAL_MEMORY(learned.zero, read.zero, sizeof read - offsetof(brd_assumptions_t, zero));
+    }
+}
+
+static void test_learnt_record_of_the_version_before_without_settings_has_none(void) {
+    brd_settings_t found;
+    brd_assumptions_t read;
+    brd_records_t kept = power_on();
+    write_as_before(&kept, NULL, NULL);
+    kept = power_on();
+    TEST_ASSERT_FALSE(brd_records_settings(&kept, &found));
+    TEST_ASSERT_FALSE(brd_records_assumptions(&kept, &read));
+}
+
+/// Commands that were kept from before a power loss quote another number of starts.
+static void test_learnt_every_power_on_is_counted(void) {
+    for (uint32_t starts = 1; starts < 20U; starts++) {
+        TEST_ASSERT_EQUAL_UINT32(starts, power_on().power_ons);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_learnt_same_settings_comes_back_with_its_provenance);
+    RUN_TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else);
+    RUN_TEST(test_learnt_zero_that_no_wheel_has_is_not_restored);
+    RUN_TEST(test_learnt_small_changes_are_not_worth_a_record);
+    RUN_TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was);
+    RUN_TEST(test_learnt_last_blank_slot_is_the_configuration_s);
+    RUN_TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair);
+    RUN_TEST(test_learnt_record_of_the_version_before_without_settings_has_none);
+    RUN_TEST(test_learnt_every_power_on_is_counted);
+    return UNITY_END();
+}

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+// The assumption ledger: its diagram, walked through exhaustively, beside a model that keeps to the diagram.
+#include <string.h>
+
+#include "iwheel/private/assumption_store.h"
+#include "unity.h"
+
+#define POISON 0xA5
+
+static iw_assumption_store_t assumptions;
+
+void setUp(void) {
+    memset(&assumptions, POISON, sizeof assumptions);
+    iw_assumption_init(&assumptions);
+}
+
+void tearDown(void) {}
+
+static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source, int32_t figure) {
+    const iw_assumption_entry_t *entry = iw_assumption_entry(&assumptions, item);
+    TEST_ASSERT_EQUAL_INT(state, entry->state);
+    TEST_ASSERT_EQUAL_INT(source, entry->source);
+    TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
+}
+
+static void test_init_assumes_everything_and_tells_what_the_document_says(void) {
+    static const iw_source_t origin[IW_ASSUMPTION_ITEMS] = {
+        [IW_ASSUMPTION_FORCE_UNIT_LEFT] = IW_SOURCE_DOCUMENT,
+        [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = IW_SOURCE_DOCUMENT,
+        [IW_ASSUMPTION_OFFSET_INCLUDED] = IW_SOURCE_DOCUMENT,
+        [IW_ASSUMPTION_WHEEL_RADIUS] = IW_SOURCE_DOCUMENT,
+    };
+    for (int item = 0; item < IW_ASSUMPTION_DLC; item++) {
+        assert_entry((iw_assumption_item_t)item, IW_ASSUMED, origin[item], 0);
+    }
+    // The table shows the lengths and nothing states them: either reading of "documented" will do.
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->state);
+    TEST_ASSERT_EQUAL_INT32(0, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->figure);
+    TEST_ASSERT_EQUAL_UINT32(0, assumptions.changes);
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions.doubt);
+}
+
+static void test_there_are_fourteen_items(void) {
+    TEST_ASSERT_EQUAL_INT(14, IW_ASSUMPTION_ITEMS);
+}
+
+static void test_assume_tells_where_an_assumption_comes_from(void) {
+    iw_assumption_assume(&assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_CONFIGURATION);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION, 0);
+    TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
+    iw_assumption_assume(&assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_CONFIGURATION);
+    TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
+    iw_assumption_assume(&assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_NONE);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_NONE, 0);
+}
+
+static void test_confirm_from_bus_lifts_no_contradiction(void) {
+    iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 1010);
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 9980);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONTRADICTED, IW_SOURCE_BUS, 1010);
+    TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
+}
+
+static void test_confirm_by_operator_lifts_a_contradiction(void) {
+    iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 1010);
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_OPERATOR, 0);
+    assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
+    TEST_ASSERT_EQUAL_UINT32(2, assumptions.changes);
+}
+
+static void test_confirm_from_bus_does_not_replace_the_operators_word(void) {
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_OPERATOR, 0);
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_BUS, 77);
+    assert_entry(IW_ASSUMPTION_WHEEL_RADIUS, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
+    TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
+}
+
+static void test_confirm_by_operator_replaces_evidence_of_the_bus(void) {
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_BUS, 120);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_BUS, 120);
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_OPERATOR, 0);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
+}
+
+static void test_contradict_ends_every_confirmation_even_the_operators(void) {
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
+    iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_BUS, -120);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONTRADICTED, IW_SOURCE_BUS, -120);
+}
+
+static void test_contradict_keeps_the_extremes_of_its_figure(void) {
+    iw_assumption_contradict(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_BUS, INT32_MIN);
+    assert_entry(IW_ASSUMPTION_DLC, IW_CONTRADICTED, IW_SOURCE_BUS, INT32_MIN);
+    iw_assumption_confirm(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_OPERATOR, INT32_MAX);
+    assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_OPERATOR, INT32_MAX);
+}
+
+static void test_items_do_not_touch_each_other(void) {
+    for (int touched = 0; touched < IW_ASSUMPTION_ITEMS; touched++) {
+        setUp();
+        const iw_assumption_store_t before = assumptions;
+        iw_assumption_contradict(&assumptions, (iw_assumption_item_t)touched, IW_SOURCE_BUS, 5);
+        for (int item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+            const iw_assumption_entry_t *was = &before.entry[item];
+            if (item != touched) {
+                assert_entry((iw_assumption_item_t)item, was->state, was->source, was->figure);
+            }
+        }
+        assert_entry((iw_assumption_item_t)touched, IW_CONTRADICTED, IW_SOURCE_BUS, 5);
+    }
+}
+
+/// The operations of the walk: assume from two sources, confirm and contradict by bus and operator.
+typedef enum {
+    ASSUME_DOCUMENT,
+    ASSUME_CONFIGURATION,
+    CONFIRM_BUS,
+    CONFIRM_OPERATOR,
+    CONTRADICT_BUS,
+    CONTRADICT_OPERATOR,
+    OPERATIONS
+} operation_t;
+
+/// What the diagram and the two sentences under `confirm` make of it.
+static iw_assumption_entry_t model(iw_assumption_entry_t entry, operation_t operation, int32_t figure) {
+    const bool assumed = entry.state == IW_ASSUMED;
+    const bool open_to_bus = assumed || (entry.state == IW_CONFIRMED && entry.source != IW_SOURCE_OPERATOR);
+    const iw_assumption_entry_t results[OPERATIONS] = {
+        [ASSUME_DOCUMENT] = {IW_ASSUMED, IW_SOURCE_DOCUMENT, 0},
+        [ASSUME_CONFIGURATION] = {IW_ASSUMED, IW_SOURCE_CONFIGURATION, 0},
+        [CONFIRM_BUS] = {IW_CONFIRMED, IW_SOURCE_BUS, figure},
+        [CONFIRM_OPERATOR] = {IW_CONFIRMED, IW_SOURCE_OPERATOR, figure},
+        [CONTRADICT_BUS] = {IW_CONTRADICTED, IW_SOURCE_BUS, figure},
+        [CONTRADICT_OPERATOR] = {IW_CONTRADICTED, IW_SOURCE_OPERATOR, figure},
+    };
+    const bool ignored = (operation <= ASSUME_CONFIGURATION && !assumed) || (operation == CONFIRM_BUS && !open_to_bus);
+    return ignored ? entry : results[operation];
+}
+
+static void apply(operation_t operation, int32_t figure) {
+    const iw_assumption_item_t item = IW_ASSUMPTION_GEAR_RATIO;
+    if (operation <= ASSUME_CONFIGURATION) {
+        iw_assumption_assume(&assumptions, item,
+                             (operation == ASSUME_DOCUMENT) ? IW_SOURCE_DOCUMENT : IW_SOURCE_CONFIGURATION);
+    } else if (operation <= CONFIRM_OPERATOR) {
+        iw_assumption_confirm(&assumptions, item, (operation == CONFIRM_BUS) ? IW_SOURCE_BUS : IW_SOURCE_OPERATOR,
+                              figure);
+    } else {
+        iw_assumption_contradict(&assumptions, item, (operation == CONTRADICT_BUS) ? IW_SOURCE_BUS : IW_SOURCE_OPERATOR,
+                                 figure);
+    }
+}
+
+static bool differs(const iw_assumption_entry_t *a, const iw_assumption_entry_t *b) {
+    return a->state != b->state || a->source != b->source || a->figure != b->figure;
+}
+
+static void walk(uint32_t path, unsigned length) {
+    iw_assumption_entry_t expected = {IW_ASSUMED, IW_SOURCE_NONE, 0};
+    setUp();
+    for (unsigned i = 0; i < length; i++, path /= OPERATIONS) {
+        const uint32_t changes = assumptions.changes;
+        const operation_t operation = (operation_t)(path % OPERATIONS);
+        const int32_t figure = (int32_t)(i % 3);
+        const iw_assumption_entry_t before = expected;
+        expected = model(expected, operation, figure);
+        apply(operation, figure);
+        if (differs(&expected, iw_assumption_entry(&assumptions, IW_ASSUMPTION_GEAR_RATIO))) {
+            assert_entry(IW_ASSUMPTION_GEAR_RATIO, expected.state, expected.source, expected.figure);
+        }
+        if ((assumptions.changes > changes) != differs(&before, &expected)) {
+            TEST_FAIL_MESSAGE("changes must grow with every change and with nothing else");
+        }
+    }
+}
+
+static void test_every_sequence_of_six_operations_keeps_to_the_diagram(void) {
+    for (uint32_t path = 0; path < 46656; path++) {
+        walk(path, 6);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_init_assumes_everything_and_tells_what_the_document_says);
+    RUN_TEST(test_there_are_fourteen_items);
+    RUN_TEST(test_assume_tells_where_an_assumption_comes_from);
+    RUN_TEST(test_confirm_from_bus_lifts_no_contradiction);
+    RUN_TEST(test_confirm_by_operator_lifts_a_contradiction);
+    RUN_TEST(test_confirm_from_bus_does_not_replace_the_operators_word);
+    RUN_TEST(test_confirm_by_operator_replaces_evidence_of_the_bus);
+    RUN_TEST(test_contradict_ends_every_confirmation_even_the_operators);
+    RUN_TEST(test_contradict_keeps_the_extremes_of_its_figure);
+    RUN_TEST(test_items_do_not_touch_each_other);
+    RUN_TEST(test_every_sequence_of_six_operations_keeps_to_the_diagram);
+    return UNITY_END();
+}

@@ -1,0 +1,483 @@
+// SPDX-License-Identifier: MIT
+// What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
+#include "answers/answers.h"
+#include "daemon_rig.h"
+#include "inspect/assumption.h"
+#include "sockets/sock_clients.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+static int client;
+static gw_stored_t stored;
+static gw_file_store_news_t news;
+static char text[GW_ASSUMPTIONS_FILE_SIZE];
+static size_t length;
+static unsigned writes;
+static bool set_aside;
+static char status_before[SOCK_REPLY_MAX]; ///< The last status that was looked at.
+
+int gw_file_store_open(gw_file_store_t *self, const char *directory, const char *name) {
+    (void)directory;
+    (void)name;
+    *self = (gw_file_store_t){.child = {.fd = -1}};
+    return 0;
+}
+
+bool gw_file_store_write(gw_file_store_t *self, const char *written, size_t size) {
+    (void)self;
+    memcpy(text, written, size);
+    length = size;
+    writes++;
+    return true;
+}
+
+void gw_file_store_set_aside(gw_file_store_t *self) {
+    (void)self;
+    set_aside = true;
+}
+
+gw_file_store_news_t gw_file_store_receive(gw_file_store_t *self, const char **out_text, size_t *out_length,
+                                           int *out_error) {
+    const gw_file_store_news_t now = news;
+    (void)self;
+    *out_length = length;
+    *out_error = 0;
+    *out_text = text;
+    news = GW_FILE_STORE_NO_NEWS;
+    return now;
+}
+
+void gw_file_store_close(gw_file_store_t *self) {
+    (void)self;
+}
+
+static const iw_config_t *config(void) {
+    return &daemon_rig.daemon->wheels.core.config;
+}
+
+static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
+    return iw_assumption_entry(&daemon_rig.daemon->wheels.core.assumptions, item);
+}
+
+/// A finding of an earlier run for what is configured now.
+static void store(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source) {
+    gw_stored_item_t *known = &stored.item[item];
+    const bool measured = source == IW_SOURCE_BUS; // The operator's word has no figure.
+    known->entry = (iw_assumption_entry_t){.state = state, .source = source, .figure = measured ? 1000 : 0};
+    known->since_wall_us = 1700000000000000;
+    inspect_assumption_value(&daemon_rig.daemon->assumptions.configured, item, known->value);
+}
+
+static void store_offset(iw_side_t side, iw_force_unit_t unit, int32_t offset_mN) {
+    stored.offset[side] = (gw_stored_offset_t){
+        .from = IW_OFFSET_OPERATOR, .unit = unit, .offset_mN = offset_mN, .samples = 40, .wall_us = 1700000000000000};
+}
+
+static void observe(void) {
+    const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    gw_assumptions_observe(&daemon_rig.daemon->assumptions, &seen);
+}
+
+/// The keeper tells it, as soon as the loop runs.
+static void tell_stored(void) {
+    length = gw_assumptions_file_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
+    news = GW_FILE_STORE_READ;
+    daemon_rig.daemon->assumptions.answered = false;
+    daemon_rig.daemon->assumptions.start_us = daemon_rig.now_us;
+    daemon_rig_run(20);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->assumptions.answered);
+    TEST_ASSERT_FALSE(set_aside);
+}
+
+void setUp(void) {
+    memset(&stored, 0, sizeof stored);
+    news = GW_FILE_STORE_NO_NEWS;
+    writes = 0;
+    set_aside = false;
+    status_before[0] = '\0';
+    daemon_rig_begin();
+    client = daemon_rig_connect();
+}
+
+void tearDown(void) {
+    (void)close(client);
+    daemon_rig_end();
+}
+
+static void test_memory_finding_is_believed_for_the_value_it_was_found_for(void) {
+    store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_BUS);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
+    TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry(IW_ASSUMPTION_GEAR_RATIO)->source);
+}
+
+static void test_memory_finding_for_another_value_is_forgotten(void) {
+    store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
+    (void)strcpy(stored.item[IW_ASSUMPTION_GEAR_RATIO].value, "7");
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_ASSUMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
+}
+
+static void test_memory_contradiction_stays_one(void) {
+    store(IW_ASSUMPTION_SETPOINT_TYPE, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_SETPOINT_TYPE)->state);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
+}
+
+static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
+    store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
+    iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_BUS,
+                             3000);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
+}
+
+static bool is_warned_of(const char *what) {
+    const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    for (uint32_t i = 0; i < wheels->warnings; i++) {
+        if (strstr(wheels->warning[i], what) != NULL) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
+    const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(wheels->estop_untried);
+    TEST_ASSERT_EQUAL_INT64(0, wheels->estop_tried_us);
+    TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
+    stored.tried = (gw_tried_t){.wall_us = 1700000000000000, .contact = {{.active_high = true, .line = "ESTOP"}}};
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_FALSE(wheels->estop_untried);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
+    TEST_ASSERT_FALSE(is_warned_of("was never seen to work on this wiring"));
+}
+
+static const iwl_estop_seen_t *see_line(const void *self) {
+    static const iwl_estop_seen_t line = {.chip = "chip", .line = "ESTOP"};
+    (void)self;
+    return &line;
+}
+
+/// The file may come after the first look: what it says is compared with the wiring all the same, and is not newer than what was seen.
+static void test_memory_button_of_another_wiring_is_void_however_late_the_file(void) {
+    static iwl_estop_ops_t ops;
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    ops = *wheels->hal.estop_ops;
+    ops.seen = see_line;
+    wheels->hal.estop_ops = &ops;
+    daemon_rig_run(50);
+    stored.tried = (gw_tried_t){.wall_us = 1700000000000000,
+                                .contact = {{.active_high = true, .line = "OTHER", .seen = *see_line(NULL)}}};
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(wheels->estop_untried);
+    TEST_ASSERT_TRUE(is_warned_of("was never seen to work on this wiring"));
+    (void)strcpy(stored.tried.contact[0].line, "ESTOP");
+    tell_stored();
+    stored.tried.wall_us = 1600000000000000;
+    tell_stored();
+    daemon_rig_run(50);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
+}
+
+/// A battery beyond its threshold is told and warned of, and stops nothing.
+static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    wheels->health.limits.battery_low_dV = 254;
+    daemon_rig_begin_driving(client);
+    for (unsigned i = 0; i < 60U; i++) {
+        (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
+        daemon_rig_run(100);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_TRUE(wheels->health.present[IW_LEFT][GW_BATTERY_LOW]);
+    TEST_ASSERT_TRUE(is_warned_of("the right wheel's battery has "));
+    TEST_ASSERT_FALSE(is_warned_of("degC"));
+    wheels->health.present[IW_RIGHT][GW_BATTERY_LOW] = false;
+    wheels->health.changes++;
+    daemon_rig_run(50);
+    TEST_ASSERT_TRUE(is_warned_of("the left wheel's battery has "));
+    TEST_ASSERT_FALSE(is_warned_of("the right wheel's battery has "));
+}
+
+static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
+    store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
+    store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance);
+    TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->wheels.core.force[IW_LEFT].offset_mN);
+    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance);
+    TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
+}
+
+static void test_memory_offset_of_an_earlier_run_keeps_its_time(void) {
+    store_offset(IW_LEFT, IW_FORCE_CN, 4321);
+    tell_stored();
+    daemon_rig_run(3000);
+    const gw_stored_offset_t *kept = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(4321, kept->offset_mN);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
+}
+
+static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
+    const gw_stored_t *known = &daemon_rig.daemon->assumptions.known;
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, known->offset[IW_RIGHT].from);
+    TEST_ASSERT_GREATER_THAN_UINT32(20, known->offset[IW_RIGHT].samples);
+    TEST_ASSERT_EQUAL_INT32(daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN,
+                            known->offset[IW_RIGHT].offset_mN);
+    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, known->offset[IW_LEFT].from);
+}
+
+static void test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second(void) {
+    daemon_rig.daemon->assumptions.write_us = 0;
+    daemon_rig_run(3000);
+    const unsigned before = writes;
+    for (unsigned i = 0; i < 10U; i++) {
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+        daemon_rig_run(290);
+    }
+    TEST_ASSERT_UINT_WITHIN(1, 3, writes - before);
+}
+
+// The bytes of the ledger that a status keeps ---------------------------------------------------------------------------------
+
+static gw_assumptions_written_t *written(void) {
+    return &daemon_rig.daemon->assumptions.written;
+}
+
+static const char *write_status(char out_line[SOCK_REPLY_MAX]) {
+    iwn_server_t *const server = &daemon_rig.daemon->answers.server;
+    iwn_out_t json = iwn_server_begin_event(server, "state");
+    iwn_server_write_status(server, iwn_server_look(server), &json);
+    iwn_out_close(&json, '}');
+    const size_t end = iwn_out_finish(&json);
+    TEST_ASSERT_GREATER_THAN_size_t(1, end);
+    memcpy(out_line, json.data, end - 1U);
+    out_line[end - 1U] = '\0';
+    return out_line;
+}
+
+/// The next status is what it would be had nothing been kept. It differs from the one before, or the change was none.
+static void expect_new_status(const char *changed) {
+    static char next[SOCK_REPLY_MAX];
+    static char anew[SOCK_REPLY_MAX];
+    (void)write_status(next);
+    written()->length = 0;
+    (void)write_status(anew);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(anew, next, changed);
+    TEST_ASSERT_TRUE_MESSAGE(strcmp(status_before, next) != 0, changed);
+    TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
+    memcpy(status_before, next, sizeof status_before);
+}
+
+/// From "nobody knows" through all that may become of it.
+static void change_item(iw_assumption_item_t item) {
+    iw_assumption_store_t *assumptions = &daemon_rig.daemon->wheels.core.assumptions;
+    gw_stored_item_t *known = &daemon_rig.daemon->assumptions.known.item[item];
+    const inspect_word_t word = {"", "a tape"};
+    iwn_refusal_t refusal;
+    *known = (gw_stored_item_t){0}; // Some were settled by the first frames.
+    assumptions->entry[item] = (iw_assumption_entry_t){0};
+    iw_assumption_confirm(assumptions, item, IW_SOURCE_BUS, 1000);
+    expect_new_status("confirmed by the bus");
+    iw_assumption_confirm(assumptions, item, IW_SOURCE_BUS, -2500);
+    expect_new_status("another figure");
+    observe();
+    expect_new_status("noted");
+    known->since_wall_us++;
+    expect_new_status("noted later");
+    (void)strcpy(known->word.found, "yes");
+    expect_new_status("found");
+    (void)strcpy(known->word.how, "bringup");
+    expect_new_status("how");
+    known->word.how[6] = 'q';
+    expect_new_status("how, in its last letter");
+    iw_assumption_contradict(assumptions, item, IW_SOURCE_BUS, 1000);
+    expect_new_status("contradicted by the bus");
+    TEST_ASSERT_TRUE(gw_assumptions_confirm(&daemon_rig.daemon->assumptions, item, &word, &refusal));
+    expect_new_status("confirmed by the operator");
+    assumptions->entry[item] = (iw_assumption_entry_t){0};
+    expect_new_status("as if it had never been asked");
+}
+
+static void test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before(void) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    assumptions->write_us = 0;
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+    daemon_rig_run(1500);
+    const unsigned before = writes;
+    assumptions->store.waits = true;
+    news = GW_FILE_STORE_FAILED;
+    daemon_rig_run(50);
+    assumptions->store.waits = false;
+    TEST_ASSERT_EQUAL_INT(GW_ASSUMPTIONS_FAILED, assumptions->state);
+    daemon_rig_run(GW_ASSUMPTIONS_RETRY_US / IW_US_PER_MS - 200U);
+    TEST_ASSERT_EQUAL_UINT(before, writes);
+    daemon_rig_run(400);
+    TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
+}
+
+static void test_memory_whose_process_has_gone_says_so(void) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    assumptions->store.waits = true;
+    news = GW_FILE_STORE_GONE;
+    daemon_rig_run(50);
+    assumptions->store.waits = false;
+    TEST_ASSERT_EQUAL_INT(GW_ASSUMPTIONS_FAILED, assumptions->state);
+    TEST_ASSERT_EQUAL_INT(ECHILD, assumptions->error);
+}
+
+static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
+    iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
+    force->provenance = IW_OFFSET_WHEEL;
+    force->offset_us = daemon_rig.now_us;
+    force->offset_mN = 1200;
+    observe();
+    const gw_stored_offset_t *kept = &daemon_rig.daemon->assumptions.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, kept->from);
+    TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
+}
+
+static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(void) {
+    gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
+    const iw_assumption_item_t item = IW_ASSUMPTION_GEAR_RATIO;
+    (void)snprintf(assumptions->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
+    iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    iw_assumption_entry_t assumed[IW_ASSUMPTION_ITEMS];
+    memcpy(assumed, seen.assumed, sizeof assumed);
+    assumed[item] = (iw_assumption_entry_t){.state = IW_CONFIRMED, .source = IW_SOURCE_BUS, .figure = 1000};
+    seen.assumed = assumed;
+    seen.assumed_changes++;
+    gw_assumptions_observe(assumptions, &seen);
+    TEST_ASSERT_EQUAL_STRING("", assumptions->known.item[item].word.found);
+}
+
+static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
+        change_item((iw_assumption_item_t)item);
+    }
+}
+
+static void test_status_after_a_change_of_the_configuration_is_as_written_anew(void) {
+    iw_config_t *core = &daemon_rig.daemon->config.core;
+    core->setpoint_type++;
+    expect_new_status("setpoint_type");
+    core->setpoint_type_set = false;
+    expect_new_status("setpoint_type not set");
+    core->current_role = (core->current_role == IW_ROLE_LIMIT) ? IW_ROLE_SETPOINT : IW_ROLE_LIMIT;
+    expect_new_status("current_role");
+    core->radius_mm++;
+    expect_new_status("radius_mm");
+    core->gear_turns++;
+    expect_new_status("gear_ratio, turns");
+    core->gear_per++;
+    expect_new_status("gear_ratio, per");
+    core->rpm_of_rotor = !core->rpm_of_rotor;
+    expect_new_status("rpm_of");
+    daemon_rig.daemon->assumptions.configured.track_mm++;
+    expect_new_status("track_mm");
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        core->invert[side] = !core->invert[side];
+        expect_new_status("invert");
+        core->force_unit[side] = (core->force_unit[side] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN;
+        expect_new_status("force_unit");
+    }
+}
+
+static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(void) {
+    daemon_rig_run(3000);
+    expect_new_status("three seconds later");
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
+    expect_new_status("right wheel tared");
+    store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
+    store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
+    tell_stored();
+    expect_new_status("what an earlier run kept");
+    TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
+}
+
+static void test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept(void) {
+    static char next[SOCK_REPLY_MAX];
+    (void)write_status(next);
+    char *const kept = (char *)memchr(written()->text, 's', written()->length); // Of "setpoint_type".
+    TEST_ASSERT_NOT_NULL(kept);
+    *kept = 'S';
+    TEST_ASSERT_NOT_NULL(strstr(write_status(next), "\"ledger\":{\"Setpoint_type\""));
+}
+
+static void test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time(void) {
+    static char first[SOCK_REPLY_MAX];
+    static char again[SOCK_REPLY_MAX];
+    (void)write_status(first);
+    TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS;
+         item++) { // What moves a terminal is escaped: six bytes for one.
+        gw_stored_item_t *known = &daemon_rig.daemon->assumptions.known.item[item];
+        known->entry = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
+        memset(known->word.how, 0x7F, sizeof known->word.how - 1U);
+        daemon_rig.daemon->wheels.core.assumptions.entry[item] = known->entry;
+    }
+    (void)write_status(first);
+    TEST_ASSERT_EQUAL_size_t(0, written()->length);
+    TEST_ASSERT_NOT_NULL(strstr(first, "\"how\":\"\\u007F\\u007F"));
+    TEST_ASSERT_EQUAL_STRING(first, write_status(again));
+}
+
+static void test_status_that_does_not_fit_keeps_nothing(void) {
+    char line[64];
+    iwn_out_t json;
+    iwn_out_init(&json, line, sizeof line);
+    iwn_server_t *const server = &daemon_rig.daemon->answers.server;
+    written()->length = 0;
+    iwn_server_write_status(server, iwn_server_look(server), &json);
+    TEST_ASSERT_TRUE(json.overflow);
+    TEST_ASSERT_EQUAL_size_t(0, written()->length);
+}
+
+static void test_memory_watches_the_button_of_the_configured_line(void) {
+    const gateway_config_t *config = &daemon_rig.daemon->config;
+    TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->assumptions.button.contact[0].line);
+    TEST_ASSERT_EQUAL_STRING(config->estop.line2, daemon_rig.daemon->assumptions.button.contact[1].line);
+    TEST_ASSERT_EQUAL(config->estop.active2_high, daemon_rig.daemon->assumptions.button.contact[1].active_high);
+    TEST_ASSERT_EQUAL(config->estop.active_high, daemon_rig.daemon->assumptions.button.contact[0].active_high);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for);
+    RUN_TEST(test_memory_finding_for_another_value_is_forgotten);
+    RUN_TEST(test_memory_contradiction_stays_one);
+    RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
+    RUN_TEST(test_memory_button_that_was_tried_before_is_not_warned_of);
+    RUN_TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file);
+    RUN_TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop);
+    RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
+    RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
+    RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
+    RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
+    RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
+    RUN_TEST(test_memory_whose_process_has_gone_says_so);
+    RUN_TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent);
+    RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
+    RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
+    RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);
+    RUN_TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew);
+    RUN_TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept);
+    RUN_TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time);
+    RUN_TEST(test_status_that_does_not_fit_keeps_nothing);
+    RUN_TEST(test_memory_watches_the_button_of_the_configured_line);
+    return UNITY_END();
+}

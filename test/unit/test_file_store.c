@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+// The process that keeps what is known from one run to the next: what it reads, writes, sets aside and refuses to touch.
+#include "disk/file_store.h"
+#include "sockets/owners.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+static size_t length;
+static char folder[] = "/tmp/iwheel-keeper-XXXXXX";
+static gw_file_store_t store;
+static const char *heard;
+static int error;
+static char second[128];
+static int fsync_error; ///< Of the disk, for a keeper that is opened after it is set; 0: none.
+
+int fsync(int fd) {
+    if (fsync_error != 0) {
+        errno = fsync_error;
+        return -1;
+    }
+    return (int)syscall(SYS_fsync, fd);
+}
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static gw_file_store_news_t next_news(void) {
+    gw_file_store_news_t news = GW_FILE_STORE_NO_NEWS;
+    struct pollfd wait = {.fd = store.child.fd, .events = POLLIN};
+    while (news == GW_FILE_STORE_NO_NEWS && poll(&wait, 1, 5000) == 1) {
+        news = gw_file_store_receive(&store, &heard, &length, &error);
+    }
+    return news;
+}
+
+static void open_store(const char *directory, gw_file_store_news_t expected) {
+    error = 0;
+    TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, directory, "file"));
+    TEST_ASSERT_FALSE_MESSAGE(gw_file_store_write(&store, "x", 1), "not before it has answered");
+    TEST_ASSERT_EQUAL_INT(expected, next_news());
+}
+
+static char *in_folder(const char *name) {
+    static char path[128];
+    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+/// A second name of a file that is there.
+static void name_again(const char *name, const char *again) {
+    (void)strcpy(second, in_folder(again));
+    TEST_ASSERT_EQUAL_INT(0, link(in_folder(name), second));
+}
+
+static void put_file(const char *name, const char *content) {
+    FILE *file = fopen(in_folder(name), "w");
+    TEST_ASSERT_NOT_NULL(file);
+    (void)fputs(content, file);
+    (void)fclose(file);
+}
+
+static void assert_file(const char *name, const char *content) {
+    char found[64] = "";
+    FILE *file = fopen(in_folder(name), "r");
+    TEST_ASSERT_NOT_NULL_MESSAGE(file, name);
+    (void)!fread(found, 1, sizeof found - 1U, file);
+    (void)fclose(file);
+    TEST_ASSERT_EQUAL_STRING(content, found);
+}
+
+static void test_keeper_writes_reads_back_and_sets_aside(void) {
+    open_store(folder, GW_FILE_STORE_ABSENT);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "one", 3));
+    TEST_ASSERT_FALSE_MESSAGE(gw_file_store_write(&store, "two", 3), "one at a time");
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("file", "one");
+    gw_file_store_close(&store);
+    open_store(folder, GW_FILE_STORE_READ);
+    TEST_ASSERT_EQUAL_UINT(3, length);
+    TEST_ASSERT_EQUAL_MEMORY("one", heard, 3);
+    gw_file_store_set_aside(&store);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "two", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("file.damaged", "one");
+    assert_file("file", "two");
+    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
+    gw_file_store_close(&store);
+}
+
+static void test_keeper_without_its_directory_fails_and_recovers_when_it_comes(void) {
+    char missing[64];
+    (void)snprintf(missing, sizeof missing, "%s/later", folder);
+    open_store(missing, GW_FILE_STORE_FAILED);
+    TEST_ASSERT_EQUAL_INT(ENOENT, error);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "one", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(ENOENT, error);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(missing, 0700));
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "two", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("later/file", "two");
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("later/file"));
+    (void)rmdir(missing);
+}
+
+static void test_keeper_takes_no_link_pipe_or_giant_for_its_file(void) {
+    put_file("other", "precious");
+    (void)unlink(in_folder("file"));
+    TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file")));
+    open_store(folder, GW_FILE_STORE_BAD);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("other", "precious");
+    assert_file("file", "new");
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("file"));
+    TEST_ASSERT_EQUAL_INT(0, mkfifo(in_folder("file"), 0600));
+    open_store(folder, GW_FILE_STORE_BAD);
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("file"));
+    put_file("file", "");
+    TEST_ASSERT_EQUAL_INT(0, truncate(in_folder("file"), (off_t)GW_FILE_STORE_TEXT_MAX + 1));
+    open_store(folder, GW_FILE_STORE_BAD);
+    TEST_ASSERT_EQUAL_INT(EFBIG, error);
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("file"));
+}
+
+static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
+    put_file("file", "old");
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
+    open_store(folder, GW_FILE_STORE_READ);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    assert_file("file", "old");
+    gw_file_store_close(&store);
+    TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
+}
+
+static void test_keeper_reports_a_failed_fsync_and_a_failed_rename(void) {
+    put_file("file", "old");
+    fsync_error = EIO;
+    open_store(folder, GW_FILE_STORE_READ);
+    fsync_error = 0;
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(EIO, error);
+    assert_file("file", "old");
+    gw_file_store_close(&store);
+    (void)unlink(in_folder("file"));
+    open_store(folder, GW_FILE_STORE_ABSENT);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file"), 0700));
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(EISDIR, error);
+    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
+    gw_file_store_close(&store);
+    (void)rmdir(in_folder("file"));
+    put_file("file", "old");
+}
+
+static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
+    put_file("other", "precious");
+    name_again("other", "file.new");
+    open_store(folder, GW_FILE_STORE_READ);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("other", "precious");
+    assert_file("file", "new");
+    TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file.new")));
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "newer", 5));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_WRITTEN, next_news());
+    assert_file("other", "precious");
+    gw_file_store_close(&store);
+}
+
+static void assert_not_read(int why) {
+    open_store(folder, GW_FILE_STORE_BAD);
+    TEST_ASSERT_EQUAL_INT(why, error);
+    gw_file_store_close(&store);
+}
+
+static void test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger(void) {
+    put_file("file", "old");
+    name_again("file", "again");
+    assert_not_read(SOCK_FOLDER_FILE);
+    TEST_ASSERT_EQUAL_INT(0, unlink(second));
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED in part: giving a file away needs root");
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, chown(in_folder("file"), 65534, 65534));
+    assert_not_read(SOCK_FOLDER_FILE);
+    (void)unlink(in_folder("file"));
+}
+
+static void assert_no_folder(const char *path, int why) {
+    open_store(path, GW_FILE_STORE_FAILED);
+    TEST_ASSERT_EQUAL_INT(why, error);
+    TEST_ASSERT_TRUE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(why, error);
+    gw_file_store_close(&store);
+}
+
+static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
+    static const mode_t modes[] = {0777, 01777, 0775, 0757};
+    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
+        assert_no_folder(folder, SOCK_FOLDER_SHARED);
+    }
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0700));
+    TEST_ASSERT_EQUAL_INT(0, symlink(".", strcpy(second, in_folder("link"))));
+    assert_no_folder(second, ELOOP);
+    strcat(second, "/");
+    assert_no_folder(second, ELOOP);
+    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("link")));
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED in part: giving a folder away needs root");
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, 65534, 65534));
+    assert_no_folder(folder, SOCK_FOLDER_FOREIGN);
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
+}
+
+static void test_keeper_that_died_is_noticed_and_nothing_waits_for_it(void) {
+    TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, folder, "file"));
+    (void)next_news();
+    (void)shutdown(store.child.fd, SHUT_RDWR);
+    (void)gw_file_store_write(&store, "new", 3);
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_GONE, next_news());
+    gw_file_store_close(&store);
+    TEST_ASSERT_FALSE(gw_file_store_write(&store, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_FILE_STORE_NO_NEWS, gw_file_store_receive(&store, &heard, &length, &error));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    if (mkdtemp(folder) == NULL) {
+        return 1;
+    }
+    RUN_TEST(test_keeper_writes_reads_back_and_sets_aside);
+    RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);
+    RUN_TEST(test_keeper_takes_no_link_pipe_or_giant_for_its_file);
+    RUN_TEST(test_keeper_that_cannot_write_keeps_the_old_file);
+    RUN_TEST(test_keeper_reports_a_failed_fsync_and_a_failed_rename);
+    RUN_TEST(test_keeper_never_writes_into_a_file_that_is_there_already);
+    RUN_TEST(test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger);
+    RUN_TEST(test_keeper_uses_no_folder_in_which_others_can_put_things);
+    RUN_TEST(test_keeper_that_died_is_noticed_and_nothing_waits_for_it);
+    (void)unlink(in_folder("file"));
+    (void)unlink(in_folder("file.new"));
+    (void)unlink(in_folder("file.damaged"));
+    (void)unlink(in_folder("other"));
+    (void)rmdir(folder);
+    return UNITY_END();
+}

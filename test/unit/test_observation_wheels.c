@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// What the wheels' own motion tells: the core and the simulated pair in virtual time, with wheels that are not as assumed.
+#include "world_rig.h"
+
+#include "unity.h"
+
+static world_rig_t rig;
+
+void setUp(void) {
+    fixture_config(&rig.config);
+    world_rig_begin(&rig, 0);
+}
+
+void tearDown(void) {}
+
+static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state) {
+    const iw_assumption_entry_t *entry = iw_assumption_entry(&rig.gateway.assumptions, item);
+    TEST_ASSERT_EQUAL_INT(state, entry->state);
+    if (state != IW_ASSUMED) {
+        TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry->source);
+    }
+}
+
+static int32_t figure(iw_assumption_item_t item) {
+    return iw_assumption_entry(&rig.gateway.assumptions, item)->figure;
+}
+
+static void test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type(void) {
+    world_rig_run(&rig, 60000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
+    assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_ASSUMED);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
+}
+
+static void test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs(void) {
+    world_rig_drive(&rig, 400, -400, 6000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
+    TEST_ASSERT_INT32_WITHIN(60, 1000, figure(IW_ASSUMPTION_GEAR_RATIO));
+    assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_CONFIRMED);
+    TEST_ASSERT_INT32_WITHIN(60, 1000, figure(IW_ASSUMPTION_SETPOINT_TYPE));
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED);
+    assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONFIRMED);
+    assert_entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_ASSUMED);
+    assert_entry(IW_ASSUMPTION_WHEEL_RADIUS, IW_ASSUMED);
+    assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED);
+}
+
+static void test_evidence_wheels_from_crawling_wheels_is_not_taken(void) {
+    world_rig_drive(&rig, 120, 120, 20000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
+}
+
+static void set_gear(uint16_t turns, bool rpm_of_rotor) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        rig.world.pair.wheel[side].motion.config.gear_turns = turns;
+        rig.world.pair.wheel[side].motion.config.rpm_of_rotor = rpm_of_rotor;
+    }
+}
+
+static void test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio(void) {
+    set_gear(3, false);
+    world_rig_drive(&rig, 300, 300, 16000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONTRADICTED);
+    TEST_ASSERT_INT32_WITHIN(200, 3000, figure(IW_ASSUMPTION_GEAR_RATIO));
+}
+
+static void test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are(void) {
+    rig.config.gear_turns = 3;
+    world_rig_begin(&rig, 0);
+    set_gear(3, false);
+    world_rig_drive(&rig, 300, 300, 8000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
+    rig.config.rpm_of_rotor = true;
+    world_rig_begin(&rig, 0);
+    set_gear(3, true);
+    world_rig_drive(&rig, 300, 300, 8000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
+}
+
+static void test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio(void) {
+    rig.config.gear_turns = 2;
+    rig.config.follow_mm_s = 500;
+    world_rig_begin(&rig, 0);
+    set_gear(2, true);
+    world_rig_drive(&rig, 300, 300, 12000);
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONTRADICTED);
+    TEST_ASSERT_INT32_WITHIN(60, 500, figure(IW_ASSUMPTION_GEAR_RATIO));
+}
+
+static void test_evidence_wheels_one_odd_stretch_contradicts_no_ratio(void) {
+    world_rig_drive(&rig, 400, 400, 4000);
+    const iw_assumption_entry_t before = *iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO);
+    rig.gateway.wheel[IW_LEFT].ticks += 70;
+    world_rig_drive(&rig, 400, 400, 8000);
+    TEST_ASSERT_EQUAL_INT(before.state, iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
+}
+
+static void test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio(void) {
+    for (unsigned times = 0; times < 5U; times++) {
+        rig.gateway.wheel[IW_LEFT].ticks += 70;
+        world_rig_drive(&rig, 400, 400, 12000);
+    }
+    assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
+}
+
+static void test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing(void) {
+    world_rig_drive(&rig, 300, 300, 100);
+    for (unsigned times = 0; times < 40U; times++) {
+        const int32_t mm_s = (times % 2U == 0U) ? 330 : 300;
+        world_rig_drive(&rig, mm_s, mm_s, 200);
+    }
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
+}
+
+static void test_evidence_wheels_a_reboot_or_a_gap_begins_anew(void) {
+    world_rig_drive(&rig, 400, 400, 3000);
+    for (unsigned times = 0; times < 4U; times++) {
+        sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
+        world_rig_run(&rig, 1000);
+        rig.world.pair.wheel[IW_LEFT].motion.ticks += (times % 2U == 0U) ? 100000U : 0U;
+        world_rig_run(&rig, 2000);
+        (void)iw_gateway_reset(&rig.gateway, rig.now_us);
+        world_rig_run(&rig, 8000);
+        (void)iw_gateway_reset(&rig.gateway, rig.now_us);
+        world_rig_drive(&rig, 400, 400, 3000);
+    }
+    TEST_ASSERT_NOT_EQUAL(IW_CONTRADICTED,
+                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
+    TEST_ASSERT_EQUAL_UINT32(4, rig.gateway.wheel[IW_LEFT].reboots);
+}
+
+static void test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order(void) {
+    rig.world.pair.pose_reversed = true;
+    world_rig_drive(&rig, 300, 350, 4000);
+    assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONTRADICTED);
+    TEST_ASSERT_LESS_THAN_INT32(200, figure(IW_ASSUMPTION_POSE_BYTE_ORDER));
+}
+
+static void test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing(void) {
+    world_rig_drive(&rig, 300, 350, 2000);
+    assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
+    sim_world_reboot(&rig.world, rig.now_us, IW_RIGHT);
+    world_rig_run(&rig, 12000);
+    assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
+}
+
+static void test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed(void) {
+    rig.world.pair.wheel[IW_LEFT].motion.blocked = true;
+    rig.world.pair.wheel[IW_RIGHT].motion.blocked = true;
+    world_rig_drive(&rig, 300, 300, 4000);
+    assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
+}
+
+static void test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit(void) {
+    iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_OPERATOR, 0);
+    iw_assumption_contradict(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER, IW_SOURCE_OPERATOR, 0);
+    world_rig_drive(&rig, 400, 400, 5000);
+    TEST_ASSERT_EQUAL_INT(IW_SOURCE_OPERATOR,
+                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->source);
+    TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED,
+                          iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER)->state);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type);
+    RUN_TEST(test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs);
+    RUN_TEST(test_evidence_wheels_from_crawling_wheels_is_not_taken);
+    RUN_TEST(test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio);
+    RUN_TEST(test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are);
+    RUN_TEST(test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio);
+    RUN_TEST(test_evidence_wheels_one_odd_stretch_contradicts_no_ratio);
+    RUN_TEST(test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio);
+    RUN_TEST(test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing);
+    RUN_TEST(test_evidence_wheels_a_reboot_or_a_gap_begins_anew);
+    RUN_TEST(test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order);
+    RUN_TEST(test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing);
+    RUN_TEST(test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed);
+    RUN_TEST(test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit);
+    return UNITY_END();
+}
