@@ -55,7 +55,7 @@ def address(board):
 
 def pin_table():
     known = {board: facts(board) for board in NAMES}
-    other = facts("stm32f103", "-DIW_BOARD_CAN_ON_PA11=1")
+    other = facts("stm32f103", "-DBRD_CAN_ON_PA11=1")
     yield "| | " + " | ".join(f"{board}, {name}" for board, name in NAMES.items()) + " |"
     yield "|---|" + "---|" * len(NAMES)
     for what in PINS:
