@@ -21,6 +21,8 @@
 #define AHEAD_US 86400000000LL
 /// Each host gets the time that a broker has for its greeting, so that one host without an answer does not hide the next one.
 #define INFO_HOST_US (MQTT_GREETING_US + 1000000U)
+/// If every host was tried and none is being tried, the wait ends so long after its begin: they refuse, and do not keep silent.
+#define INFO_LEAST_US 5000000U
 /// The longest wait for the next retained message, from the accepted connection on.
 #define INFO_NEXT_US 1000000U
 
@@ -200,13 +202,18 @@ static int read_info(const mqtt_settings_t *settings, const fleet_wanted_t *want
         fleet_ignore_refused, info_came};
     (void)snprintf(topic, sizeof topic, "iwheel/%s/info", (wanted->span.machine != NULL) ? wanted->span.machine : "+");
     (void)snprintf(name, sizeof name, "iwheel-fleet-history-%d", (int)getpid());
-    for (size_t i = 0; mqtt_settings_host(settings, i, host); i++) {
+    const uint64_t least_us = self.until_us + INFO_LEAST_US;
+    size_t hosts = 0;
+    for (; mqtt_settings_host(settings, hosts, host); hosts++) {
         self.until_us += INFO_HOST_US;
     }
     const int code = mqtt_broker_open(&broker, settings, &listener);
-    while (code == 0 && bridge_now_us() < self.until_us) {
+    bool all_tried = false;
+    while (code == 0 && bridge_now_us() < self.until_us &&
+           !(all_tried && broker.state == MQTT_AWAY && bridge_now_us() >= least_us)) {
         bool writes = false;
         mqtt_broker_step(&broker, bridge_now_us());
+        all_tried = all_tried || broker.next >= hosts;
         struct pollfd wait = {.fd = mqtt_broker_fd(&broker, &writes), .events = POLLIN};
         wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
         (void)poll(&wait, 1, 50);
