@@ -47,6 +47,30 @@ static void test_help_names_the_configuration_that_is_read(void) {
 #endif
 }
 
+/// The comment of each key is compiled in from the file in share/, by its section and name.
+static void expect_comments(const settings_form_t *form) {
+    for (size_t i = 0; i < form->count; i++) {
+        const settings_key_t *key = &form->keys[i];
+        const settings_help_t *help = form->help;
+        while (help->section != NULL &&
+               (strcmp(help->section, key->section) != 0 || strcmp(help->key, key->key) != 0)) {
+            help++;
+        }
+        TEST_ASSERT_NOT_NULL_MESSAGE(help->text, key->key);
+        TEST_ASSERT_EQUAL_STRING_LEN_MESSAGE("; ", help->text, 2, key->key);
+        TEST_ASSERT_EQUAL_CHAR_MESSAGE('\n', help->text[strlen(help->text) - 1U], key->key);
+    }
+}
+
+static void test_help_of_each_key_is_in_its_configuration_file(void) {
+    expect_comments(&mqtt_settings_form);
+    expect_comments(&ros_settings_form);
+    expect_comments(&serial_settings_form);
+#ifdef WITH_WEB
+    expect_comments(&web_settings_form);
+#endif
+}
+
 static void test_help_says_durations_as_they_are_read(void) {
     expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
     expect_said(help_record, "--for TIME  " DURATION_FORM ";");
@@ -113,6 +137,7 @@ static void test_help_of_confirm_lists_the_items_and_no_other(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_help_names_the_configuration_that_is_read);
+    RUN_TEST(test_help_of_each_key_is_in_its_configuration_file);
     RUN_TEST(test_help_says_durations_as_they_are_read);
     RUN_TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places);
     RUN_TEST(test_help_fits_a_terminal_of_80_columns);
