@@ -8,7 +8,6 @@
 #include <sys/random.h>
 #include <sysexits.h>
 #include <time.h>
-#include <unistd.h>
 
 #define SECOND_US 1000000U
 #define INFO_US   60000000U

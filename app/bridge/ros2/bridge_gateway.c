@@ -2,8 +2,6 @@
 // The gateway's side: there and gone, and what it says.
 #include "bridge_parts.h"
 
-#include <string.h>
-
 #define CONNECT_MS     200
 #define BACKOFF_MAX_US 2000000
 /// A snapshot that came so long after the lease was granted was made after it.

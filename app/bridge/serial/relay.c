@@ -11,7 +11,6 @@
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
 #include <sysexits.h>
-#include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
 #define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 6)

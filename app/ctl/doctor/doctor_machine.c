@@ -5,7 +5,6 @@
 #include "iwheel_northbound/text.h"
 
 #include <dirent.h>
-#include <errno.h>
 #include <grp.h>
 #include <linux/can.h>
 #include <stdio.h>

@@ -3,7 +3,6 @@
 #include "decode/frame.h"
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
-#include "text/ctl_text.h"
 
 #include "iwheel_linux/backend.h"
 

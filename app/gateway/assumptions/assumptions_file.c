@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "assumptions_file.h"
 
-#include "iwheel/codec.h"
-#include "iwheel/observation.h"
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/line.h"
