@@ -76,10 +76,16 @@ static void test_help_says_durations_as_they_are_read(void) {
     expect_said(help_record, "--for TIME  " DURATION_FORM ";");
 }
 
+/// The verb of that place in the program's page, or a null pointer behind the last.
+static const verb_t *verb_at(unsigned number) {
+    const char *name = help_find("help")->choice(number);
+    return (name != NULL) ? help_find(name) : NULL;
+}
+
 /// Completion and the program's page take the words and the summary from their places in the page.
 static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
     const verb_t *verb = NULL;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         char begin[64];
         char summary[64];
         const size_t length = (size_t)snprintf(begin, sizeof begin, "Usage: iwheelctl [--socket PATH]%s %s",
@@ -94,7 +100,7 @@ static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
 
 static void test_help_fits_a_terminal_of_80_columns(void) {
     const verb_t *verb = NULL;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         for (const char *line = verb->page; *line != '\0'; line += strcspn(line, "\n") + 1U) {
             TEST_ASSERT_LESS_OR_EQUAL_size_t_MESSAGE(80U, strcspn(line, "\n"), line);
         }
@@ -105,7 +111,7 @@ static void test_help_fits_a_terminal_of_80_columns(void) {
 static void test_help_names_each_word_that_may_follow(void) {
     const verb_t *verb = NULL;
     unsigned choices = 0;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         for (unsigned k = 0; verb->choice != NULL && verb->choice(k) != NULL && strcmp(verb->name, "help") != 0; k++) {
             expect_said(verb->page, verb->choice(k));
             choices++;
