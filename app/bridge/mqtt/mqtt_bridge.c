@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "mqtt_bridge.h"
 
+#include "common/bridge_service.h"
 #include "folder.h"
 
 #include <errno.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sysexits.h>
-#include <time.h>
 
 #define SECOND_US 1000000U
 #define INFO_US   60000000U
@@ -16,12 +16,6 @@ static const mqtt_way_t retained = {.qos = 1, .retain = true};
 
 static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
     return (mqtt_buffer_t){self->payload, sizeof self->payload};
-}
-
-static int64_t wall_us(void) {
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
 bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
@@ -93,7 +87,7 @@ static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
 }
 
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
-    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
     remember_stop(self, event);
     bridge_lease_end(&self->lease, self->now_us);
@@ -106,7 +100,8 @@ static void take_why(void *context, const iwc_message_t *reply) {
         remember_stop(self, reply);
     }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
-        const size_t length = mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, wall_us(), reply, buffer(self));
+        const size_t length =
+            mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, bridge_wall_us(), reply, buffer(self));
         keep_event(self, "stop", length, stop_us);
     }
 }
@@ -192,7 +187,7 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
         if (strcmp(name, "lease") == 0) {
             take_lease(self, event);
         }
-        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
         keep_event(self, name, length, self->spool.mark);
     }
     mqtt_events_send(self);
@@ -323,7 +318,7 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     return mqtt_broker_open(&self->broker, settings, &broker);
 }
 
-static void poll(mqtt_bridge_t *self) {
+static void poll_events(mqtt_bridge_t *self) {
     mqtt_spool_poll(&self->spool);
     if (self->spool.behind != self->told_behind) {
         self->told_behind = self->spool.behind;
@@ -360,7 +355,7 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     mqtt_spool_sync(&self->spool);
     if (now_us >= self->second_us) {
         self->second_us = now_us + SECOND_US;
-        poll(self);
+        poll_events(self);
     }
     return code;
 }

@@ -7,14 +7,8 @@
 /// A snapshot that came so long after the lease was granted was made after it.
 #define GRANTED_US 200000
 
-int64_t bridge_clock_us(clockid_t clock) {
-    struct timespec now;
-    (void)clock_gettime(clock, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 int64_t bridge_monotonic_us(void) {
-    return bridge_clock_us(CLOCK_MONOTONIC);
+    return (int64_t)bridge_now_us();
 }
 
 // ---- there and gone -----------------------------------------------------------------------------------------------

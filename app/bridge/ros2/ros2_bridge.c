@@ -162,7 +162,7 @@ static void tell(bridge_t *self, int64_t now) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&self->facts, (ros_tells_t)i, &statuses[i]);
     }
-    ros_publish_diagnostics(self->ros, statuses, bridge_clock_us(CLOCK_REALTIME));
+    ros_publish_diagnostics(self->ros, statuses, bridge_wall_us());
     if (now >= self->second_us) {
         self->second_us = now + SECOND_US;
         self->assumptions_due = true;
