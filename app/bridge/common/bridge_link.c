@@ -47,8 +47,6 @@ void bridge_link_close(bridge_link_t *self) {
     (void)close(self->epoll_fd);
 }
 
-// ---- here and gone ------------------------------------------------------------------------------------------------
-
 /// Becomes AWAY, or stays so: the line has ended, or was never there.
 static void lose(bridge_link_t *self) {
     const bridge_link_state_t before = self->state;
@@ -141,8 +139,6 @@ static int come_here(bridge_link_t *self) {
     }
     return 0;
 }
-
-// ---- listening ----------------------------------------------------------------------------------------------------
 
 static void listen_now(bridge_link_t *self) {
     iwc_message_t event;

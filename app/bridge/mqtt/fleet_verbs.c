@@ -35,8 +35,6 @@ static int complain(int code, const char *why) {
     return code;
 }
 
-// ---- the table ----------------------------------------------------------------------------------------------------
-
 void fleet_ignore(void *context) {
     (void)context;
 }
@@ -163,8 +161,6 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
     fleet_close(&console.fleet);
     return code;
 }
-
-// ---- the history --------------------------------------------------------------------------------------------------
 
 typedef struct {
     history_t *history;

@@ -23,8 +23,6 @@ bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     return self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
 }
 
-// ---- what the bridge says of itself -------------------------------------------------------------------------------
-
 static void tell_info(mqtt_bridge_t *self) {
     iwc_message_t state;
     const mqtt_info_t info = {.boot = self->boot,
@@ -61,8 +59,6 @@ static void tell_availability(mqtt_bridge_t *self, bool always) {
         self->online = online;
     }
 }
-
-// ---- events -------------------------------------------------------------------------------------------------------
 
 /// An event that is worth to be kept; `stop_us` is the wall clock of the newest stop, by which one is known that happened unseen.
 static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
@@ -105,8 +101,6 @@ static void take_why(void *context, const iwc_message_t *reply) {
         keep_event(self, "stop", length, stop_us);
     }
 }
-
-// ---- what the gateway says ----------------------------------------------------------------------------------------
 
 /// What makes a state worth sending at once: everything in it that is no measurement.
 static void read_condition(const iwc_message_t *state, char *out, size_t size) {
@@ -207,8 +201,6 @@ static void gateway_gone(void *context, uint64_t now_us) {
     tell_info(self);
 }
 
-// ---- the broker ---------------------------------------------------------------------------------------------------
-
 static void broker_up(void *context) {
     mqtt_bridge_t *self = context;
     iwc_message_t state;
@@ -228,8 +220,6 @@ static void broker_down(void *context) {
     self->sensors_us = 0;
     mqtt_bridge_stop_if_ours(self);
 }
-
-// ---- the whole ----------------------------------------------------------------------------------------------------
 
 static bool make_boot(char out[MQTT_BOOT_SIZE]) {
     uint64_t number = 0;

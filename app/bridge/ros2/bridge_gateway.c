@@ -11,8 +11,6 @@ int64_t bridge_monotonic_us(void) {
     return (int64_t)bridge_now_us();
 }
 
-// ---- there and gone -----------------------------------------------------------------------------------------------
-
 void bridge_end_lease(bridge_t *self) {
     self->leased_us = 0;
     self->driver = 0;
@@ -122,8 +120,6 @@ iwc_result_t bridge_call(bridge_t *self) {
     }
     return IWC_OK;
 }
-
-// ---- what the gateway says ----------------------------------------------------------------------------------------
 
 static void take_stop(bridge_t *self, const iwc_message_t *event) {
     const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);

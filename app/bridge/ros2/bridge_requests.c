@@ -55,8 +55,6 @@ static void answer_result(bridge_t *self, const ros_request_t *request, iwc_resu
     }
 }
 
-// ---- what permits motion or opens a latch -----------------------------------------------------------------------------
-
 /// Empty: somebody wants it now.
 static const char *why_not_meant(bridge_t *self, const ros_request_t *request, int64_t *out_age_us) {
     const ros_moment_t now = bridge_moment();

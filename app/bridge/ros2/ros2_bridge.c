@@ -8,8 +8,6 @@
 /// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
 #define SILENT_US 150000
 
-// ---- commands ----------------------------------------------------------------------------------------------------
-
 /// What a command is, besides what it wants.
 typedef struct {
     ros_twist_t twist;
@@ -116,8 +114,6 @@ static void take_from_ros(bridge_t *self) {
         bridge_take_request(self, &request);
     }
 }
-
-// ---- time ---------------------------------------------------------------------------------------------------------
 
 static void judge_silence(bridge_t *self, int64_t now) {
     const int64_t timeout_us = (int64_t)self->settings.drive.timeout_ms * 1000;
@@ -230,8 +226,6 @@ static bool take_now(void *context) {
     (void)pthread_mutex_unlock(&self->lock);
     return can;
 }
-
-// ---- begin and end ------------------------------------------------------------------------------------------------
 
 static int open_both(bridge_t *self) {
     self->gateway = iwc_new();

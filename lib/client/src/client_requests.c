@@ -140,8 +140,6 @@ bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply) {
     return true;
 }
 
-// ---- composing ----------------------------------------------------------------------------------------------------
-
 /// Room for the longest request of ours: `estop` with a reason that is escaped throughout.
 #define TEXT_SIZE        640U
 #define NAME_MAX_BYTES   64U
