@@ -170,15 +170,20 @@ static const char *hint(const char *key) {
                : NULL;
 }
 
+static const settings_form_t form;
+
+static unsigned line_of(const char *key, const unsigned *lines) {
+    return lines[settings_find(&form, NULL, key) - keys];
+}
+
 /// Of the last key of the stop budget that was given.
 static unsigned last_line(const unsigned *lines) {
+    static const char *const budget[] = {"period_ms", "lease_ms", "decel_mm_s2", "max_speed_mm_s"};
     unsigned last = 0;
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        const uint16_t range = keys[i].range;
-        const bool involved = range == IW_CONFIG_PERIOD || range == IW_CONFIG_LEASE || range == IW_CONFIG_DECEL ||
-                              range == IW_CONFIG_MAX_SPEED;
-        if (involved && lines[i] > last) {
-            last = lines[i];
+    for (size_t i = 0; i < sizeof budget / sizeof budget[0]; i++) {
+        const unsigned line = line_of(budget[i], lines);
+        if (line > last) {
+            last = line;
         }
     }
     return last;
@@ -204,20 +209,9 @@ static void budget_cures(const iw_config_t *core, char *out, size_t size) {
 /// Without a value standstill follows from radius and gear.
 static void complete(void *values, const unsigned *lines) {
     iw_config_t *core = &((gateway_config_t *)values)->core;
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (keys[i].range == IW_CONFIG_REST_RPM && lines[i] == 0U) {
-            core->rest_rpm = iw_config_rest(core).standard;
-        }
+    if (line_of("rest_rpm", lines) == 0U) {
+        core->rest_rpm = iw_config_rest(core).standard;
     }
-}
-
-static unsigned line_of(uint16_t range, const unsigned *lines) {
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (keys[i].range == range) {
-            return lines[i];
-        }
-    }
-    return 0;
 }
 
 static void complain_rest(settings_report_t *report, const iw_config_t *core, unsigned line) {
@@ -227,18 +221,9 @@ static void complain_rest(settings_report_t *report, const iw_config_t *core, un
                       core->rest_rpm, core->radius_mm, iw_config_rest(core).max, iw_config_rest(core).standard);
 }
 
-static unsigned line_of_key(const char *name, const unsigned *lines) {
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (strcmp(keys[i].section, "estop") == 0 && strcmp(keys[i].key, name) == 0) {
-            return lines[i];
-        }
-    }
-    return 0;
-}
-
 static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
     const iw_config_t *core = &((const gateway_config_t *)values)->core;
-    config_relate_contacts(values, report, line_of_key("line2", lines), line_of_key("estop_discrepancy_ms", lines));
+    config_relate_contacts(values, report, line_of("line2", lines), line_of("estop_discrepancy_ms", lines));
     char cures[SETTINGS_MESSAGE_SIZE];
     const iw_config_fault_t fault = iw_config_check(core);
     if (fault == IW_CONFIG_STOP_BUDGET) {
@@ -250,10 +235,10 @@ static void relate(settings_report_t *report, const void *values, const unsigned
             core->lease_ms, core->period_ms, core->max_speed_mm_s, core->decel_mm_s2,
             (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
     } else if (fault == IW_CONFIG_REST_SPEED) {
-        complain_rest(report, core, line_of(IW_CONFIG_REST_RPM, lines));
+        complain_rest(report, core, line_of("rest_rpm", lines));
     } else if (fault == IW_CONFIG_MIN_CURRENT) {
         settings_complain(
-            report, line_of(IW_CONFIG_MIN_CURRENT, lines),
+            report, line_of("min_current_mA", lines),
             "min_current_mA = %u is more than max_current_mA = %u: rule R15, no limit of a client would be "
             "permitted; write min_current_mA = %u at most, or max_current_mA = %u at least",
             core->min_current_mA, core->max_current_mA, core->max_current_mA, core->min_current_mA);
