@@ -23,7 +23,6 @@ bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, con
     return bridge_stop_open(&self->stop, terms->socket, self->epoll_fd) && lines && self->epoll_fd >= 0;
 }
 
-/// Takes a waiting question out of its place.
 static bridge_question_t take_out(bridge_link_t *self, unsigned at) {
     const bridge_question_t question = self->waits[at];
     self->count--;

@@ -28,7 +28,6 @@ static bool is_local(const char *bus) {
     return strncmp(bus, "unix:", 5U) == 0;
 }
 
-/// Reads the first word of a file of sysfs.
 static bool read_word(const char *path, char *out_word, size_t size) {
     FILE *file = fopen(path, "re");
     if (file == NULL) {

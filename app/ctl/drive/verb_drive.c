@@ -104,7 +104,6 @@ static iwc_result_t send_drive(drive_t *self, int64_t now_us) {
     return result;
 }
 
-/// What a line from the gateway means for the drive.
 static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
     const json_t *ok = json_object_get(line, "ok");
     if (ok == NULL) {
