@@ -155,7 +155,7 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
             break;
         }
         if (result != IWC_OK && result != IWC_TIMEOUT) {
-            code = ctl_lost(ctl, result);
+            code = ctl_lost(result);
         }
     }
     return code;
