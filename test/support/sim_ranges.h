@@ -5,8 +5,8 @@
 /// assumptions: nobody has measured them on a real pair of wheels.
 ///
 /// What each of them means is in motion.h. Not in here: faults, such as a blocked wheel.
-#ifndef IWHEEL_SIM_RANGES_H
-#define IWHEEL_SIM_RANGES_H
+#ifndef SIM_RANGES_H
+#define SIM_RANGES_H
 
 #include "iwheel_sim/pair.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel_sim/ranges.h"
+#include "sim_ranges.h"
 
 static uint32_t between(sim_random_t *random, uint32_t low, uint32_t high) {
     return low + sim_random_below(random, high - low + 1U);
