@@ -34,7 +34,7 @@ COUNTED = {
     "unit.ctl": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"), "unit.client": ("tests of the C client's example", "test/client/test_*.py", r"^    def test_"),
     "faults.table": ("seeded faults", "test/faults/*.faults", r"^@@ .* \| "), "target.driver": ("tests of the STM32 driver", "test/target/*.c", r"^ *RUN_TEST\("),
     "kernel.verdicts": ("tests of the kernel's runner", "test/kernel/test_*.py", r"^    def test_"), "fuzz.targets": ("fuzz targets", "test/fuzz/fuzz_*.c", r"^int LLVMFuzzerTestOneInput"),
-    "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"), "gates.faults": ("faults for gates", "scripts/planted_faults.py", r"^    \("),
+    "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"), "gates.faults": ("faults for gates", "test/gates/planted_faults.py", r"^    \("),
     "verdicts.tests": ("tests of the verdicts", "test/support/test_verdict.py", r"^    def test_"),
 }
 
