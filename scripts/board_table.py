@@ -5,7 +5,7 @@
 usage: board_table.py --update|--check
 
 The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld, the clocks of the board's header.
-Exit status 77 (skipped) without a compiler. The sizes are in docs/sizes.md: scripts/size_table.py.
+Exit status 77 (skipped) without a compiler. The sizes are in docs/sizes.md: scripts/sizes.py.
 """
 import re
 import shutil

@@ -204,13 +204,19 @@ def codespell(folder, text):
 
 def style(folder, code):
     for part in ("core/src", "core/include", "lib/northbound/protocol/src", "lib/northbound/protocol/include", "port", "app", "test"):
-        (folder / part).mkdir(parents=True)
+        (folder / part).mkdir(parents=True, exist_ok=True)
     (folder / "core/src/planted.c").write_text(code)
     for part in ("core/src", "port"):
         (folder / part / "commented.c").write_text(CLEAN + ("// A reason.\n" + "int iw_x;\n" * 7) * 12)
     for part in ("lib/northbound/protocol/src", "app"):
         (folder / part / "clean.c").write_text(CLEAN)
-    return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
+    return run(sys.executable, SCRIPTS / "style.py", folder)
+
+
+def style_header(folder, guard):
+    (folder / "app").mkdir()
+    (folder / "app/planted.h").write_text(f"// SPDX-License-Identifier: MIT\n#ifndef IW_{guard}\n#define IW_{guard}\n#endif\n")
+    return style(folder, CLEAN)
 
 
 def put(folder, fault):
@@ -260,7 +266,8 @@ def api(folder, fault):
     (folder / "docs").mkdir()
     shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
     (folder / "core/include/planted.h").write_text(fault)
-    return run(SCRIPTS / "api_reference", folder)
+    command = re.search(r'^test\(idle api .* sh -c "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)[1]
+    return run("sh", "-c", command.replace("\\$", "$"), cwd=folder)
 
 
 def pages(folder, fault):
@@ -334,17 +341,24 @@ def python_wheels(folder, lines):
     return status, said
 
 
-def dialect(folder, code):
-    (folder / "app").mkdir()
-    (folder / "app/planted.c").write_text(code)
-    return run(SCRIPTS / "dialect.py", "--check", folder)
+def of_sizes():
+    sys.path.insert(0, str(SCRIPTS))
+    return importlib.import_module("sizes")
 
 
 def sizes(_, new):
-    spec = importlib.util.spec_from_file_location("size_table", SCRIPTS / "size_table.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    found = [*module.differences({"permit": [2000], "core": [9000]}, new)]
+    found = [*of_sizes().differences({"permit": [2000], "core": [9000]}, new)]
+    return len(found), "\n".join(found)
+
+
+def sizes_of_use(_, more):
+    """What is linked on a Cortex-M4 for the use of the codec, and of something more."""
+    module, build = of_sizes(), ROOT / "build/arm"
+    if not [*build.rglob("libiwheel_core.a")]:
+        return 77, "build/arm has no library"
+    module.CPUS = {"Cortex-M4": "cortex-m4"}
+    module.USES = {"codec": ("codec.h observation.h", f"{module.CODEC} {more}", 10_000)}
+    found = module.uses([build])[1]
     return len(found), "\n".join(found)
 
 
@@ -517,10 +531,12 @@ CASES = [
     (style, "lizard", "401 lines that are no comments", CLEAN + "\n" * 396, True),
     (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
     (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
-    (dialect, "python3", "clean", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),
-    (dialect, "python3", "++ before a name", function("    ++a;\n    return a;\n"), True),
-    (dialect, "python3", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
-    (dialect, "python3", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
+    (style, "lizard", "the form of the tree", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),
+    (style, "lizard", "++ before a name", function("    ++a;\n    return a;\n"), True),
+    (style, "lizard", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
+    (style, "lizard", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
+    (style_header, "lizard", "clean", "PLANTED_H", False),
+    (style_header, "lizard", "an include guard of another name", "PLANTS_H", True),
     (faults, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
     (faults, "python3", "a function is renamed that no fault is in", ("lib/northbound/server/src/requests.c", "void carry_out(", "void carry_it_out("), False),
     (faults, "python3", "a function is renamed that faults are in", ("lib/northbound/server/src/drive.c", "void iwn_server_twist(", "void iwn_server_turn("), False),
@@ -573,6 +589,8 @@ CASES = [
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
+    (sizes_of_use, "arm-none-eabi-gcc", "clean", "", False),
+    (sizes_of_use, "arm-none-eabi-gcc", "a module that nothing calls", "iw_observation_init", True),
     (mutation, "clang", "seen", "killed", False),
     (mutation, "clang", "lives", "lives", True),
     (around, "clang", "seen", ("daemon_motion", {}, True), False),
