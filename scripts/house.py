@@ -13,7 +13,7 @@ pages    the lists of docs/how-to-add.md, and the indexes of test/, scripts/ and
 pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
          of the tree calls pip without checksums.
 
-Tried: clang-tidy (14 has no check of includes between folders), include-what-you-use (judges one file), `uv lock --check` (needs the network).
+No tool does it: clang-tidy has no check of includes between folders, and include-what-you-use judges one file; `uv lock --check` compares with uv.lock, not with lists for pip.
 """
 import json
 import os

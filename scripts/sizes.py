@@ -10,8 +10,8 @@ those of the presets arm-m3 and arm, which listen, of the build next to arm that
 top of the main loop's deepest path; calls through the HAL go to each of its functions. Of an image that is optimised as one program, the graph is
 that of the linker's result and of the objects apart from it.
 
-Exit status 77 (skipped) if the committed table was made by another compiler. Tried: `size` and bloaty, which measure one file, not what is linked of a
-library for a use; gcc's -fstack-usage, which gives frames, not paths.
+Exit status 77 (skipped) if the committed table was made by another compiler. No tool does it: `size` and bloaty measure one file, not what is linked of a
+library for a use; -fstack-usage of gcc gives frames, not paths.
 """
 import re
 import subprocess

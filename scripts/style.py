@@ -11,8 +11,8 @@ compiler accepts in two forms is not written in the one of this tree:
 
 usage: style.py [--fix] [ROOT]      --fix writes that form
 
-Needs lizard (PyPI), which measures functions. Tried: clang-tidy 14 and clang-format 14 have no check for any of this but the length of functions and
-their parameters, and do not compile the STM32 port; readability-math-missing-parentheses (19) does not judge conditions.
+Needs lizard (PyPI), which measures functions. Tried: clang-tidy and clang-format 14 have no check for any of this but the length of functions
+and their parameters, and clang-tidy does not compile the STM32 port.
 """
 import re
 import statistics

@@ -111,6 +111,7 @@ test(idle upgrade.packages ci packaging debian.packages "" 60 test/upgrade/run -
 test(real upgrade ci packaging "debian.packages;upgrade.packages" "" 24 test/upgrade/run)
 test(idle package check packaging default "" 28 test/package/run ${B})
 test(idle python.words check lint "" "" 1 scripts/northbound.py --check)
+test(idle python.description check lint "" "" 1 python3 test/northbound/test_description.py)
 # Installed from a copy: setuptools writes beside the sources.
 test(idle python.install check packaging "" py:pip 8 sh -c "rm -rf build/python && mkdir -p build/python && cp -r python/src python/pyproject.toml python/README.md build/python && .venv/bin/pip install --quiet --disable-pip-version-check --no-deps --no-index --no-build-isolation --target build/python/site ./build/python && cd / && PYTHONPATH=${ROOT}/build/python/site ${ROOT}/.venv/bin/python -c 'import iwheel'")
 test(idle python.types check lint "" py:mypy 10 sh -c "cd python && ../.venv/bin/mypy")

@@ -152,14 +152,17 @@ def northbound(folder, fault):
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
     sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
                "lib/northbound/server/src/observe.c", *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json"))]
-    for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
+    for name in ("scripts/northbound.py", "test/northbound/described.py", "test/northbound/test_description.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
         if name == fault[0]:
             assert fault[1] in text, f"{name} no longer has {fault[1]}"
             text = text.replace(fault[1], fault[2], 1)
         (folder / name).write_text(text)
-    return run(sys.executable, folder / "scripts/northbound.py", "--check")
+    written, said = run(sys.executable, folder / "scripts/northbound.py", "--check")
+    told, more = run(sys.executable, folder / "test/northbound/test_description.py")
+    # A failure comes with a traceback as well; only an error is a broken gate.
+    return written + told, said + (more if "errors=" in more else more.replace("Traceback", "at"))
 
 
 def eva(folder, code):
