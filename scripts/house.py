@@ -31,10 +31,7 @@ HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">]+)[">]', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "lib", "port", "app")
-# Libraries and programs: where each looks for headers of its own.
-COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
-              "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/board": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "lib/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": (), "lib/sockets": ()}
+DEPTH = {"core": 4, "app/bridge/ros2": 6}  # Of any other: 5.
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
 
 
@@ -69,9 +66,9 @@ def depth(path, folders, known):
     return known[path]
 
 
-def deepest(headers, component):
+def deepest(component):
     """(levels, where) of the file with the most headers of its own library or program below it."""
-    known, folders = {}, [ROOT / folder for folder in headers]
+    known, folders = {}, [ROOT / component / folder for folder in ("include", "src", ".")]
     return max(((depth(path.resolve(), folders, known), name(path)) for path in sources(component)), default=(0, component))
 
 
@@ -151,24 +148,22 @@ def fact_of_arrows(program, limit):
 
 def facts():
     builds = [ROOT / "build" / build for build in BUILDS if (ROOT / "build" / build / "compile_commands.json").is_file()]
-    message, headers, private = files_of_a_message(), public_headers(), private_includes()
-    levels = {component: deepest(headers, component) for component, headers in COMPONENTS.items()}
-    deep = max((fact, component) for component, fact in levels.items() if component != "core")[0]
     compiled, parts = uses_of_parts(builds)
-    daemon = [line for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line]
-    print(f"files that name every telemetry message: {len(message)} (limit 8): {', '.join(message)}")
-    print(f"public headers of the core: {len(headers)} (limit 11): {', '.join(headers)}")
-    print(f"include depth of the core: {levels['core'][0]} (limit 4), at {levels['core'][1]}; of any other library or program: {deep[0]} (limit 5), at {deep[1]}")
-    print(f"private headers included outside the core: {len(private)} (limit 0)")
-    print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
-    print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
-    findings = [*private, *parts, *fact_of_arrows("app/gateway", 42), *fact_of_arrows("app/ctl", 40)]
-    findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
-    findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
-    findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []
-    findings += [f"{where} includes {count} levels deep" for component, (count, where) in levels.items() if count > (4 if component == "core" else 5)]
-    findings += ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
-    return findings
+    counted = [("files that name every telemetry message", files_of_a_message(), 8), ("public headers of the core", public_headers(), 11),
+               ("private headers included outside the core", private_includes(), 0),
+               (f"parts of iw_gateway_t named outside the core, in {compiled} files compiled", parts, 0),
+               ("lines of app/gateway that name gw_daemon_t, the whole of it",
+                [line.strip() for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line], 60)]
+    findings = ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
+    for what, found, limit in counted:
+        print(f"{what}: {len(found)} (limit {limit})")
+        findings += [f"{what}: {one}" for one in found] if len(found) > limit else []
+    levels = {component: deepest(component) for component in permitted()}
+    for component, (count, where) in sorted(levels.items()):
+        limit = DEPTH.get(component, 5)
+        print(f"include depth of {component}: {count} (limit {limit}), at {where}")
+        findings += [f"{where} includes {count} levels deep"] if count > limit else []
+    return [*findings, *fact_of_arrows("app/gateway", 42), *fact_of_arrows("app/ctl", 40)]
 
 
 # ---- layers ---------------------------------------------------------------------------------------------------------
@@ -226,21 +221,10 @@ def files(*places):
 
 
 def line_of(name, pattern):
-    """The first line with the pattern, as "12: text"; None: there is none."""
-    try:
-        text = (ROOT / name).read_text(encoding="utf-8")
-    except (UnicodeDecodeError, FileNotFoundError):
-        return None
+    """The number of the first line with the pattern; None: there is none."""
+    text = (ROOT / name).read_text(errors="replace") if (ROOT / name).is_file() else ""
     found = re.search(pattern, text)
-    if not found:
-        return None
-    number = text.count("\n", 0, found.start())
-    return f"{number + 1}: {text.splitlines()[number].strip()[:80]}"
-
-
-def moved_to(name):
-    same = [other for other in files(".") if Path(other).name == Path(name).name and other != name]
-    return f"; is it {' or '.join(same)} now?" if same else ""
+    return text.count("\n", 0, found.start()) + 1 if found else None
 
 
 def judge_list(title, section):
@@ -249,20 +233,17 @@ def judge_list(title, section):
         return [f'{PAGE}, "{title}": the list has no comment `<!-- pattern: REGEX  in: PLACE... -->`']
     pattern, places = mark[1], mark[2].split()
     listed = [name for line in re.findall(r"^\d+\. .*$", section, re.MULTILINE) for name in re.findall(r"^\d+\. `([^`]+)`", line)]
-    there = {name: line_of(name, pattern) for name in files(*places)}
-    there = {name: line for name, line in there.items() if line}
-    if not there and not listed:
-        print(f'note: {PAGE}, "{title}": nothing in the tree is such a thing yet, and nothing is listed')
+    there = {name: line for name in files(*places) if (line := line_of(name, pattern))}
     where = f'{PAGE}, "{title}"'
     wrong = [f"{where}: add a numbered line for `{name}`, which has the pattern in line {line}" for name, line in there.items() if name not in listed]
     for name in listed:
         if not (ROOT / name).is_file():
-            wrong.append(f"{where}: `{name}` is not there: take its line out, or name the file that does this now{moved_to(name)}")
+            wrong.append(f"{where}: `{name}` is not there: take its line out, or name the file that does this now")
         elif not line_of(name, pattern):
             wrong.append(f"{where}: take the line of `{name}` out: nothing in it is like {pattern} any more")
     wrong += [f"{where}: `{name}` is listed twice" for name in set(listed) if listed.count(name) > 1]
     beside = [name for name in re.findall(r"`([\w./-]+/[\w.-]+\.\w+)`", MARK.sub("", section)) if not (ROOT / name).exists()]
-    return wrong + [f"{where}: `{name}` is not there{moved_to(name)}" for name in sorted(set(beside) - set(listed))]
+    return wrong + [f"{where}: `{name}` is not there" for name in sorted(set(beside) - set(listed))]
 
 
 def judge_how_to_add():
