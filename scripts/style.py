@@ -83,12 +83,6 @@ def file_findings(path, name, longest=FILE_LINES):
             yield f"{name}:{number}: unfinished: {line.strip()}"
 
 
-def line_findings(path, name):
-    for number, line in enumerate(path.read_text().splitlines(), 1):
-        if len(line) > LINE:
-            yield f"{name}:{number}: {len(line)} characters, at most {LINE}"
-
-
 def known_names(root):
     """(identifiers of the code, names of files, rules of the safety case): what a comment may speak of."""
     paths = sources(root, CODE)
@@ -100,9 +94,11 @@ def known_names(root):
 
 
 def dangling(path, name, known):
-    """Names in comments that nothing bears: a comment that no longer holds misleads."""
+    """Lines that are too long, and names in comments that nothing has: a comment that no longer holds misleads."""
     identifiers, files, rules = known
     for number, line in enumerate(path.read_text().splitlines(), 1):
+        if len(line) > LINE:
+            yield f"{name}:{number}: {len(line)} characters, at most {LINE}"
         comment = " ".join(found for found in STRING_OR_COMMENT.findall(line) if found.startswith("/"))
         gone = [found for found in NAMED.findall(comment) if found not in identifiers]
         gone += [found for found in FILE_NAMED.findall(comment) if found not in files and Path(found).name not in files]
@@ -188,30 +184,20 @@ def main(arguments):
     root = Path(places[0] if places else Path(__file__).resolve().parent.parent).resolve()
     findings = [finding for path in sources(root, DIALECT) for finding in dialect_findings(path, path.relative_to(root), fix)]
     for group, limits in GROUPS.items():
-        paths = sources(root, limits[0])
-        lengths, complexities = [], []
-        for path in paths:
-            functions = lizard.analyze_file(str(path)).function_list
-            lengths += [function.length for function in functions]
-            complexities += [function.cyclomatic_complexity for function in functions]
-            findings += function_findings(path.relative_to(root), functions, limits)
-            findings += file_findings(path, path.relative_to(root))
+        measured = {path: lizard.analyze_file(str(path)).function_list for path in sources(root, limits[0])}
+        lengths = [function.length for functions in measured.values() for function in functions]
         if not lengths:
             sys.exit(f"{group}: no function found in {', '.join(limits[0])}")
-        if statistics.median(lengths) > limits[2]:
-            findings.append(f"{group}: the median function has {statistics.median(lengths)} lines, at most {limits[2]}")
-        sizes = [len(path.read_text().splitlines()) for path in paths]
-        print(f"{group}: {len(lengths)} functions in {len(paths)} files; lines: median {statistics.median(lengths):g}, "
-              f"max {max(lengths)}; complexity: median {statistics.median(complexities):g}, max {max(complexities)}; "
-              f"file lines: median {statistics.median(sizes):g}, max {max(sizes)}; "
-              f"comments {comment_share(paths):.0f} %")
-    headers = sources(root, HEADERS)
-    for path in headers:
+        for path, functions in measured.items():
+            findings += [*function_findings(path.relative_to(root), functions, limits), *file_findings(path, path.relative_to(root))]
+        median = statistics.median(lengths)
+        findings += [f"{group}: the median function has {median} lines, at most {limits[2]}"] if median > limits[2] else []
+        print(f"{group}: {len(lengths)} functions in {len(measured)} files, lines: median {median:g}, max {max(lengths)}; comments {comment_share(measured):.0f} %")
+    for path in sources(root, HEADERS):
         findings += function_findings(path.relative_to(root), lizard.analyze_file(str(path)).function_list, GROUPS["core"])
         findings += file_findings(path, path.relative_to(root))
     known = known_names(root)
     for path in sources(root, COMMENTED):
-        findings += line_findings(path, path.relative_to(root))
         findings += dangling(path, path.relative_to(root), known)
     for folder, (least, most) in COMMENT_SHARE.items():
         share = comment_share([path for path in sources(root, (folder,)) if path.suffix == ".c"])
@@ -220,7 +206,6 @@ def main(arguments):
             findings.append(f"{folder}: {share:.1f} % comments, between {least} and {most} % wanted")
     for path in sources(root, ("test",)):
         findings += file_findings(path, path.relative_to(root), TEST_FILE_LINES)
-    print(f"public headers: comments {comment_share(headers):.0f} %")
     print(*findings, sep="\n")
     return 1 if findings else 0
 
