@@ -18,7 +18,7 @@ The form of the description: `requests`, `events` and `objects` have `fields`, e
 `extends` names an object whose fields come before. `reply` of a request and `topic` of an event say the rest. What is sent beside that is
 `cmd` and `id` of a request, `id` and `ok` of a reply, `event` of an event. A refusal is the object `refusal`.
 
-docs/northbound.md and the words of the C sources are compared with it by test/northbound, the gateway by python/tests/test_protocol.py. No tool
+Its form, docs/northbound.md and the words of the C sources are judged by test/northbound, the gateway by python/tests/test_protocol.py. No tool
 does it: JSON Schema has neither units nor words with a meaning, and datamodel-code-generator (PyPI), which writes TypedDicts from it, writes no C.
 """
 
@@ -32,7 +32,6 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TYPES = os.path.join("python", "src", "iwheel", "_protocol.py")
 FIELDS = os.path.join("lib", "northbound", "protocol", "src", "request_fields.h")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
-FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least", "most", "default", "bytes"}
 
 
 def read(path):
@@ -53,45 +52,6 @@ class Description:
         """All fields of an object, request or event: its own and those it extends."""
         before = self.fields(self.objects[holder["extends"]]) if "extends" in holder else {}
         return {**before, **holder["fields"]}
-
-    def reply(self, cmd):
-        return self.fields(self.objects[self.requests[cmd]["reply"]])
-
-    def event(self, name):
-        return self.fields(self.events[name])
-
-    def unit(self, name, field):
-        """In words; None: it has none."""
-        if "unit" in field:
-            return field["unit"]
-        ends = [end for end in self.units if name == end or name.endswith("_" + end)]
-        return self.units[max(ends, key=len)] if ends and field["type"] == "integer" else None
-
-    # Its own form ----------------------------------------------------------------------------------------------------
-
-    def faults(self):
-        """What is wrong with the description itself."""
-        holders = [("objects", self.objects), ("requests", self.requests), ("events", self.events), ("serial", self.raw["serial"])]
-        for group, members in holders:
-            for member, holder in members.items():
-                for name, field in holder["fields"].items():
-                    yield from self._field_faults(f"{group}.{member}.{name}", name, field)
-        for cmd, request in self.requests.items():
-            if request["reply"] not in self.objects:
-                yield f"requests.{cmd}: the reply {request['reply']} is no object"
-        for name, event in self.events.items():
-            if event["topic"] is not None and event["topic"] not in self.words["topic"]:
-                yield f"events.{name}: {event['topic']} is no topic"
-
-    def _field_faults(self, where, name, field):
-        kinds = field["type"] if isinstance(field["type"], list) else [field["type"]]
-        for key in set(field) - FIELD_KEYS:
-            yield f"{where}: what is {key}?"
-        for kind in kinds:
-            if kind not in PLAIN and kind not in self.words and kind not in self.objects:
-                yield f"{where}: {kind} is no type"
-        if kinds == ["integer"] and self.unit(name, field) is None:
-            yield f"{where}: an integer without a unit"
 
 
 # The Python client's types -------------------------------------------------------------------------------------------
@@ -234,15 +194,13 @@ def main(arguments):
     if arguments not in (["--check"], ["--update"]):
         print(__doc__.split("\n\n")[1], file=sys.stderr)
         return 64
-    description = Description()
-    found = list(description.faults())
-    if not found:
-        for path, text in ((TYPES, python_types(description)), (FIELDS, c_fields(description))):
-            if arguments == ["--update"]:
-                with open(os.path.join(ROOT, path), "w", encoding="utf-8") as file:
-                    file.write(text)
-            elif not os.path.exists(os.path.join(ROOT, path)) or read(path) != text:
-                found.append(f"{path} is not what share/northbound.json makes of it; mend: scripts/northbound.py --update")
+    description, found = Description(), []
+    for path, text in ((TYPES, python_types(description)), (FIELDS, c_fields(description))):
+        if arguments == ["--update"]:
+            with open(os.path.join(ROOT, path), "w", encoding="utf-8") as file:
+                file.write(text)
+        elif not os.path.exists(os.path.join(ROOT, path)) or read(path) != text:
+            found.append(f"{path} is not what share/northbound.json makes of it; fix: scripts/northbound.py --update")
     print("\n".join(found) or "the Python client's types and the C reader's fields are those of share/northbound.json")
     return 1 if found else 0
 
