@@ -7,7 +7,7 @@ usage: scripts/proofs.py [--update] [TABLE]
 A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), or one of several proofs in a step. `number` is a minimum of single
 tests. It fails: a step without a row, a row whose step or runner is no longer there, or that went to a longer list, and a number that has become
 smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts); a step that was not
-run here is "not run", which is no pass. --update raises numbers and adds steps.
+run here is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
 """
 import csv
 import re
