@@ -179,13 +179,15 @@ def eva_core(folder, fault):
 def mcdc(folder, calls):
     """A function with a decision of two conditions and a main that makes the calls given."""
     (folder / "core").mkdir()
-    (folder / "profiles").mkdir()
+    (folder / "build/mcdc/profiles").mkdir(parents=True)
     (folder / "core/planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
     (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
     run("clang-19", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc", folder / "main.c",
-        folder / "core/planted.c", "-o", folder / "unit_planted")
-    run("env", f"LLVM_PROFILE_FILE={folder}/profiles/a.profraw", folder / "unit_planted")
-    return run(SCRIPTS / "mcdc_gate.py", folder, folder / "core")
+        folder / "core/planted.c", "-o", folder / "build/mcdc/unit_planted")
+    run("env", f"LLVM_PROFILE_FILE={folder}/build/mcdc/profiles/a.profraw", folder / "build/mcdc/unit_planted")
+    inner, outer = re.findall(r'^set\(conditions "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)
+    command = outer.replace("${conditions}", inner).replace("\\$", "$").replace('\\"', '"')
+    return run("sh", "-c", command, cwd=folder)
 
 
 def ruff(folder, code):
@@ -455,6 +457,7 @@ CASES = [
     (analyzer, "gcc", "clean", CLEAN, False),
     (analyzer, "gcc", "second free", "#include <stdlib.h>\nvoid f(void *p);\nvoid f(void *p)\n{\n    free(p);\n    free(p);\n}\n", True),
     (mcdc, "llvm-cov-19", "clean", SOME_FOUR, False),
+    (mcdc, "llvm-cov-19", "a decision that nothing runs", "", True),
     (mcdc, "llvm-cov-19", "a condition that never decides alone", "f(0, 0); f(1, 1);", True),
     (eva, "frama-c", "clean", SOME_INDEX.format(1), False),
     (eva, "frama-c", "index off by one", SOME_INDEX.format(2), True),
