@@ -242,7 +242,7 @@ static void look(iw_side_t side) {
     (void)iw_gateway_is_sending(&gateway);
     iw_gateway_snapshot(&gateway, now_us, &seen);
     (void)iw_snapshot_force_validity(&seen, side);
-    iw_observation_step(&source, &gateway, &seen);
+    iw_observation_step(&observation, &gateway, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
     (void)iw_assumption_entry(&gateway.assumptions, IW_ASSUMPTION_DLC);
@@ -303,7 +303,7 @@ int main(void) {
     if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
         return 1;
     }
-    iw_observation_init(&source);
+    iw_observation_init(&observation);
     //@ slevel merge;
     live();
     return 0;
