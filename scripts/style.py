@@ -39,7 +39,7 @@ IMPOSED = ("web_call_handle",)  # A library calls these: it says what they take.
 SPDX = "SPDX-License-Identifier: MIT"
 UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX)\b")
 STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
-NAMED = re.compile(r"\b(?:iw|IW)_\w*[A-Za-z0-9]\b(?![*_])|(?<=`)[A-Za-z]\w+(?=(?:\(\))?`)|(?<=::)\w+")
+NAMED = re.compile(r"\b(?:iw[lnc]?|IW[LNC]?|brd|BRD)_\w*[A-Za-z0-9]\b(?![*_])|(?<=`)[A-Za-z]\w+(?=(?:\(\))?`)|(?<=::)\w+")
 FILE_NAMED = re.compile(r"(?<![\w/<-])[\w/-]+\.(?:[ch]|md)\b")
 RULE_NAMED = re.compile(r"\bR\d+\b")
 DIALECT = ("core", "port", "lib", "app", "test", "examples")

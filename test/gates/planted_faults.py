@@ -526,6 +526,7 @@ CASES = [
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
     (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
+    (style, "lizard", "a comment that names a macro of the board that is gone", CLEAN + "// As BRD_GONE.\n", True),
     (style, "lizard", "a comment that names a file that is gone", CLEAN + "// See gone.h.\n", True),
     (style, "lizard", "a comment that names a rule that is gone", CLEAN + "// By R99.\n", True),
     (style, "lizard", "121 characters", CLEAN + "// " + "a" * 118 + "\n", True),
