@@ -234,7 +234,7 @@ def put(folder, fault):
 
 def house(folder, fault):
     """The tree with one change. Of the programs only the one changed is compiled anew."""
-    for part in ("core", "port", "lib", "app"):
+    for part in ("core", "port", "lib", "app", "docs"):
         shutil.copytree(ROOT / part, folder / part)
     put(folder, fault)
     flags = [f"-I{folder / part}" for part in ("core/include", "port/stm32_stub", "port/stm32_stub/access", "port/stm32_stub/boards/stm32f103")]
