@@ -10,7 +10,7 @@
 
 usage: man_pages.py PAGE.scd [--depends FILE PAGE]    FILE: for make, what PAGE is made of
 
-It runs none of the programs: a cross build makes the same pages.
+It runs none of the programs: a cross build makes the same pages. No tool does it: scdoc includes no files and reads no Markdown; help2man runs programs.
 """
 
 import argparse

@@ -7,7 +7,7 @@ usage: scripts/proofs.py [--update] [TABLE]
 A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), or one of several proofs in a step. `number` is a minimum of single
 tests. It fails: a step without a row, a row whose step or runner is no longer there, or that went to a longer list, and a number that has become
 smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts); a step that was not
-run here is "not run", which is no pass. --update raises numbers and adds steps.
+run here is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
 """
 import csv
 import re
@@ -34,7 +34,7 @@ COUNTED = {
     "unit.ctl": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"), "unit.client": ("tests of the C client's example", "test/client/test_*.py", r"^    def test_"),
     "faults.table": ("seeded faults", "test/faults/*.faults", r"^@@ .* \| "), "target.driver": ("tests of the STM32 driver", "test/target/*.c", r"^ *RUN_TEST\("),
     "kernel.verdicts": ("tests of the kernel's runner", "test/kernel/test_*.py", r"^    def test_"), "fuzz.targets": ("fuzz targets", "test/fuzz/fuzz_*.c", r"^int LLVMFuzzerTestOneInput"),
-    "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"), "gates.faults": ("faults for gates", "scripts/planted_faults.py", r"^    \("),
+    "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"), "gates.faults": ("faults for gates", "test/gates/planted_faults.py", r"^    \("),
     "verdicts.tests": ("tests of the verdicts", "test/support/test_verdict.py", r"^    def test_"),
 }
 

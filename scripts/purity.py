@@ -5,7 +5,8 @@
 usage: purity.py [--strings] [--on BASE] LIBRARY SOURCE_DIR
 
 LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too,
-with --on what another library has, which is as portable.
+with --on what another library has, which is as portable. No tool does it: `nm` lists the symbols (this judges them), and gcc has no warning for data
+that is mutable.
 """
 import argparse
 import re

@@ -9,7 +9,8 @@ BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compil
 know, are found through the relocations; they and mem* are charged a fixed amount. Calls through the HAL end here: a port adds its own.
 
 --frames: no function of these folders may take more than that by itself. BUILD_DIR is any that tells how it compiles
-(compile_commands.json); each source is compiled once more, to nothing.
+(compile_commands.json); each source is compiled once more, to nothing. No tool does it: -Wstack-usage of gcc judges one function; avstack (Perl) and
+puncover (PyPI) add up, but know neither the run-time library nor what the linker optimised, and do not fail.
 """
 import json
 import os

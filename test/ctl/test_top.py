@@ -19,7 +19,7 @@ sys.path += [os.path.join(ROOT, "test", "system"), *glob.glob(os.path.join(ROOT,
 try:
     import pyte
 except ImportError:
-    print("skip: pyte is missing (pip install -r scripts/requirements.txt into .venv; ./check does it)")
+    print("skip: pyte is missing (./check installs requirements/check.txt into .venv)")
     sys.exit(77)
 import several
 from fake_gateway import FakeGateway, snapshot

@@ -125,7 +125,7 @@ def find_foreign(machine):
     folder = os.path.join(cache(), f"distribution-{machine.architecture}")
     root = os.path.join(folder, "root")
     fresh = not os.path.exists(os.path.join(root, "wanted"))
-    output(os.path.join(ROOT, "scripts/cross_root"), machine.architecture, root, *machine.parts)
+    output(os.path.join(ROOT, "scripts/from_debian"), "root", machine.architecture, root, *machine.parts)
     if fresh or not os.path.exists(os.path.join(folder, "vmlinuz")):
         keep(root, folder)
     return folder

@@ -35,7 +35,7 @@ def find_build(build, download=True):
     if generation(build) == 2:
         return build
     beside = os.path.join(os.path.dirname(os.path.abspath(build)), "gpiod2")
-    library = [os.path.join(ROOT, "scripts", "build_libgpiod2")] + ([] if download else ["--no-download"])
+    library = [os.path.join(ROOT, "test", "kernel", "build_libgpiod2")] + ([] if download else ["--no-download"])
     configure = ["cmake", "-S", ROOT, "-B", beside, "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O2 -DNDEBUG"]
     last_line(configure, PKG_CONFIG_PATH=last_line(library))
     last_line(["cmake", "--build", beside, "--target", "iwheel-gateway", "iwheel-sim", "-j", str(os.cpu_count())])

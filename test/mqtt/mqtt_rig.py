@@ -201,7 +201,7 @@ class MqttRig(Rig):
 
     def __init__(self, build, driving=False, settings=None, config=None):
         if not paho:
-            raise Skip("paho-mqtt is missing in .venv (pip install -r scripts/requirements.txt)")
+            raise Skip("paho-mqtt is missing in .venv (scripts/python_packages .venv requirements/check.txt)")
         if not shutil.which("mosquitto"):
             raise Skip("mosquitto is missing (scripts/install_tools check brings it)")
         self.bridge = self.broker = None

