@@ -20,9 +20,9 @@ from bus import Bus, now_us
 from client import Client
 from judge import Judge
 from judge_log import PAIR_REAL_US, Config, Event
+from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-PR_SET_PDEATHSIG = 1
 SERVICE_NICE = -10
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
@@ -80,10 +80,6 @@ def read_only(folder):
             raise OSError(ctypes.get_errno(), "mount")
 
     return mount
-
-
-def die_with_parent():
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def as_a_service():
