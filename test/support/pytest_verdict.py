@@ -8,8 +8,8 @@ last attempt only. The last line is "N passed, N failed, N skipped", lines befor
     --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
     --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
 
-A test may collect what it finds in a fixture that is a verdict.Evidence. What `words()` of a fixture says is shown, and judged, with a failure.
-@pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.limit(SECONDS): may take longer than LIMIT_S.
+A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
+@pytest.mark.full: only with IWHEEL_FULL=1. What passing tests print, -rP shows.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ import unittest
 import pytest
 import verdict
 
-LIMIT_S = 240  # of one test
+LIMIT_S, FULL_LIMIT_S = 240, 7200  # of one test
 SKIPS = (unittest.SkipTest, pytest.skip.Exception)
 RUN = pytest.StashKey()
 
@@ -41,7 +41,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "full: only with IWHEEL_FULL=1")
-    config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s")
+    config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s; those for IWHEEL_FULL: {FULL_LIMIT_S} s")
     if config.option.jobs < 1:
         raise pytest.UsageError("--jobs must be at least 1")
     config.option.build = os.environ["IWHEEL_BUILD"] = os.path.abspath(config.option.build)
@@ -89,7 +89,7 @@ def pytest_runtest_makereport(item, call):
     report = yield
     report.failures, report.claims = [], []
     if report.when == "call":
-        report.sections += [("its programs said", one.words()) for one in (item.funcargs or {}).values() if report.failed and hasattr(one, "words")]
+        report.sections += [("its programs said", one.said()) for one in (item.funcargs or {}).values() if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)
@@ -130,8 +130,11 @@ def perform(config, items):
 # ---- between the processes -------------------------------------------------------------------------------------------
 
 def limit_of(items):
-    marks = [item.get_closest_marker("limit") for item in items]
-    return sum(mark.args[0] if mark else LIMIT_S for mark in marks)
+    def one(item):
+        mark = item.get_closest_marker("limit")
+        return mark.args[0] if mark else FULL_LIMIT_S if item.get_closest_marker("full") else LIMIT_S
+
+    return sum(map(one, items))
 
 
 def apart(function, limit_s):
@@ -218,7 +221,7 @@ class Run(verdict.Session):
 
     def __init__(self, session):
         self.config, self.units, self.lock = session.config, units_of(session.items), threading.Lock()
-        self.over, self.skipped = False, []
+        self.over, self.skipped = False, {}
         self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
         self.nursery = Nursery(self.config, self.units)
@@ -257,7 +260,7 @@ class Run(verdict.Session):
                 if kind == verdict.INCONCLUSIVE and report.failed:
                     report.outcome, report.longrepr = "skipped", (str(self.units[name][0].path), report.location[1], attempt.skip)
                 if report.skipped:
-                    self.skipped.append(f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}")
+                    self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
                 report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
@@ -272,7 +275,7 @@ def dead(item, attempt):
 @pytest.hookimpl(tryfirst=True)
 def pytest_report_teststatus(report):
     """With -v: how long it took, what it measured, and which attempt it was."""
-    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "told"):
+    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "told") and not hasattr(report, "context"):  # No subtest.
         return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.told})"
     return None
 
@@ -309,4 +312,4 @@ def pytest_unconfigure(config):
     run = config.stash.get(RUN, None)
     if run:
         kept = [f"kept: {run.folder}"] if config.option.keep else []
-        print(*kept, *run.skipped, run.sums, sep="\n", end="", flush=True)
+        print(*kept, *run.skipped.values(), run.sums, sep="\n", end="", flush=True)

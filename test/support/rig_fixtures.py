@@ -25,6 +25,25 @@ def t(build, rig_type, pytestconfig):
         rig.close(pytestconfig.option.keep)
 
 
+@pytest.fixture
+def make_rig(build, request, pytestconfig):
+    """Makes the one rig of a bridge's test, with what @pytest.mark.rig(...) says."""
+    made = []
+
+    def make(rig_type):
+        mark = request.node.get_closest_marker("rig")
+        made.append(rig_type(build, **(mark.kwargs if mark else {})))
+        return made[0]
+
+    yield make
+    for one in made:
+        one.close(keep=pytestconfig.option.keep)
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "rig(...): what the test's rig is made with")
+
+
 def pytest_pycollect_makeitem(collector, name, obj):
     """Scenarios, of any name."""
     if hasattr(obj, "scenario") and callable(obj):

@@ -30,7 +30,7 @@ FAULTS = (
     ("a skip hides what was found before it", "except (Exception, pytest.skip.Exception,", "except (AssertionError,", "test_skip_hides_no_failure"),
     ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
     ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
-    ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "words")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
     ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
     ("the gateway's own word is enough", "claims=claims, stalls=stalls,", "claims=[], stalls=stalls + claims,", "test_gateway_late_on_a_quiet_machine_is_final"),
@@ -44,7 +44,7 @@ FAULTS = (
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     ("others hear of each attempt", 'report.outcome, report.longrepr = "skipped"', 'report.told, report.longrepr = "skipped"', "test_late_on_a_late_machine_is_not_judged"),
     ("pytest's own status wins", "session.exitstatus = run.end()", "run.end()", "test_late_on_a_late_machine_is_not_judged"),
-    ("what was skipped has no name", "print(*kept, *run.skipped,", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
+    ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
@@ -165,7 +165,7 @@ class Conclusive(Made):
     def test_words_of_a_fixture_are_judged(self):
         said = self.final("""
             class Rig:
-                def words(self):
+                def said(self):
                     return "iwheel-gateway: Segmentation fault"
 
             @pytest.fixture
@@ -196,6 +196,20 @@ class Conclusive(Made):
     def test_gateway_late_on_a_quiet_machine_is_final(self):
         self.final('def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[]")
 
+    def test_one_of_several_parts_is_final(self):
+        """Also if another part is only late."""
+        self.final("""
+            class Test(unittest.TestCase):
+                def test_one(self):
+                    note("tried")
+                    with self.subTest("late"):
+                        self.fail("not within 1 s")
+                    with self.subTest("good"):
+                        pass
+                    with self.subTest("moved"):
+                        verdict.hold(False, "moved")
+            """)
+
     def test_failure_before_or_after_the_test_fails(self):
         for before, after, junit in (("assert False", "", "error"), ("", "verdict.hold(False, 'moved')", "error")):
             self.final(f"""
@@ -221,6 +235,15 @@ class Inconclusive(Made):
         self.assertIn("real time not judged", ran.lines[-2])
         self.assertEqual("1 inconclusive, counted as skipped: test_it.py::test_one", ran.lines[-3])
         self.assertEqual("skip: test_it.py::test_one: inconclusive in each of 4 attempts: the machine stalled for up to 500 ms", ran.lines[-4])
+
+    def test_late_part_is_not_judged(self):
+        self.repeated("""
+            class Test(unittest.TestCase):
+                def test_one(self):
+                    note("tried")
+                    with self.subTest("late"):
+                        self.fail("not within 1 s")
+            """)
 
     def test_collected_check_is_not_judged(self):
         self.repeated('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 400_000))\n')

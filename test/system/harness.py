@@ -24,6 +24,7 @@ from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SERVICE_NICE = -10
+WORDS = 800  # of a program's, beside a failure
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
     "wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540},
@@ -406,6 +407,10 @@ class Rig:
         judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **{"pair_limit_us": PAIR_REAL_US, **options})
         judge.judge()
         return judge
+
+    def said(self):
+        """What is told beside a failure."""
+        return self.gateway.text()[-WORDS:] if self.gateway else ""
 
     def close(self, keep=False):
         for client in self.clients:

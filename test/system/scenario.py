@@ -9,7 +9,6 @@ from judge_log import percentile
 from verdict import CHECK, RULE, TIMING, Evidence, Failure
 
 REGISTRY = {}
-WORDS = 400  # of each gateway's, beside a failure
 # Refusals of arm that pass by themselves: the wheels roll out, or the last zero is still on its way.
 AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled")
 
@@ -40,8 +39,8 @@ class Test(Evidence):
         self.build, self.rig_type = build, rig_type or self.rig_type
         self.latencies, self.rigs = [], []
 
-    def words(self):
-        return "".join(rig.gateway.text()[-WORDS:] for rig in self.rigs if rig.gateway)
+    def said(self):
+        return "".join(rig.said() for rig in self.rigs)
 
     def rig(self, *arguments, **options):
         rig = self.rig_type(self.build, *arguments, **options)
