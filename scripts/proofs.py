@@ -23,8 +23,8 @@ LISTS = ("quick", "check", "ci", "full")
 TIMEOUT_S = 60
 # Proofs inside steps: (what, command of the runner that lists them) or (what, files, what begins each single test in them).
 LISTED = {
-    "system.scenarios": ("scenarios on the local bus", "test/system/run --list"), "serial.wires": ("scenarios of the relay", "-m pytest --collect-only -q test/serial/test_wires.py"),
-    "serial.image": ("scenarios with the real image", "-m pytest --collect-only -q test/serial/test_image.py"), "ros2.rides": ("scenarios of the ROS 2 bridge", "test/ros2/run --list"),
+    "system.scenarios": ("scenarios on the local bus", "-m pytest --collect-only -q test/system/test_scenarios.py"), "serial.wires": ("scenarios of the relay", "-m pytest --collect-only -q test/serial/test_wires.py"),
+    "serial.image": ("scenarios with the real image", "-m pytest --collect-only -q test/serial/test_image.py"), "ros2.rides": ("scenarios of the ROS 2 bridge", "-m pytest --collect-only -q test/ros2"),
     "mqtt.trials": ("trials of the MQTT bridge", "-m pytest --collect-only -q test/mqtt"), "web.trials": ("trials of the web bridge", "-m pytest --collect-only -q test/web"),
     "kernel.check": ("tests on a real kernel", "test/kernel/run --list"), "kernel.full": ("the same, the long ones too", "test/kernel/run --list --full"),
     "python.tests": ("tests of the Python client", "-m pytest --collect-only -q python/tests"), "service.tests": ("tests of the service", "test/service/run --list"),

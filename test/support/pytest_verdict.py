@@ -32,6 +32,16 @@ SKIPS = (unittest.SkipTest, pytest.skip.Exception)
 RUN = pytest.StashKey()
 
 
+class Hooks:
+    @pytest.hookspec
+    def pytest_verdict_end(self, run):
+        """All tests have a verdict; what a folder concludes from them together, it may `add`."""
+
+
+def pytest_addhooks(pluginmanager):
+    pluginmanager.add_hookspecs(Hooks)
+
+
 def pytest_addoption(parser):
     group = parser.getgroup("verdicts")
     group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
@@ -101,6 +111,7 @@ def pytest_runtest_makereport(item, call):
     report.claims += [claim for one in evidence for claim in one.claims]
     report.stalls = [stall for one in evidence for stall in one.stalls]
     report.figures = [figure for one in evidence for figure in one.figures]
+    report.data = {key: value for one in evidence for key, value in one.data.items()}
     return report
 
 
@@ -221,7 +232,7 @@ class Run(verdict.Session):
 
     def __init__(self, session):
         self.config, self.units, self.lock = session.config, units_of(session.items), threading.Lock()
-        self.over, self.skipped = False, {}
+        self.over, self.skipped, self.passed = False, {}, {}
         self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
         self.nursery = Nursery(self.config, self.units)
@@ -255,10 +266,11 @@ class Run(verdict.Session):
         with self.lock:
             if self.over:
                 return
-            reports = attempt.data or [dead(self.units[name][0], attempt)]
-            for report in reports:
+            if kind == verdict.PASSED:
+                self.passed[name] = attempt
+            for report in attempt.data or [report_of(self.units[name][0].nodeid, self.units[name][0].location, attempt)]:
                 if kind == verdict.INCONCLUSIVE and report.failed:
-                    report.outcome, report.longrepr = "skipped", (str(self.units[name][0].path), report.location[1], attempt.skip)
+                    report.outcome, report.longrepr = "skipped", (*report.location[:2], attempt.skip)
                 if report.skipped:
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
                 report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
@@ -267,9 +279,18 @@ class Run(verdict.Session):
                 self.config.hook.pytest_runtest_logreport(report=report)
 
 
-def dead(item, attempt):
-    """The report of a test whose process told nothing."""
-    return pytest.TestReport(item.nodeid, item.location, {}, "failed", attempt.failures[0].text, "call")
+    def add(self, name, attempt, figures):
+        """The verdict on something that is no test."""
+        report = report_of(name, (name, 0, name), attempt)
+        report.figures = figures
+        self.take(name, self.verdict_of(attempt), attempt._replace(data=[report]))
+
+
+def report_of(nodeid, location, attempt):
+    """Of what has no report of pytest's: no test, or one whose process told nothing."""
+    text = "\n".join(failure.text for failure in attempt.failures)
+    outcome, told = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
+    return pytest.TestReport(nodeid, location, {}, outcome, told, "call")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -290,6 +311,7 @@ def pytest_runtestloop(session):
         for number in (signal.SIGINT, signal.SIGTERM):
             handlers[number] = signal.signal(number, run.interrupt)
         run.run(list(run.units), option.jobs)
+        session.config.hook.pytest_verdict_end(run=run)
         session.config.stash[RUN] = run
     finally:
         for number, handler in handlers.items():

@@ -48,6 +48,8 @@ FAULTS = (
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
+    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_what_a_folder_concludes_counts"),
+    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_what_a_folder_concludes_counts"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
 LATE = "[(verdict.now_us(), 500_000)]"
@@ -92,9 +94,9 @@ class Made(unittest.TestCase):
 
     plugin = HERE
 
-    def begin(self, tests, stalls):
+    def begin(self, tests, stalls, more=""):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()) if hasattr(self, "enterContext") else tempfile.mkdtemp())
-        for name, text in {"conftest.py": textwrap.dedent(CONFTEST).format(stalls=stalls), "test_it.py": textwrap.dedent(HEAD) + textwrap.dedent(tests),
+        for name, text in {"conftest.py": textwrap.dedent(CONFTEST).format(stalls=stalls) + textwrap.dedent(more), "test_it.py": textwrap.dedent(HEAD) + textwrap.dedent(tests),
                            "pytest.ini": "[pytest]\naddopts = -p no:cacheprovider -p no:anyio -p pytest_verdict\n"}.items():
             (self.folder / name).write_text(text)
 
@@ -105,8 +107,8 @@ class Made(unittest.TestCase):
         return {**{key: value for key, value in os.environ.items() if key != "IWHEEL_FULL"}, "PYTHONPATH": f"{self.plugin}:{HERE}", "TMPDIR": str(self.folder),
                 "PYTHONDONTWRITEBYTECODE": "1", **more}
 
-    def run_made(self, tests, *options, stalls=LATE, **more):
-        self.begin(tests, stalls)
+    def run_made(self, tests, *options, stalls=LATE, conftest="", **more):
+        self.begin(tests, stalls, conftest)
         done = subprocess.run(self.command(*options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, env=self.surroundings(**more),
                               check=False)
         cases, junit, notes = {}, self.folder / "junit.xml", self.folder / "notes"
@@ -346,6 +348,21 @@ class Processes(Made):
     def test_what_was_measured_is_told(self):
         ran = self.run_made('def test_one(t):\n    t.figures.append("7 ms")\n')
         self.assertRegex("\n".join(ran.lines), r"test_one PASSED \(0\.\d s, 7 ms\)")
+
+    def test_what_a_folder_concludes_counts(self):
+        conftest = """
+            def pytest_verdict_end(run):
+                values = [value for attempt in run.passed.values() for report in attempt.data if report.when == "call" for value in report.data["values"]]
+                failures = [verdict.Failure("too much", verdict.TIMING)] if sum(values) > 5 else []
+                run.add("all_together", verdict.Attempt(failures, "not enough" if sum(values) < 3 else None), [f"sum {sum(values)}"])
+            """
+        for value, status, last, case in ((1, 0, "2 passed, 0 failed, 1 skipped", "skipped"), (2, 0, "3 passed, 0 failed, 0 skipped", "passed"), (3, 1, "2 passed, 1 failed, 0 skipped", "failure")):
+            ran = self.run_made(f"""
+                @pytest.mark.parametrize("number", (0, 1))
+                def test_one(t, number):
+                    t.data["values"] = [{value}]
+                """, stalls="[]", conftest=conftest)
+            self.assertEqual((status, last, case), (ran.status, ran.last, ran.cases["all_together"]), ran.lines)
 
     def test_interrupted_run_ends_with_its_tests(self):
         for number in (signal.SIGINT, signal.SIGTERM):

@@ -84,10 +84,10 @@ class Attempt(NamedTuple):
 
 
 class Evidence:
-    """What a test collects while it runs, for an Attempt."""
+    """What a test collects while it runs, for an Attempt. `data`: what else its folder wants to know."""
 
     def __init__(self):
-        self.failures, self.figures, self.stalls, self.claims = [], [], [], []
+        self.failures, self.figures, self.stalls, self.claims, self.data = [], [], [], [], {}
 
 
 def now_us():

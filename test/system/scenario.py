@@ -37,7 +37,7 @@ class Test(Evidence):
     def __init__(self, build, rig_type=None):
         super().__init__()
         self.build, self.rig_type = build, rig_type or self.rig_type
-        self.latencies, self.rigs = [], []
+        self.latencies, self.rigs = self.data.setdefault("latencies", []), []
 
     def said(self):
         return "".join(rig.said() for rig in self.rigs)
