@@ -27,7 +27,7 @@ LISTED = {
     "serial.image": ("scenarios with the real image", "-m pytest --collect-only -q test/serial/test_image.py"), "ros2.rides": ("scenarios of the ROS 2 bridge", "-m pytest --collect-only -q test/ros2"),
     "mqtt.trials": ("trials of the MQTT bridge", "-m pytest --collect-only -q test/mqtt"), "web.trials": ("trials of the web bridge", "-m pytest --collect-only -q test/web"),
     "kernel.check": ("tests on a real kernel", "test/kernel/run --list"), "kernel.full": ("the same, the long ones too", "test/kernel/run --list --full"),
-    "python.tests": ("tests of the Python client", "-m pytest --collect-only -q python/tests"), "service.tests": ("tests of the service", "test/service/run --list"),
+    "python.tests": ("tests of the Python client", "-m pytest --collect-only -q python/tests"), "service.tests": ("tests of the service", "-m pytest --collect-only -q test/service"),
 }
 COUNTED = {
     "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^ *RUN_TEST\("),

@@ -104,7 +104,7 @@ test(idle kernel.build check build "" "" 348 sh -c "test/kernel/build_kernel ${K
 test(real kernel check+full scenario "default;kernel.build" "" 135 test/kernel/run --build ${B} --jobs ${JOBS} ${KERNEL_OPTIONS} ${full})
 test(real kernel.repeat full scenario "default;kernel.build" "" 2700 test/kernel/run --build ${B} --jobs ${JOBS} ${KERNEL_OPTIONS} --repeat 20)
 test(real timed check realtime "default;kernel.build" "" 25 test/bench/run --smoke)
-test(real service check packaging default "" 20 python3 test/service/run --build ${B})
+test(real service check packaging default py:pytest 20 ${PYTEST} test/service --build ${B} --jobs 1)
 test(idle man check lint default scdoc 2 python3 test/man/test_pages.py ${B})
 test(idle debian.packages ci packaging default "" 216 test/debian/run --build)
 test(real debian ci packaging debian.packages "" 61 test/debian/run)
