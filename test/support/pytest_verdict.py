@@ -234,6 +234,7 @@ class Run(verdict.Session):
         self.config, self.units, self.lock = session.config, units_of(session.items), threading.Lock()
         self.over, self.skipped, self.passed = False, {}, {}
         self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
+        os.chmod(self.folder, 0o1777)  # As /tmp: what tests do as another user ends at their own folders.
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
         self.nursery = Nursery(self.config, self.units)
         super().__init__(self.work_off, self.tell, verdict.Witness(getattr(self.config, "witness_nice", 0)))

@@ -38,6 +38,7 @@ FAULTS = (
     ("a crash passes", "return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])", "return verdict.Attempt()", "test_crash_is_final"),
     ("no end in time", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
     ("what a test leaves behind lives on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
+    ("other users are kept from the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
     ("attempts share their output", "    capture.stop_global_capturing()", "    return_ = None\n    capture.stop_global_capturing if return_ else None", "test_output_is_not_mixed"),
     ("a failure after the test is forgotten", "    if report.failed:\n        error = call", '    if report.failed and report.when == "call":\n        error = call', "test_failure_before_or_after_the_test_fails"),
     ("tests of a class are prepared one by one", 'shared = item.cls and "setUpClass" in vars(item.cls)', "shared = False", "test_class_that_prepares_once_is_one_attempt"),
@@ -309,6 +310,15 @@ class Processes(Made):
             """, "--jobs", "1")
         self.assertEqual(0, ran.status, ran.lines)
         self.assertFalse(runs(ran.notes[0]))
+
+    def test_other_users_may_enter_the_folder_of_all_tests(self):
+        ran = self.run_made("""
+            import tempfile
+
+            def test_one():
+                assert os.stat(tempfile.gettempdir()).st_mode & 0o7777 == 0o1777 and "iwheel-tests-" in tempfile.gettempdir()
+            """, stalls="[]")
+        self.assertEqual("1 passed, 0 failed, 0 skipped", ran.last, ran.lines)
 
     def test_output_is_not_mixed(self):
         ran = self.run_made("""
