@@ -21,13 +21,12 @@ except ImportError:
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "system"))
 
 from bus import now_us
-from harness import Process, Rig
+from harness import WORDS, Process, Rig
 from trials import Skip, until
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 ID = "w1"
-FIGURES = []  # Rows of the table in docs/mqtt.md: (fault, how often, events sent, arrived, doubled, seconds until the last arrived).
 
 
 def free_port():
@@ -83,8 +82,11 @@ class Far:
         numbers = list(dict.fromkeys(int(event["id"].rsplit("-", 1)[1]) for event, _ in told))
         assert numbers == list(range(numbers[0], numbers[-1] + 1)), f"a gap, or out of order: {numbers}"
         latest_s = max(at_us - event["t_us"] for event, at_us in told) / 1e6
-        FIGURES.append((fault, often, numbers[-1] - numbers[0] + 1, len(numbers), len(told) - len(numbers), latest_s))
-        print("figures:", " | ".join(str(one) for one in FIGURES[-1][:-1]), f"| {latest_s:.1f} s", flush=True)
+        row = f"{fault} | {often} | {numbers[-1] - numbers[0] + 1} | {len(numbers)} | {len(told) - len(numbers)} | {latest_s:.1f} s"
+        print("figures:", row, flush=True)
+        if "IWHEEL_FIGURES" in os.environ:  # See figures.py.
+            with open(os.environ["IWHEEL_FIGURES"], "a", encoding="utf-8") as file:
+                file.write(f"figures: {row}\n")
 
     def events(self, name=None, machine=ID):
         """(topic's name, event) in the order in which they came, doubles by id left out."""
@@ -218,6 +220,9 @@ class MqttRig(Rig):
 
     def words(self):
         return self.bridge.text() if self.bridge else ""
+
+    def said(self):
+        return self.words()[-WORDS:] + super().said()
 
     def gateway_command(self, *extra):
         return super().gateway_command("--watch-socket", self.path("watch.sock"), *extra)

@@ -42,7 +42,7 @@ from bus import now_us
 from harness import die_with_parent, find_program
 from judge_log import percentile
 from mqtt_rig import MqttRig, free_port, put_table
-from trials import ROOT, Skip, full, until
+from trials import ROOT, Skip, until
 
 PAGE = ROOT / "docs/mqtt.md"
 STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
@@ -372,15 +372,6 @@ def run_load(rig, seconds, **load):
     sent, arrived, doubled = row["stops"]
     assert arrived == sent > 0 and doubled == 0, row
     assert row["heard"] == load["machines"] and row["missing"] <= row["states"] / 20, row
-
-
-def test_twenty_machines_at_ten_hertz_each_stop_reaches_the_console(rig):
-    run_load(rig, 4, kind="mosquitto", machines=20, every_ms=100)
-
-
-@full
-def test_three_hundred_machines_at_three_servers_each_stop_reaches_the_console(rig):
-    run_load(rig, 20, kind="nats3", machines=300, every_ms=5000)
 
 
 # ---- the table ------------------------------------------------------------------------------------------------------------

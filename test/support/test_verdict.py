@@ -309,7 +309,7 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check itself, with the step `system`, whose runner is a script of this test, and `unit`, whose tests are a file of CTest's output.
+    """./check itself, with the step `system`, whose pytest is a script of this test, and `unit`, whose tests are a file of CTest's output.
     Both wait for the build, which does nothing here and counts as one."""
 
     FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
@@ -332,7 +332,7 @@ class Check(unittest.TestCase):
                 files[name] = files[name].replace(old, new)
             files |= {"bin/cmake": f'#!/bin/sh\n[ "$1" != -S ] || exec {shutil.which("cmake")} "$@"\n',
                       "bin/ctest": textwrap.dedent(self.CTEST.format(ctest=shutil.which("ctest"), junit=junit)),
-                      "test/system/run": f"#!/bin/bash\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
+                      ".venv/bin/python": f"#!/bin/bash\n[ $1 != -c ] || exit 0\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
             for name, text in files.items():
                 path = Path(folder, name)
                 path.parent.mkdir(parents=True, exist_ok=True)

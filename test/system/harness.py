@@ -20,10 +20,11 @@ from bus import Bus, now_us
 from client import Client
 from judge import Judge
 from judge_log import PAIR_REAL_US, Config, Event
+from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-PR_SET_PDEATHSIG = 1
 SERVICE_NICE = -10
+WORDS = 800  # of a program's, beside a failure
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
     "wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540},
@@ -80,10 +81,6 @@ def read_only(folder):
             raise OSError(ctypes.get_errno(), "mount")
 
     return mount
-
-
-def die_with_parent():
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def as_a_service():
@@ -410,6 +407,10 @@ class Rig:
         judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **{"pair_limit_us": PAIR_REAL_US, **options})
         judge.judge()
         return judge
+
+    def said(self):
+        """What is told beside a failure."""
+        return self.gateway.text()[-WORDS:] if self.gateway else ""
 
     def close(self, keep=False):
         for client in self.clients:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The scenarios of wires.py with the real image in the board's place, and those that only it can play: its e-stop pin and its resets."""
+"""Scenarios of test_wires.py with the real image in the board's place, and those that only it can play: its e-stop pin and its resets."""
 
 import bisect
 import contextlib
@@ -14,15 +14,16 @@ import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "python", "src"))
 
-import scenario as scenarios
-import wires
+import pytest
+import test_wires as wires
 from bus import now_us
 from harness import Process
 from iwheel import Gateway
 from judge import Judge
 from judge_log import Event, Frame, Violation, signed
 from rig import Cable, SerialRig
-from wires import await_service, begin, end_well, raw_drive
+from scenario import scenario
+from test_wires import await_service, begin, cable_pulled, client_killed, end_well, raw_drive, relay_killed, relay_stopped, tool  # noqa: F401
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SLICE_US = 2000  # As image.py.
@@ -152,16 +153,14 @@ class ImageRig(SerialRig):
 
 # ---- the same, with the real image -----------------------------------------------------------------------------------
 
-ALSO = ("client_killed", "relay_stopped", "relay_killed", "cable_pulled", "tool")
-LONG = ("drive", "delayed", "noisy", "deaf", "too_fast", "flood", "rights", "slow", "terminated", "alone")  # With ./check --full.
 FULL = os.environ.get("IWHEEL_FULL") == "1"
-HOST = dict(scenarios.REGISTRY)
-scenarios.REGISTRY.clear()
-scenarios.Test.rig_type = ImageRig
-for name in ALSO + (LONG if FULL else ()):
-    title, seconds, play = HOST[name]
-    scenarios.scenario(title, seconds)(play)
-scenario = scenarios.scenario
+if FULL:
+    from test_wires import alone, deaf, delayed, drive, flood, noisy, rights, slow, terminated, too_fast  # noqa: F401
+
+
+@pytest.fixture
+def rig_type():
+    return ImageRig
 
 
 @scenario("corrupted, cut, doubled and late lines move nothing", 15)
@@ -267,5 +266,3 @@ def run_tool(t, rig, *words, code=0):
     t.check(done.returncode == code, f"iwheelctl {' '.join(words)}: {done.returncode} {done.stdout} {done.stderr}")
     return json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
 
-
-__all__ = ["HOST", "run_tool"]

@@ -5,10 +5,11 @@ import json
 import threading
 import time
 
-from bridge import arm, steer, turns
+import pytest
+from test_bridge import arm, steer, turns
 from bus import now_us
 from mqtt_rig import ID
-from trials import Driver, braking_ms, needs, until
+from trials import Driver, braking_ms, until
 
 DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}, "config": {"drive": {"lease_ms": 400}}}
 STOP_MS = 200  # From the command at the broker to the first smaller setpoint on the bus.
@@ -52,7 +53,7 @@ def stops_in_time(rig, far, times=5):
     assert max(delays) < STOP_MS, delays
 
 
-@needs(settings={"state": {"every_ms": 100}})
+@pytest.mark.rig(settings={"state": {"every_ms": 100}})
 def test_stop_never_waits_behind_questions(rig):
     rig.start()
     far = rig.online()
@@ -62,7 +63,7 @@ def test_stop_never_waits_behind_questions(rig):
     assert flood.sent > 1000, flood.sent
 
 
-@needs(settings={"state": {"every_ms": 100}})
+@pytest.mark.rig(settings={"state": {"every_ms": 100}})
 def test_stop_never_refused_for_other_senders(rig):
     """More senders than the bridge knows, and one that uses up the numbers of the person who stops."""
     rig.start()
@@ -105,7 +106,7 @@ class Hand(threading.Thread):
         self.join(5)
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_one_person_drives_and_the_second_is_busy(rig):
     rig.start()
     first, second = rig.online(rig.far("anna")), rig.far("ben")
@@ -132,7 +133,7 @@ def test_one_person_drives_and_the_second_is_busy(rig):
     assert key not in rig.bridge.text() + rig.gateway.text()
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_one_person_hands_over_at_standstill_only(rig):
     rig.start()
     first, second = rig.online(rig.far("anna")), rig.far("ben")
@@ -150,7 +151,7 @@ def test_one_person_hands_over_at_standstill_only(rig):
     assert second.ask("drive", key=second.key, left_mm_s=0, right_mm_s=0)["ok"]
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
     """Row 7: no command of that person is accepted, and yet nothing is armed or reset while it comes, under its own name or another's."""
     rig.start()
@@ -174,7 +175,7 @@ def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
     assert not turns(rig)
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_one_person_resets_only_the_stop_that_is_meant(rig):
     rig.start()
     far = rig.online()

@@ -1,13 +1,9 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The service as systemd sees it: units, users, files, sandbox, restarts, rights to its socket.
 
-usage: test/service/run [--build DIR] [--only NAME]... [--list]
-
-Nothing here needs a running systemd. The last line sums up: "N passed, N failed, N skipped".
+Nothing here needs a running systemd.
 """
 
-import argparse
 import contextlib
 import grp
 import itertools
@@ -31,7 +27,7 @@ sys.path[:0] = [os.path.join(ROOT, "test", "system"), os.path.join(ROOT, "python
 
 from bus import now_us
 from harness import BECOME_STRANGER, STRANGER, Process, Rig, lock_names
-from verdict import Attempt, hold, of_text, run_all
+from verdict import hold
 
 import iwheel
 
@@ -52,7 +48,7 @@ WEB_EXPOSURE_MAX = 14
 RESTART_EXPOSURE_MAX = 16
 """It may do one thing: change interfaces."""
 SLOW = {"drive": {"lease_ms": 300}, "limits": {"echo_ms": 200, "wheel_silent_ms": 200}}
-build = os.path.join(ROOT, "build", "default")
+build = os.environ.get("IWHEEL_BUILD", os.path.join(ROOT, "build", "default"))
 
 
 def need(*tools):
@@ -576,31 +572,3 @@ class Strangers(unittest.TestCase):
             self.assertIn(word, self.rig.gateway.text())
             self.assertIn("no recording can be written", self.rig.gateway.text())
             self.assertEqual(os.listdir(folder), [])
-
-
-def attempt(test):
-    """As test/support/verdict.py judges it."""
-    result = unittest.TestResult()
-    unittest.defaultTestLoader.loadTestsFromName(test, sys.modules["__main__"]).run(result)
-    bad = result.failures + result.errors
-    return of_text("\n".join(text for _, text in bad)) if bad else Attempt(skip=result.skipped[0][1] if result.skipped else None)
-
-
-def main():
-    global build
-    parser = argparse.ArgumentParser(description="The service as systemd sees it.")
-    parser.add_argument("--build", default=build)
-    parser.add_argument("--only", action="append", metavar="NAME", help="only tests whose name contains this")
-    parser.add_argument("--list", action="store_true", help="list the tests and exit")
-    options = parser.parse_args()
-    build = os.path.abspath(options.build)
-    tests = [test.id().split(".", 1)[1] for group in unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"]) for test in group]
-    tests = [test for test in tests if not options.only or any(part in test for part in options.only)]
-    if options.list:
-        print(*tests, sep="\n")
-        return 0
-    return run_all(tests, attempt).end()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

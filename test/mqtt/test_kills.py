@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The history of a fleet while nats-servers die: what the stream lacks is reported. IWHEEL_KILLS=100 test/mqtt/run --only kills for the long form."""
+"""The history of a fleet while nats-servers die: what the stream lacks is reported. IWHEEL_KILLS=100 pytest test/mqtt -k kills for the long form."""
 
 import contextlib
 import json
@@ -8,9 +8,10 @@ import socket
 import threading
 import time
 
-from bridge import numbers
-from console import cluster_config, console, lines
-from fleet import HOSTS, Cluster, collector, use_tls
+import pytest
+from test_bridge import numbers
+from test_console import cluster_config, console, lines
+from test_fleet import HOSTS, Cluster, collector, use_tls
 from mqtt_rig import ID
 from trials import until
 
@@ -98,6 +99,7 @@ def kill_and_stop(rig, cluster, teller, host):
     until(lambda: cluster.stream("info")[0] == 0, 30, "the stream answers")
 
 
+@pytest.mark.limit(240 + 60 * KILLS)
 def test_history_under_kills_reports_each_gap(rig):
     """Leader and follower of the stream in turn; each stop is in the history, or reported as missing, also at the end."""
     cluster = Cluster(rig)

@@ -9,7 +9,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from bridge import make_stops, numbers
+from test_bridge import make_stops, numbers
 from harness import Process
 from mqtt_rig import ID, Far, free_port
 from trials import ROOT, Skip, until

@@ -8,12 +8,13 @@ import sys
 import time
 from pathlib import Path
 
-from bridge import arm, make_certificates as sign, make_stops, numbers, steer, turns
-from console import console, write_config
-from fleet import HOSTS, Cluster, certificates, fleet_far, start_fleet_broker, use_tls, with_certificate
+import pytest
+from test_bridge import arm, make_certificates as sign, make_stops, numbers, steer, turns
+from test_console import console, write_config
+from test_fleet import HOSTS, Cluster, certificates, fleet_far, start_fleet_broker, use_tls, with_certificate
 from harness import Process
 from mqtt_rig import ID, Far, Line, paho
-from trials import Skip, needs, until
+from trials import Skip, until
 
 STRANGER = 65534
 DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}}
@@ -33,7 +34,7 @@ def need_root():
 # ---- what a broker never accepts ------------------------------------------------------------------------------------
 
 
-@needs(settings={"broker": {"protocol": "5"}})
+@pytest.mark.rig(settings={"broker": {"protocol": "5"}})
 def test_event_too_large_is_set_aside_and_later_ones_go(rig):
     """The broker's largest packet is smaller than a stop, info and state: what fits arrives, the rest when it fits."""
     rig.broker_lines.append("max_packet_size 420")
@@ -189,7 +190,7 @@ def test_stranger_on_loopback_gets_no_password_and_no_command(rig):
         os.unlink(rig.path("mqtt.out"))
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_broker_of_a_stranger_does_not_drive(rig):
     need_root()
     rig.broker_lines = ["allow_anonymous true", "persistence false", "user nobody"]
@@ -204,7 +205,7 @@ def test_broker_of_a_stranger_does_not_drive(rig):
     rig.online()
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_broker_on_a_unix_socket_drives_if_its_user_is_right(rig):
     need_root()
     path = rig.path("broker.sock")
@@ -291,7 +292,7 @@ def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
 # ---- Home Assistant under the shipped rights ------------------------------------------------------------------------
 
 
-@needs(settings={"home_assistant": {"enabled": "yes"}})
+@pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
 def test_home_assistant_sensors_pass_the_shipped_rights_of_mosquitto(rig):
     port = start_fleet_broker(rig)
     certificates(rig, "console", "homeassistant")
@@ -309,7 +310,7 @@ def test_home_assistant_sensors_pass_the_shipped_rights_of_mosquitto(rig):
     assert not [topic for topic, *_ in home.all if "forged" in topic]
 
 
-@needs(settings={"home_assistant": {"enabled": "yes"}})
+@pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
 def test_home_assistant_sensors_pass_the_shipped_rights_of_nats(rig):
     cluster = Cluster(rig)
     use_tls(rig, HOSTS[0], cluster.mqtt)
@@ -320,7 +321,7 @@ def test_home_assistant_sensors_pass_the_shipped_rights_of_nats(rig):
     until(lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10}, 25, f"counted in info: {rig.words()}")
 
 
-@needs(settings={"home_assistant": {"enabled": "yes"}})
+@pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
 def test_home_assistant_sensors_that_are_refused_are_reported(rig):
     acl = Path(rig.path("acl"))
     acl.write_text("topic readwrite iwheel/#\n", encoding="ascii")

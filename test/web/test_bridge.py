@@ -18,10 +18,11 @@ import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import pytest
 from bus import now_us
 from harness import Process
 from judge_log import GAP_US
-from trials import ROOT, Driver, Skip, braking_ms, full, longest_gap_ms, needs, until
+from trials import ROOT, Driver, Skip, braking_ms, longest_gap_ms, until
 from web_rig import Person, free_port
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/api/fleet", "/metrics", "/health")
@@ -84,7 +85,7 @@ def test_stop_never_needs_a_proof(rig):
         until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_read_secret_reads_and_does_nothing_else(rig):
     rig.start().connected()
     reads = {"Authorization": f"Bearer {rig.read_secret}"}
@@ -96,7 +97,7 @@ def test_read_secret_reads_and_does_nothing_else(rig):
         assert rig.ask("POST", path, headers=reads)[0] == 401, path
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_proof_replayed_moved_or_altered_is_refused(rig):
     rig.start().connected()
     person = rig.person
@@ -123,7 +124,7 @@ def test_proof_replayed_moved_or_altered_is_refused(rig):
     assert gateway_state(rig)["state"] == "listening"
 
 
-@needs(settings={"web": {"token_hours": 1}})
+@pytest.mark.rig(settings={"web": {"token_hours": 1}})
 def test_token_over_or_replaced_ends_streams_and_is_refused(rig):
     rig.start().connected()
     for change in (lambda: os.utime(rig.path("token"), (1, 1)), lambda: os.unlink(rig.path("token"))):
@@ -254,7 +255,7 @@ def assert_no_gap(rig, since_us):
     assert gap_ms < GAP_US / 1000, f"{gap_ms:.1f} ms between two setpoints of a wheel"
 
 
-@needs(settings={"web": {"max_connections": 64}})
+@pytest.mark.rig(settings={"web": {"max_connections": 64}})
 def test_stop_gets_through_a_flood_of_a_thousand_connections_and_the_gateway_has_no_gap(rig):
     rig.start().connected()
     driver, since = Driver(rig), now_us()
@@ -314,7 +315,7 @@ def test_slow_connections_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds
     driver.end()
 
 
-@needs(settings={"web": {"max_connections": 8}})
+@pytest.mark.rig(settings={"web": {"max_connections": 8}})
 def test_watchers_leave_room_for_stop(rig):
     rig.start().connected()
     streams = [rig.stream() for _ in range(7)]
@@ -406,7 +407,7 @@ def test_bridge_that_watches_cannot_drive_arm_or_reset(rig):
         assert status == 403 and body["error"] == "denied", body
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_page_drives_while_it_asks_and_no_longer(rig):
     rig.start().connected()
     person = rig.person
@@ -429,7 +430,7 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
     until(lambda: person.arm()[1].get("ok"), 6, "it may arm again")
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_bridge_killed_while_driving_stops_the_wheels(rig):
     rig.start().connected()
     key = rig.person.arm()[1]["key"]
@@ -445,7 +446,7 @@ def test_bridge_killed_while_driving_stops_the_wheels(rig):
     assert rig.person.drive(key, 99)[1]["error"] == "dropped"
 
 
-@needs(driving=True, settings={"gateway": {}})
+@pytest.mark.rig(driving=True, settings={"gateway": {}})
 def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
     rig.start_gateway()
     rig.web_settings["gateway"]["socket"] = rig.path("watch.sock")
@@ -565,7 +566,7 @@ def drive_for(person, key, sequence, seconds=0.5, v=150):
     return sequence
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_one_person_drives_and_the_second_is_busy_by_name(rig):
     first, second = two_people(rig)
     key = first.arm()[1]["key"]
@@ -591,7 +592,7 @@ def test_one_person_drives_and_the_second_is_busy_by_name(rig):
     drive_for(second, terms["key"], 1, 0.2)
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_one_person_of_two_who_arm_at_once(rig):
     """Both arms leave before either has its reply."""
     people = two_people(rig)
@@ -604,7 +605,7 @@ def test_one_person_of_two_who_arm_at_once(rig):
     assert len(granted) == len(refused) == 1 and refused[0]["error"] == "busy", answers
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
     first, second = two_people(rig)
     for sequence in range(1, 5):
@@ -623,7 +624,7 @@ def test_one_person_with_a_deflected_stick_refuses_arm_and_reset(rig):
     assert status == 200 and body["state"] == "listening", body
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_one_person_key_is_in_no_event_status_or_log(rig):
     first, _second = two_people(rig)
     with rig.stream() as stream:
@@ -637,7 +638,7 @@ def test_one_person_key_is_in_no_event_status_or_log(rig):
     assert key not in text + rig.web.text() + rig.gateway.text()
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_arm_and_reset_too_old_or_of_another_stop_are_stale(rig):
     rig.start().connected()
     person = rig.person
@@ -699,7 +700,7 @@ def reset_of(person, number):
     return target, person.header("POST", target)
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
     rig.start().connected()
     person, forwarder = rig.person, Forwarder(rig)
@@ -1018,7 +1019,7 @@ def prometheus(rig):
     child.wait(5)
 
 
-@full
+@pytest.mark.full
 def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
     rig.start().connected()
     with prometheus(rig) as ask:

@@ -12,10 +12,11 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from bus import now_us
 from harness import read_only
 from mqtt_rig import ID
-from trials import ROOT, Driver, Skip, braking_ms, full, needs, until
+from trials import ROOT, Driver, Skip, braking_ms, until
 from verdict import hold
 
 STEPPED = r"""
@@ -97,7 +98,7 @@ def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
     until(lambda: far.texts("availability")[-1] == "offline", what="a clean end is told")
 
 
-@needs(settings={"state": {"every_ms": 60000}})
+@pytest.mark.rig(settings={"state": {"every_ms": 60000}})
 def test_state_comes_at_once_when_it_changes_and_else_as_seldom_as_configured(rig):
     rig.start()
     far = rig.online()
@@ -133,7 +134,7 @@ def test_bridge_before_gateway_and_broker_waits_for_both(rig):
     rig.online(far)
 
 
-@needs(settings={"home_assistant": {"enabled": "yes"}})
+@pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
 def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
     rig.start()
     ha = rig.far("ha", topics=("homeassistant/#", "iwheel/#"))
@@ -297,7 +298,7 @@ def turns(rig, since_us=0):
 DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}, "config": {"drive": {"lease_ms": 200}}}
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_sender_drives_while_it_sends_and_no_longer(rig):
     rig.start()
     far = rig.online()
@@ -311,7 +312,7 @@ def test_sender_drives_while_it_sends_and_no_longer(rig):
     assert other.ask("drive", left_mm_s=100, right_mm_s=100)["error"] == "not_holder", "another one drives"
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_broker_stalls_300_ms_the_wheels_stop_and_nothing_is_driven_late(rig):
     """From the bus log: lease and period after the last command the wheels are told to brake, and the backlog moves nothing."""
     rig.start()
@@ -334,7 +335,7 @@ def test_broker_stalls_300_ms_the_wheels_stop_and_nothing_is_driven_late(rig):
     assert stop["cause"] in ("lease_lost", "client_stop"), stop
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_broker_killed_while_driving_stops_the_wheels(rig):
     rig.start()
     far = rig.online()
@@ -346,7 +347,7 @@ def test_broker_killed_while_driving_stops_the_wheels(rig):
     until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
 
 
-@needs(**DRIVING)
+@pytest.mark.rig(**DRIVING)
 def test_bridge_killed_or_frozen_while_driving_stops_the_wheels(rig):
     rig.start()
     far = rig.online()
@@ -360,7 +361,7 @@ def test_bridge_killed_or_frozen_while_driving_stops_the_wheels(rig):
         time.sleep(0.6)
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
     rig.mqtt_settings["gateway"]["socket"] = rig.path("watch.sock")
     rig.start()
@@ -407,8 +408,8 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
     far.tell("connection cut behind a byte, also in the middle of a confirmation", 6)
 
 
-@full
-@needs(settings={"broker": {"keepalive_s": 5}})
+@pytest.mark.full
+@pytest.mark.rig(settings={"broker": {"keepalive_s": 5}})
 def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
     line = rig.cut_here()
     rig.start()
@@ -490,7 +491,7 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     assert max(clocks) - min(clocks) > 86400_000_000, "the clock did step"
 
 
-@full
+@pytest.mark.full
 def test_campaign_of_kills_each_stop_once_in_order(rig):
     """Bridge and broker, killed in turn, fifty times."""
     line = rig.cut_here()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The console: history from the cluster's stream, recordings fetched from a machine whatever becomes of the line, and MQTT 5."""
 
+import pytest
 import base64
 import json
 import re
@@ -15,11 +16,11 @@ import zlib
 from datetime import datetime, timezone
 from pathlib import Path
 
-from bridge import make_stops, numbers
-from fleet import HOSTS, Cluster, use_tls, with_certificate
+from test_bridge import make_stops, numbers
+from test_fleet import HOSTS, Cluster, use_tls, with_certificate
 from harness import Process
 from mqtt_rig import ID, Far, Line, free_port, paho
-from trials import Skip, needs, until
+from trials import Skip, until
 
 try:
     from paho.mqtt.packettypes import PacketTypes
@@ -385,7 +386,7 @@ class Far5:
         self.client.loop_stop()
 
 
-@needs(settings={"broker": {"protocol": "5"}})
+@pytest.mark.rig(settings={"broker": {"protocol": "5"}})
 def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_wanted(rig):
     rig.start()
     far = Far5(rig)
@@ -407,7 +408,7 @@ def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_want
     assert code == 0 and (folder / "x.log").read_bytes() == Path(rig.path(name + ".log")).read_bytes(), (code, out, err)
 
 
-@needs(settings={"broker": {"protocol": "5"}})
+@pytest.mark.rig(settings={"broker": {"protocol": "5"}})
 def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig):
     """By 3.1.1 a broker confirms what its ACL forbids, and nobody knows."""
     acl = Path(rig.path("acl"))

@@ -11,8 +11,9 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
 from bus import now_us
-from trials import Driver, Skip, braking_ms, full, needs, until
+from trials import Driver, Skip, braking_ms, until
 
 SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
@@ -217,7 +218,7 @@ def turns(rig):
 HIDE = "Object.defineProperty(document, 'hidden', {value: true, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_pad_drives_while_it_is_held_and_stops_when_let_go_or_hidden(rig):
     rig.start().connected()
     with page_of(rig) as page:
@@ -236,7 +237,7 @@ def test_pad_drives_while_it_is_held_and_stops_when_let_go_or_hidden(rig):
         assert until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="a stop")[0]["cause"] == "client_stop"
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_pad_held_by_a_key_stops_with_the_focus(rig):
     rig.start().connected()
     with page_of(rig) as page:
@@ -260,7 +261,7 @@ def move_by_mouse(page, n):
     page.mouse.move(box["x"] + box["width"] / 2 + n % 2, box["y"] + box["height"] / 4)
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
     rig.start().connected()
     with page_of(rig) as page:
@@ -444,7 +445,7 @@ def press_stop(page, rig):
     until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_stop_never_dead_behind_a_question_of_the_page(rig):
     rig.start().connected()
     with page_of(rig, "phone") as page:
@@ -535,7 +536,7 @@ def test_page_has_no_service_worker(rig):
         page.said.clear()
 
 
-@needs(driving=True)
+@pytest.mark.rig(driving=True)
 def test_reset_button_clears_the_stop_that_is_shown(rig):
     rig.start().connected()
     with page_of(rig) as page:
@@ -550,8 +551,8 @@ def test_reset_button_clears_the_stop_that_is_shown(rig):
         seen(page, "document.querySelector('#state').textContent === 'listening'")
 
 
-@full
-@needs(settings={"gateway": {"rate_hz": 50}})
+@pytest.mark.full
+@pytest.mark.rig(settings={"gateway": {"rate_hz": 50}})
 def test_page_stays_smooth_at_50_hz(rig):
     """IWHEEL_WEB_MINUTES (5; 60 for the hour) on a phone's size: frame times and memory."""
     minutes = float(os.environ.get("IWHEEL_WEB_MINUTES", "5"))
@@ -574,28 +575,3 @@ def test_page_stays_smooth_at_50_hz(rig):
               f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.", flush=True)
         assert times[len(times) // 2] < 34 and heap[-1] < 60
     driver.end()
-
-
-def take_pictures(build, folder):
-    """Those of docs/web.md, with a machine that drives."""
-    from web_rig import WebRig
-
-    folder.mkdir(parents=True, exist_ok=True)
-    for size in SIZES:
-        for scheme in ("light", "dark"):
-            rig = WebRig(build)
-            try:
-                rig.start().connected()
-                driver = Driver(rig, 300)
-                with page_of(rig, size, scheme) as page:
-                    live(page)
-                    for speed in (300, 150, 350, 250):
-                        driver.speed = speed
-                        time.sleep(2)
-                    page.evaluate("goLive(); for (const plot of allPlots()) plot.move(0.35, 0.2)")
-                    time.sleep(0.5)
-                    page.screenshot(path=folder / f"web-{size}-{scheme}.png")
-                driver.end()
-            finally:
-                rig.close()
-    return 0
