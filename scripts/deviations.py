@@ -8,6 +8,7 @@ Looks at .clang-tidy, ruff.toml and .cppcheck-suppressions, at what compilers ar
 .cppcheck-suppressions accepts, cppcheck tells itself.
 The last line is "N passed, N failed, N skipped". No tool does it: each tool knows its own comments (clang-tidy, `ruff --select RUF100`), none the page.
 """
+
 import fnmatch
 import os
 import re
@@ -34,8 +35,11 @@ SILENCERS = [
     ("mypy", r"# type: (ignore[\w\[\],-]*)"),
 ]
 # Files that are nothing but a list of what is switched off: tool, and a line of it: what, and where if it says so.
-LISTS = {".clang-tidy": ("clang-tidy", r"^\s+-([a-z][\w.*-]+),?()"), "ruff.toml": ("ruff", r'^ +"([A-Z]+\d+)"()'),
-         ".cppcheck-suppressions": ("cppcheck", r"^([^#:\n]+):?(.*)$")}
+LISTS = {
+    ".clang-tidy": ("clang-tidy", r"^\s+-([a-z][\w.*-]+),?()"),
+    "ruff.toml": ("ruff", r'^ +"([A-Z]+\d+)"()'),
+    ".cppcheck-suppressions": ("cppcheck", r"^([^#:\n]+):?(.*)$"),
+}
 # Where nothing is looked for: what is built, and where these words stand for themselves.
 ELSEWHERE = {"build", ".git", ".venv", "__pycache__"}
 THEMSELVES = {"scripts/deviations.py", "test/gates/planted_faults.py"}
@@ -60,7 +64,7 @@ def rows_of(page):
         if re.match(r"\| *D\d", line):
             fields = [field.strip() for field in line.strip().strip("|").split("|")]
             if len(fields) != len(Row._fields) or not all(fields):
-                sys.exit(f"failed: {page}: not \"| number | tool | what | where | reason |\": {line}")
+                sys.exit(f'failed: {page}: not "| number | tool | what | where | reason |": {line}')
             found.append(Row(*(field.strip("`") for field in fields)))
     return found
 

@@ -15,6 +15,7 @@ pins     the lists of requirements/: every package that pyproject.toml wants is 
 
 No tool does it: clang-tidy has no check of includes between folders, and include-what-you-use judges one file; `uv lock --check` compares with uv.lock, not with lists for pip.
 """
+
 import json
 import os
 import re
@@ -46,8 +47,10 @@ def name(path):
 def files_of_a_message():
     """Production files that name every telemetry message: each new one touches them."""
     texts = {path: path.read_text() for path in sources(*PRODUCTION)}
-    of = [{path for path, text in texts.items() if re.search(rf"\bIW_(CODEC|ID_LEFT|ID_RIGHT|DLC)_{kind}\b|\biw_codec_{kind.lower()}_t\b", text)}
-          for kind in TELEMETRY]
+    of = [
+        {path for path, text in texts.items() if re.search(rf"\bIW_(CODEC|ID_LEFT|ID_RIGHT|DLC)_{kind}\b|\biw_codec_{kind.lower()}_t\b", text)}
+        for kind in TELEMETRY
+    ]
     return sorted(name(path) for path in set.intersection(*of))
 
 
@@ -73,8 +76,9 @@ def deepest(component):
 
 
 def private_includes():
-    return sorted(f"{name(path)} includes {included}" for path in sources(*OUTSIDE) for included in INCLUDE.findall(path.read_text())
-                  if "iwheel/private/" in included)
+    return sorted(
+        f"{name(path)} includes {included}" for path in sources(*OUTSIDE) for included in INCLUDE.findall(path.read_text()) if "iwheel/private/" in included
+    )
 
 
 def members_renamed(folder):
@@ -88,7 +92,7 @@ def members_renamed(folder):
 def compiled_anew(job):
     entry, folder = job
     command = [word for word in shlex.split(entry["command"]) if word not in ("ccache", "-c")]
-    command[command.index("-o"):command.index("-o") + 2] = ["-fsyntax-only"]
+    command[command.index("-o") : command.index("-o") + 2] = ["-fsyntax-only"]
     command = [word.replace(str(HEADERS), folder) for word in command]
     run = subprocess.run(command, cwd=entry["directory"], capture_output=True, text=True, check=False)
     return [line for line in run.stderr.splitlines() if "error:" in line]
@@ -142,18 +146,27 @@ def fact_of_arrows(program, limit):
     circle = needing_each_other(used)
     percent = 100 * len(used) / possible
     print(f"arrows between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
-    return [*bare, *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
-            *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else [])]
+    return [
+        *bare,
+        *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
+        *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else []),
+    ]
 
 
 def facts():
     builds = [ROOT / "build" / build for build in BUILDS if (ROOT / "build" / build / "compile_commands.json").is_file()]
     compiled, parts = uses_of_parts(builds)
-    counted = [("files that name every telemetry message", files_of_a_message(), 8), ("public headers of the core", public_headers(), 11),
-               ("private headers included outside the core", private_includes(), 0),
-               (f"parts of iw_gateway_t named outside the core, in {compiled} files compiled", parts, 0),
-               ("lines of app/gateway that name gw_daemon_t, the whole of it",
-                [line.strip() for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line], 60)]
+    counted = [
+        ("files that name every telemetry message", files_of_a_message(), 8),
+        ("public headers of the core", public_headers(), 11),
+        ("private headers included outside the core", private_includes(), 0),
+        (f"parts of iw_gateway_t named outside the core, in {compiled} files compiled", parts, 0),
+        (
+            "lines of app/gateway that name gw_daemon_t, the whole of it",
+            [line.strip() for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line],
+            60,
+        ),
+    ]
     findings = ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
     for what, found, limit in counted:
         print(f"{what}: {len(found)} (limit {limit})")
@@ -201,7 +214,9 @@ def layers():
                 wrong += [f"{path} includes {included} of {other}" for other in sorted(there - table.get(owners[path], set()))]
     unused = sorted(f"{who} -> {whom}" for who, all_of in table.items() for whom in all_of if (who, whom) not in used)
     strangers = sorted(set(owners.values()) - set(table))
-    wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused]
+    wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [
+        f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused
+    ]
     print(f"{len(files)} files of {len(table)} libraries and programs, {len(used)} permitted arrows")
     return wrong or ([] if table else [f"{ARCHITECTURE} has no table"])
 
@@ -215,8 +230,11 @@ MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
 def files(*places):
     """What git knows or would add; without git everything there."""
     run = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "--", *places], capture_output=True, text=True, check=False)
-    names = run.stdout.split("\n") if run.returncode == 0 else [
-        str(path.relative_to(ROOT)) for place in places for path in ([ROOT / place] if (ROOT / place).is_file() else (ROOT / place).rglob("*"))]
+    names = (
+        run.stdout.split("\n")
+        if run.returncode == 0
+        else [str(path.relative_to(ROOT)) for place in places for path in ([ROOT / place] if (ROOT / place).is_file() else (ROOT / place).rglob("*"))]
+    )
     return sorted(name for name in set(names) if name and (ROOT / name).is_file())
 
 
@@ -288,8 +306,11 @@ def wishes(group, table):
 def pins_of_group(group, table):
     from pip._vendor.packaging.markers import Marker
     from pip._vendor.packaging.requirements import Requirement
+
     file = f"requirements/{group}.txt"
-    found = [(name.lower(), version, Marker(marker or "os_name != ''"), sums, via) for name, version, marker, sums, via in PIN.findall((ROOT / file).read_text())]
+    found = [
+        (name.lower(), version, Marker(marker or "os_name != ''"), sums, via) for name, version, marker, sums, via in PIN.findall((ROOT / file).read_text())
+    ]
     wanted = [Requirement(wish) for wish in wishes(group, table)]
     print(f"{file}: {len(found)} pins of {len(wanted)} wishes")
     yield from (f"{file}: {name} {version} has no checksum" for name, version, _, sums, _ in found if not sums)
@@ -303,6 +324,7 @@ def pins_of_group(group, table):
 
 def pins():
     import tomllib
+
     table = tomllib.loads((ROOT / "requirements/pyproject.toml").read_text())["dependency-groups"]
     wrong = [what for group in table for what in pins_of_group(group, table)]
     for file in (file for file in files(".") if os.access(ROOT / file, os.X_OK)):

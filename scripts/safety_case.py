@@ -9,6 +9,7 @@ usage: safety_case.py [--update]
 The last line is "N passed, N failed, N skipped". No tool does it: doorstop and StrictDoc (PyPI) keep requirements and links in files of their own form,
 and do not know seeded faults.
 """
+
 import re
 import sys
 from pathlib import Path
@@ -17,13 +18,22 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "docs/developer/threat-model.md"
 sys.path.insert(0, str(ROOT / "test/faults"))
 import table
+
 FAULTS = sorted({*range(1, 35)} - {31})  # The rows of the fault catalogue; what happens in each is written on the page.
 INTERFACES = 11
 # Tested elsewhere under other names.
-OTHER_TESTS = {21: ("sim.directed",), 26: ("hang",), 34: (
-    "test_one_person_arm_too_old_changes_nothing", "test_one_person_reset_too_old_leaves_the_latch", "test_one_person_confirm_too_old_is_refused",
-    "test_one_person_burst_of_old_requests_changes_nothing", "test_one_person_reset_of_another_stop_leaves_the_latch",
-    "test_one_person_board_refuses_what_is_too_old")}
+OTHER_TESTS = {
+    21: ("sim.directed",),
+    26: ("hang",),
+    34: (
+        "test_one_person_arm_too_old_changes_nothing",
+        "test_one_person_reset_too_old_leaves_the_latch",
+        "test_one_person_confirm_too_old_is_refused",
+        "test_one_person_burst_of_old_requests_changes_nothing",
+        "test_one_person_reset_of_another_stop_leaves_the_latch",
+        "test_one_person_board_refuses_what_is_too_old",
+    ),
+}
 # Tests of a row by the first part of their names, beside those that begin with rowNN_.
 PREFIXES = {32: "test_one_person_", 33: "test_stop_never_"}
 
@@ -106,8 +116,11 @@ def findings(text, tests, bugs, rules):
         names = re.findall(r"`([^`]+)`", row[1]) if row else []
         if not names:
             yield f"fault {number}: no test"
-        yield from (f"fault {number}: there is no test {name}; scripts/safety_case.py --update writes the list"
-                    for name in names if "." not in name and name not in tests)
+        yield from (
+            f"fault {number}: there is no test {name}; scripts/safety_case.py --update writes the list"
+            for name in names
+            if "." not in name and name not in tests
+        )
 
 
 def threat_findings(text, tests):
@@ -156,7 +169,11 @@ def self_test(text, tests, bugs, rules):
     ]
     missed = sum(fault == text or not list(findings(fault, tests, bugs, rules)) for fault in faults)
     page = THREATS.read_text()
-    threats = [page.replace("`row20_odd_frames`", "`row20_even_frames`"), re.sub(r"^\| MQTT .*\n", "", page, flags=re.M), re.sub(r"(?m)^(\| CAN bus.*\|)[^|]*\|$", r"\1 |", page)]
+    threats = [
+        page.replace("`row20_odd_frames`", "`row20_even_frames`"),
+        re.sub(r"^\| MQTT .*\n", "", page, flags=re.M),
+        re.sub(r"(?m)^(\| CAN bus.*\|)[^|]*\|$", r"\1 |", page),
+    ]
     return missed + sum(fault == page or not list(threat_findings(fault, tests)) for fault in threats), len(faults) + len(threats)
 
 

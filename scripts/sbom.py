@@ -41,6 +41,7 @@ def checksum(path):
 
 # ---- what the files say ---------------------------------------------------------------------------------------------
 
+
 def shipped(folder):
     """The files that people install or flash."""
     found = [path for kind in ("*.deb", "*.whl", "images/*") for path in glob.glob(f"{folder}/{kind}")]
@@ -107,8 +108,11 @@ def facts(folder):
             with tempfile.TemporaryDirectory() as root:
                 subprocess.run(["dpkg-deb", "-x", path, root], check=True)
                 fact["depends"] = depends(path)
-                fact["libraries"] = {package_of(soname, field(path, "Architecture")) for soname in linked_libraries(root)
-                                     if not any(soname.startswith(f"{one.rstrip('0123456789')}.so") for one in own)}
+                fact["libraries"] = {
+                    package_of(soname, field(path, "Architecture"))
+                    for soname in linked_libraries(root)
+                    if not any(soname.startswith(f"{one.rstrip('0123456789')}.so") for one in own)
+                }
                 fact["foreign"] = foreign_files(root)
         elif os.path.basename(os.path.dirname(path)) == "images":
             fact["archives"] = archives(re.sub(r"\.\w+$", ".map", path))
@@ -116,6 +120,7 @@ def facts(folder):
 
 
 # ---- the document ---------------------------------------------------------------------------------------------------
+
 
 def identifier(name):
     return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", name)
@@ -140,9 +145,15 @@ def uplot(files):
     name, paths = UPLOT
     version, pinned = re.search(rf"^bring {name} (\S+) (\S+)", (ROOT / "scripts/web_assets").read_text(), re.M).groups()
     told = "; ".join(f"{PAGE}/{file} is {paths[file]}, sha256 {files[file]}" for file in sorted(files) if file in paths)
-    return package(name, version, checksums=[{"algorithm": "SHA512", "checksumValue": base64.b64decode(pinned).hex()}], licenseConcluded="MIT",
-                   licenseDeclared="MIT", comment=told, externalRefs=[{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl",
-                                                                       "referenceLocator": f"pkg:npm/{name}@{version}"}])
+    return package(
+        name,
+        version,
+        checksums=[{"algorithm": "SHA512", "checksumValue": base64.b64decode(pinned).hex()}],
+        licenseConcluded="MIT",
+        licenseDeclared="MIT",
+        comment=told,
+        externalRefs=[{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl", "referenceLocator": f"pkg:npm/{name}@{version}"}],
+    )
 
 
 def build_tools(buildinfo):
@@ -165,8 +176,15 @@ class Bill:
 
     def add(self, name, version, file, fact):
         """One of ours with what its file says."""
-        mine = package(name, version, packageFileName=file, checksums=[{"algorithm": "SHA256", "checksumValue": fact["checksum"]}],
-                       licenseConcluded="MIT", licenseDeclared="MIT", supplier="Organization: iWheel gateway maintainers")
+        mine = package(
+            name,
+            version,
+            packageFileName=file,
+            checksums=[{"algorithm": "SHA256", "checksumValue": fact["checksum"]}],
+            licenseConcluded="MIT",
+            licenseDeclared="MIT",
+            supplier="Organization: iWheel gateway maintainers",
+        )
         self.ours.append(mine)
         self.relate("SPDXRef-DOCUMENT", "DESCRIBES", mine["SPDXID"])
         for library in sorted(fact["libraries"]):
@@ -200,8 +218,10 @@ def describe(folder, found):
         "SPDXID": "SPDXRef-DOCUMENT",
         "name": f"iwheel-gateway-{version}",
         "documentNamespace": f"urn:uuid:{identity}",
-        "creationInfo": {"created": datetime.datetime.fromtimestamp(epoch, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
-                         "creators": ["Tool: scripts/sbom.py"]},
+        "creationInfo": {
+            "created": datetime.datetime.fromtimestamp(epoch, datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "creators": ["Tool: scripts/sbom.py"],
+        },
         "packages": bill.ours + [bill.others[name] for name in sorted(bill.others)],
         "relationships": bill.relations,
     }

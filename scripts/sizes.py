@@ -13,6 +13,7 @@ that of the linker's result and of the objects apart from it.
 Exit status 77 (skipped) if the committed table was made by another compiler. No tool does it: `size` and bloaty measure one file, not what is linked of a
 library for a use; -fstack-usage of gcc gives frames, not paths.
 """
+
 import re
 import subprocess
 import sys
@@ -30,8 +31,10 @@ ROW = re.compile(r"^\| `?([^|`]+?)`? +\|(.*)\|$", re.MULTILINE)
 CODEC = "iw_codec_decode iw_codec_encode_setpoint"
 SETPOINT = "iw_setpoint_init iw_setpoint_demand iw_setpoint_command iw_setpoint_due iw_setpoint_take iw_setpoint_next_us"
 FORCE = "iw_force_init iw_force_reopen iw_force_receive iw_force_receive_offset iw_force_validity iw_force_net_mN"
-GATEWAY = ("iw_config_default iw_gateway_init iw_gateway_step iw_gateway_suspended iw_gateway_bus_facts iw_gateway_arm iw_gateway_drive "
-           "iw_gateway_stop iw_gateway_estop iw_gateway_reset iw_gateway_disconnect iw_gateway_tare iw_gateway_state iw_gateway_arming")
+GATEWAY = (
+    "iw_config_default iw_gateway_init iw_gateway_step iw_gateway_suspended iw_gateway_bus_facts iw_gateway_arm iw_gateway_drive "
+    "iw_gateway_stop iw_gateway_estop iw_gateway_reset iw_gateway_disconnect iw_gateway_tare iw_gateway_state iw_gateway_arming"
+)
 KNOWN = "iw_gateway_set_assumption iw_gateway_restore_offset iw_config_stop_budget"
 OBSERVATION = "iw_observation_init iw_observation_step"
 # What is used: its headers, its functions, and the most that it may cost on a Cortex-M4.
@@ -49,18 +52,38 @@ HAL = ("brd_bxcan_send", "brd_bxcan_receive", "brd_bxcan_bus_state", "brd_bxcan_
 HANDLERS = ("brd_systick_handler", "brd_exti0_handler", "brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler")
 # Of the image gateway alone; and how the functions are called that northbound's refusals reach through a table.
 SERIAL_HANDLERS, THROUGH_TABLE = ("brd_serial_usart_handler", "brd_serial_receive_handler", "brd_serial_transmit_handler"), ":say_"
-SAVED_BY_CPU = 36 # Eight registers and four bytes to align them.
+SAVED_BY_CPU = 36  # Eight registers and four bytes to align them.
 
 
 def linked(library, cpu, headers, functions):
     """{module: bytes} of what is linked."""
     with tempfile.TemporaryDirectory() as folder:
         source, memory_map = Path(folder) / "use.c", Path(folder) / "map"
-        source.write_text("".join(f'#include "iwheel/{header}"\n' for header in headers.split()) + "void *volatile sink;\nvoid use(void) {\n"
-                          + "".join(f"    sink = (void *){function};\n" for function in functions.split()) + "}\n")
-        subprocess.run(["arm-none-eabi-gcc", f"-mcpu={CPUS[cpu]}", "-mthumb", "-mfloat-abi=soft", "-Os", f"-I{ROOT / 'core/include'}",
-                        "-nostartfiles", "-specs=nosys.specs", f"-Wl,--gc-sections,-e,use,-Map={memory_map}", source, library, "-o",
-                        Path(folder) / "used"], check=True, stderr=subprocess.DEVNULL)
+        source.write_text(
+            "".join(f'#include "iwheel/{header}"\n' for header in headers.split())
+            + "void *volatile sink;\nvoid use(void) {\n"
+            + "".join(f"    sink = (void *){function};\n" for function in functions.split())
+            + "}\n"
+        )
+        subprocess.run(
+            [
+                "arm-none-eabi-gcc",
+                f"-mcpu={CPUS[cpu]}",
+                "-mthumb",
+                "-mfloat-abi=soft",
+                "-Os",
+                f"-I{ROOT / 'core/include'}",
+                "-nostartfiles",
+                "-specs=nosys.specs",
+                f"-Wl,--gc-sections,-e,use,-Map={memory_map}",
+                source,
+                library,
+                "-o",
+                Path(folder) / "used",
+            ],
+            check=True,
+            stderr=subprocess.DEVNULL,
+        )
         text = memory_map.read_text().split("Linker script and memory map", 1)[1]
     sizes = {}
     for size, module in SECTION.findall(re.sub(r"\n (\.\S+)\n +0x", r"\n \1 0x", text)):
@@ -83,8 +106,7 @@ def uses(builds):
 
 
 def objects_of(build, *folders):
-    return sorted(path for path in Path(build).rglob("*.c.o*") if path.suffix in (".o", ".obj")
-                  and any(f"{folder}.dir" in path.parts for folder in folders))
+    return sorted(path for path in Path(build).rglob("*.c.o*") if path.suffix in (".o", ".obj") and any(f"{folder}.dir" in path.parts for folder in folders))
 
 
 def depth_of(objects, indirect=()):
@@ -108,7 +130,9 @@ def linked_objects(build, image):
     archives = {f"{path.stem.removeprefix('lib')}.dir" for path in loaded if path.suffix == ".a"}
     objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_northbound_server", "iwheel_stm32_driver", image)
     merged = [path for path in loaded if path.name.startswith(f"{image}.elf.ltrans")]
-    return [path for path in objects if (path.resolve() in loaded or archives.intersection(path.parts)) and not (merged and b".gnu.lto_" in path.read_bytes())] + merged
+    return [
+        path for path in objects if (path.resolve() in loaded or archives.intersection(path.parts)) and not (merged and b".gnu.lto_" in path.read_bytes())
+    ] + merged
 
 
 def image_stack(build, image):
@@ -147,12 +171,20 @@ def image_sizes(build, image):
 
 def stacks_and_images(builds):
     """`builds`: those of Cortex-M0+, M3, M4."""
-    rows = ["", "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.", "",
-            "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
-            "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
-            "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
-            "is the worst of main loop and interrupt, of the 1792 that sections.ld keeps for it; in emulation at least 256 of them stay unused.", "",
-            "| image             |    flash   |     RAM    |    stack   |", "|-------------------|-----------:|-----------:|-----------:|"]
+    rows = [
+        "",
+        "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.",
+        "",
+        "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |",
+        "|-----------------|-----------:|-----------:|-----------:|",
+        "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |",
+        "",
+        "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
+        "is the worst of main loop and interrupt, of the 1792 that sections.ld keeps for it; in emulation at least 256 of them stay unused.",
+        "",
+        "| image             |    flash   |     RAM    |    stack   |",
+        "|-------------------|-----------:|-----------:|-----------:|",
+    ]
     for board, (image, which, more) in BOARDS.items():
         for kind in ("listen", "demo", "gateway"):
             build = str(builds[which]).rstrip("/") + more + {"listen": ""}.get(kind, f"-{kind}")
@@ -177,17 +209,27 @@ def render(builds):
     rows, findings, shares = uses(builds)
     modules = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
     kinds = sorted(type_sizes().items(), key=lambda item: -item[1])
-    lines = ["# Sizes", "",
-             f"Made by `scripts/sizes.py --update` with arm-none-eabi-gcc {compiler()} -Os; `./check` compares.", "",
-             "Code and constants in bytes of what is linked for each use, without what is not called (`-ffunction-sections`, `--gc-sections`). The",
-             "core has no data and no bss.", "",
-             "| what is used            | " + " | ".join(f"{cpu:>10}" for cpu in CPUS) + " |",
-             "|-------------------------|" + "|".join("-----------:" for _ in CPUS) + "|"]
+    lines = [
+        "# Sizes",
+        "",
+        f"Made by `scripts/sizes.py --update` with arm-none-eabi-gcc {compiler()} -Os; `./check` compares.",
+        "",
+        "Code and constants in bytes of what is linked for each use, without what is not called (`-ffunction-sections`, `--gc-sections`). The",
+        "core has no data and no bss.",
+        "",
+        "| what is used            | " + " | ".join(f"{cpu:>10}" for cpu in CPUS) + " |",
+        "|-------------------------|" + "|".join("-----------:" for _ in CPUS) + "|",
+    ]
     lines += [f"| {name:<23} | " + " | ".join(f"{value:>10}" for value in values) + " |" for name, values in rows]
     lines += ["", "Where the bytes of the gateway are, on Cortex-M4:", "", "| module       |   bytes |", "|--------------|--------:|"]
     lines += [f"| {name:<12} | {size:>7} |" for name, size in modules]
-    lines += ["", "RAM in bytes: `iw_gateway_t` holds everything, once per pair of wheels; the others are its parts.", "",
-              "| type              |     RAM    |", "|-------------------|-----------:|"]
+    lines += [
+        "",
+        "RAM in bytes: `iw_gateway_t` holds everything, once per pair of wheels; the others are its parts.",
+        "",
+        "| type              |     RAM    |",
+        "|-------------------|-----------:|",
+    ]
     lines += [f"| {f'`{name}`':<17} | {size:>10} |" for name, size in kinds]
     lines += stacks_and_images(builds)
     return "\n".join(lines) + "\n", dict(rows)["gateway"][2], findings

@@ -14,6 +14,7 @@ usage: style.py [--fix] [ROOT]      --fix writes that form
 Needs lizard (PyPI), which measures functions. Tried: clang-tidy and clang-format 14 have no check for any of this but the length of functions
 and their parameters, and clang-tidy does not compile the STM32 port.
 """
+
 import re
 import statistics
 import sys
@@ -44,12 +45,16 @@ FILE_NAMED = re.compile(r"(?<![\w/<-])[\w/-]+\.(?:[ch]|md)\b")
 RULE_NAMED = re.compile(r"\bR\d+\b")
 DIALECT = ("core", "port", "lib", "app", "test", "examples")
 # Comments, strings, characters, preprocessor lines; words; operators.
-TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*|\w+|->|\+\+|--|<<=|>>=|<<|>>|&&|\|\||[<>=!+\-*/%&|^]=|.',
-                   re.DOTALL | re.MULTILINE)
+TOKEN = re.compile(
+    r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*|\w+|->|\+\+|--|<<=|>>=|<<|>>|&&|\|\||[<>=!+\-*/%&|^]=|.',
+    re.DOTALL | re.MULTILINE,
+)
 COMPARES = {"==", "!=", "<", ">", "<=", ">=", "&&", "||"}
 ASSIGNS = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>="}
 OPEN, CLOSE = "([{", ")]}"
-INCREMENT = re.compile(r"(?P<before>(?:^[ \t]*|for \([^\n]*; ))(?P<operator>\+\+|--)(?P<what>[A-Za-z_][\w.\->]*(?:\[[^\]\n]+\](?:[.\w\->]*))*)(?P<after>;|\) \{)", re.MULTILINE)
+INCREMENT = re.compile(
+    r"(?P<before>(?:^[ \t]*|for \([^\n]*; ))(?P<operator>\+\+|--)(?P<what>[A-Za-z_][\w.\->]*(?:\[[^\]\n]+\](?:[.\w\->]*))*)(?P<after>;|\) \{)", re.MULTILINE
+)
 SIZEOF = re.compile(r"\bsizeof\(([a-z_][\w.\->]*(?:\[[^\]\n]*\])?)\)")
 TYPE = re.compile(r"\w+_t$|(?:char|int|long|short|unsigned|float|double|bool|void)$|T$")
 VOID_MEM = re.compile(r"\(void\)(mem(?:set|cpy|move)\()")
@@ -153,8 +158,8 @@ def parenthesised(text):
 
 def without_parentheses(found):
     """Not in a macro, whose arguments need theirs."""
-    line = found.string[found.string.rfind("\n", 0, found.start()) + 1:found.end()]
-    before = found.string[:found.start() - len(line) + len(found[0])].rstrip("\n")
+    line = found.string[found.string.rfind("\n", 0, found.start()) + 1 : found.end()]
+    before = found.string[: found.start() - len(line) + len(found[0])].rstrip("\n")
     in_macro = line.lstrip().startswith("#") or before.endswith("\\")
     return found[0] if in_macro or TYPE.search(found[1]) else f"sizeof {found[1]}"
 
@@ -192,7 +197,9 @@ def main(arguments):
             findings += [*function_findings(path.relative_to(root), functions, limits), *file_findings(path, path.relative_to(root))]
         median = statistics.median(lengths)
         findings += [f"{group}: the median function has {median} lines, at most {limits[2]}"] if median > limits[2] else []
-        print(f"{group}: {len(lengths)} functions in {len(measured)} files, lines: median {median:g}, max {max(lengths)}; comments {comment_share(measured):.0f} %")
+        print(
+            f"{group}: {len(lengths)} functions in {len(measured)} files, lines: median {median:g}, max {max(lengths)}; comments {comment_share(measured):.0f} %"
+        )
     for path in sources(root, HEADERS):
         findings += function_findings(path.relative_to(root), lizard.analyze_file(str(path)).function_list, GROUPS["core"])
         findings += file_findings(path, path.relative_to(root))

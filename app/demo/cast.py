@@ -51,9 +51,7 @@ class Driver:
             self.child.stdin.write(f"{left} {right}\n".encode())
             self.child.stdin.flush()
         except BrokenPipeError as error:
-            raise RuntimeError(
-                "the joystick program has ended: " + (self.text().splitlines() or ["without a word"])[-1]
-            ) from error
+            raise RuntimeError("the joystick program has ended: " + (self.text().splitlines() or ["without a word"])[-1]) from error
 
     def text(self):
         with open(self.output, encoding="utf-8") as file:

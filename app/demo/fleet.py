@@ -39,8 +39,10 @@ def broker(rig, port):
     """A nats-server, which keeps a history, on this port and the next; without one a mosquitto. What the console is told beside the port."""
     server = shutil.which("nats-server") or "/usr/sbin/nats-server"
     if os.path.exists(server):
-        config = write(rig.path("nats.conf"), f'server_name: demo\nlisten: 127.0.0.1:{port + 1}\njetstream {{ store_dir: "{rig.path("nats")}" }}\n'
-                                              f'mqtt {{ listen: 127.0.0.1:{port} }}\n')
+        config = write(
+            rig.path("nats.conf"),
+            f'server_name: demo\nlisten: 127.0.0.1:{port + 1}\njetstream {{ store_dir: "{rig.path("nats")}" }}\nmqtt {{ listen: 127.0.0.1:{port} }}\n',
+        )
         process = Process([server, "-c", config], rig.path("nats.out"))
         rig.processes.append(process)
         listens(process, "nats-server", port)
@@ -56,8 +58,11 @@ def broker(rig, port):
 
 def bridge(rig, name, port):
     os.mkdir(rig.path("spool"), 0o700)
-    config = write(rig.path("mqtt.conf"), f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[machine]\nid = {name}\n[broker]\nport = {port}\n"
-                                          f"[state]\nevery_ms = 1000\n[spool]\ndirectory = {rig.path('spool')}\n")
+    config = write(
+        rig.path("mqtt.conf"),
+        f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[machine]\nid = {name}\n[broker]\nport = {port}\n"
+        f"[state]\nevery_ms = 1000\n[spool]\ndirectory = {rig.path('spool')}\n",
+    )
     rig.processes.append(Process([find_program(rig.build, "iwheel-mqtt"), "-c", config], rig.path("mqtt.out")))
 
 
@@ -72,7 +77,11 @@ def tell(rigs, console, keeps, iwheelctl):
     told = f"{len(rigs)} machines, {len(rigs) - 1} online" in text and "estop_line" in text
     print("walker-1 was stopped by its button, the last one's gateway was killed" + ("" if told else ": NOT TOLD"))
     frames = rigs[0].path("fetched.log")
-    for words in ([*console, "history", "--last", "5min"] if keeps else None, [*console, "recording", "walker-1", "--output", frames], [iwheelctl, "why", frames, "--frames", "1"]):
+    for words in (
+        [*console, "history", "--last", "5min"] if keeps else None,
+        [*console, "recording", "walker-1", "--output", frames],
+        [iwheelctl, "why", frames, "--frames", "1"],
+    ):
         if words:
             print(f"\n$ {' '.join([Path(words[0]).name, *words[1:]])}", flush=True)
             done = subprocess.run(words, check=False, capture_output=True, text=True)
@@ -103,9 +112,12 @@ def main():
             return tell(rigs, console, keeps, find_program(options.build, "iwheelctl"))
         again = " ".join([os.path.relpath(console[0]), *console[1:]])
         sim = os.path.relpath(find_program(options.build, "iwheel-sim"))
-        print(f"{options.machines} machines at the broker on port {options.port}. In another terminal:\n\n"
-              f"    {sim} --control {rigs[0].path('control')} estop press\n    {again} recording walker-1\n"
-              + (f"    {again} history --last 5min\n" if keeps else ""), flush=True)
+        print(
+            f"{options.machines} machines at the broker on port {options.port}. In another terminal:\n\n"
+            f"    {sim} --control {rigs[0].path('control')} estop press\n    {again} recording walker-1\n"
+            + (f"    {again} history --last 5min\n" if keeps else ""),
+            flush=True,
+        )
         time.sleep(5)
         return subprocess.run(console, check=False).returncode
     except KeyboardInterrupt:

@@ -26,20 +26,20 @@ def keep(rig):
     print(f"""
 Gateway and simulator go on running. In another terminal, in this folder:
 
-    export IWHEEL_SOCKET={rig.path('gateway.sock')}
+    export IWHEEL_SOCKET={rig.path("gateway.sock")}
     {tool} status
     {tool} drive 300 300 --for 3s
     {tool} watch state stop
     {tool} why
 
-    SIM="{sim} --control {rig.path('control')}"
+    SIM="{sim} --control {rig.path("control")}"
     $SIM estop press
     $SIM estop release
     {tool} reset
     $SIM help
 
-Configuration:      {rig.path('gateway.conf')}
-Gateway's messages: {rig.path('gateway.out')}
+Configuration:      {rig.path("gateway.conf")}
+Gateway's messages: {rig.path("gateway.out")}
 """)
     if sys.stdin.isatty():
         print("Enter or Ctrl-C ends both.", flush=True)
@@ -74,11 +74,7 @@ def tell(story, view, sleeper, interrupts):
         f"\nEverything happened as told, in {story.elapsed_s():.0f} s. {len(judge.frames)} frames were on the bus, "
         f"{len(judge.setpoints)} of them\nsetpoints, judged one by one: no rule was broken; "
         f"longest gap {judge.gap_max_us / 1000:.0f} ms."
-        + (
-            f"\n(Timing was not judged: this machine stalled for up to {sleeper.worst_s * 1000:.0f} ms.)"
-            if late
-            else ""
-        )
+        + (f"\n(Timing was not judged: this machine stalled for up to {sleeper.worst_s * 1000:.0f} ms.)" if late else "")
     )
 
 

@@ -126,7 +126,9 @@ def tell(rig, peer, view):
         raise Failed(f"{off_m:.2f} m off its beginning; stopped: {stopped}")
     time.sleep(0.5)
     pose = rig.client().request("status")["pose"]
-    print(f"\nA square of {SIDE_M:g} m, back within {100 * off_m:.0f} cm by odom; the wheel's own odometry says {pose['x_mm'] / 1000:.2f} {pose['y_mm'] / 1000:.2f} m.")
+    print(
+        f"\nA square of {SIDE_M:g} m, back within {100 * off_m:.0f} cm by odom; the wheel's own odometry says {pose['x_mm'] / 1000:.2f} {pose['y_mm'] / 1000:.2f} m."
+    )
 
 
 def main():

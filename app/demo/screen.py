@@ -37,8 +37,7 @@ class Lines:
         word = {"armed": "drive", "stopping": "stop", "latched": "latched"}.get(status["state"], status["state"])
         self._print(
             elapsed_s,
-            f"{word:<7} {left['applied_mm_s']}/{right['applied_mm_s']} mm/s   "
-            f"left {number(left['speed_mm_s'])} right {number(right['speed_mm_s'])} mm/s",
+            f"{word:<7} {left['applied_mm_s']}/{right['applied_mm_s']} mm/s   left {number(left['speed_mm_s'])} right {number(right['speed_mm_s'])} mm/s",
         )
 
     def close(self):
@@ -129,16 +128,8 @@ class Screen:
             return " starting"
         state, lease, estop = self.status["state"], self.status["lease"], self.status["estop"]["state"]
         colour = {"listening": 36, "armed": 32, "stopping": 33, "latched": 31}[state]
-        remaining = (
-            "nobody may drive"
-            if lease["holder"] is None
-            else f"{lease['name']} may drive for {number(lease['remaining_ms']):>4} ms"
-        )
-        lamp = (
-            tint(f"{self.glyphs.lamp} e-stop released", 32)
-            if estop == "released"
-            else tint(f" {self.glyphs.lamp} E-STOP {estop.upper()} ", 41, 97, 1)
-        )
+        remaining = "nobody may drive" if lease["holder"] is None else f"{lease['name']} may drive for {number(lease['remaining_ms']):>4} ms"
+        lamp = tint(f"{self.glyphs.lamp} e-stop released", 32) if estop == "released" else tint(f" {self.glyphs.lamp} E-STOP {estop.upper()} ", 41, 97, 1)
         return f" state {tint(f'{state.upper():<10}', colour, 1)}  {remaining:<32}  " + lamp
 
     def _wheels(self):
@@ -159,11 +150,7 @@ class Screen:
         cells = [self.glyphs.empty] * BAR
         filled = 0 if value is None else round(min(1, abs(value) / FULL_SCALE_MM_S) * half)
         low, high = (half - filled, half) if (value or 0) < 0 else (half + 1, half + 1 + filled)
-        body = (
-            tint("".join(cells[:low]), 2) + tint(self.glyphs.full * (min(high, half) - low), colour)
-            if low < half
-            else tint("".join(cells[:half]), 2)
-        )
+        body = tint("".join(cells[:low]), 2) + tint(self.glyphs.full * (min(high, half) - low), colour) if low < half else tint("".join(cells[:half]), 2)
         tail = tint(self.glyphs.full * (high - half - 1), colour) + tint("".join(cells[max(high, half + 1) :]), 2)
         return f"  {label} {body}{self.glyphs.middle}{tail} {number(value):>5} mm/s "[:400] + " "
 
@@ -182,9 +169,7 @@ class Screen:
         middle = [(max(p[axis] for p in points) + min(p[axis] for p in points)) / 2 for axis in (0, 1)]
         across, down = MAP_WIDTH * 2, MAP_HEIGHT * 4
         scale = min(across, down) / span
-        dots = {
-            (int(across / 2 + (px - middle[0]) * scale), int(down / 2 - (py - middle[1]) * scale)) for px, py in points
-        }
+        dots = {(int(across / 2 + (px - middle[0]) * scale), int(down / 2 - (py - middle[1]) * scale)) for px, py in points}
         grid = [[" "] * MAP_WIDTH for _ in range(MAP_HEIGHT)]
         bits = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
         cells = {}

@@ -91,9 +91,7 @@ class Story:
         answered_ms = self.rig.start_gateway(wheels=False)
         self.client = self.rig.client("demo")
         self.client.request("watch", topics=["state"], rate_hz=20)
-        heard = self.watch(
-            5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released"
-        )
+        heard = self.watch(5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released")
         self.require(answered_ms < 3000, f"the gateway answers {answered_ms:.0f} ms after its start")
         self.require(heard, "both wheels are heard and stand still, the e-stop is released")
         self.watch(1.2)
@@ -102,15 +100,11 @@ class Story:
     def learn_offsets(self):
         self.step(
             "Learning the force sensors' zero",
-            "Each wheel takes the mean force of its first two seconds as its zero and sends it "
-            "for a minute. Nobody leans on the handles, so it is a good one.",
+            "Each wheel takes the mean force of its first two seconds as its zero and sends it for a minute. Nobody leans on the handles, so it is a good one.",
         )
         known = self.watch(
             6,
-            lambda s: all(
-                s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None
-                for side in ("left", "right")
-            ),
+            lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None for side in ("left", "right")),
         )
         offsets = [self.status[side]["force_offset_mN"] for side in ("left", "right")]
         self.require(
@@ -138,8 +132,7 @@ class Story:
         budget = self.status["budget"]
         self.require(
             budget["client_lost_ms"] <= 1000,
-            f"if it falls silent, the machine stands within {budget['client_lost_ms']} ms "
-            f"and {budget['client_lost_mm'] / 1000:.2f} m",
+            f"if it falls silent, the machine stands within {budget['client_lost_ms']} ms and {budget['client_lost_mm'] / 1000:.2f} m",
         )
         driver.want(0, 0)
         self.watch(2.0)
@@ -185,15 +178,12 @@ class Story:
     def client_dies(self, driver):
         self.step(
             "The joystick program dies",
-            "kill -9 in the middle of it. Nobody feeds the lease any more: the gateway ramps down, "
-            "holds zero for 1.5 s, then falls silent.",
+            "kill -9 in the middle of it. Nobody feeds the lease any more: the gateway ramps down, holds zero for 1.5 s, then falls silent.",
         )
         killed_us = now_us()
         self.rig.timeline.append(Event(killed_us, "gone"))
         driver.end()
-        stopped = self.watch(
-            2, lambda s: s["state"] == "stopping" and s["left"]["applied_mm_s"] == 0 and s["right"]["applied_mm_s"] == 0
-        )
+        stopped = self.watch(2, lambda s: s["state"] == "stopping" and s["left"]["applied_mm_s"] == 0 and s["right"]["applied_mm_s"] == 0)
         setpoints = self.rig.bus.setpoints(killed_us)
         slower_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed < 395), 9999)
         zero_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed == 0), 9999)
@@ -221,11 +211,7 @@ class Story:
         latched = self.watch(1, lambda s: s["state"] == "latched")
         zeros = [
             next(
-                (
-                    (t - pressed_us) / 1000
-                    for t, name, speed in self.rig.bus.setpoints(pressed_us)
-                    if name == wanted and speed == 0
-                ),
+                ((t - pressed_us) / 1000 for t, name, speed in self.rig.bus.setpoints(pressed_us) if name == wanted and speed == 0),
                 9999,
             )
             for wanted in (266, 298)
@@ -292,11 +278,7 @@ class Story:
             for line in driver.text().splitlines():
                 words = line.split()
                 if len(words) == len(Event._fields):
-                    self.rig.timeline.append(
-                        Event(*(int(w) if w.lstrip("-").isdigit() else w for w in words))._replace(
-                            ok=words[3] == "True"
-                        )
-                    )
+                    self.rig.timeline.append(Event(*(int(w) if w.lstrip("-").isdigit() else w for w in words))._replace(ok=words[3] == "True"))
         judge = self.rig.judge(estop_limit_us=50_000)
         broken = [found for found in judge.found if not found.timing]
         if broken:

@@ -22,8 +22,11 @@ def bridge(rig, port):
     """The bridge, allowed to drive, and the page's address."""
     settings = rig.path("web.conf")
     page = Path(rig.build, "app/bridge/web/page").resolve()
-    Path(settings).write_text(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[web]\nport = {port}\ntoken_file = {rig.path('token')}\npage = {page}\n"
-                              "[drive]\nenabled = yes\nallow_reset = yes\n", encoding="utf-8")
+    Path(settings).write_text(
+        f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[web]\nport = {port}\ntoken_file = {rig.path('token')}\npage = {page}\n"
+        "[drive]\nenabled = yes\nallow_reset = yes\n",
+        encoding="utf-8",
+    )
     program = find_program(rig.build, "iwheel-web")
     process = Process([program, "-c", settings], rig.path("web.out"))
     rig.processes.append(process)
@@ -44,16 +47,19 @@ def main():
         rig.start_gateway()
         url = bridge(rig, options.port)
         sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
-        print(f"""
+        print(
+            f"""
 The page of two simulated wheels, which may be driven from it:
 
     {url}
 
 From a phone, forward the port:  ssh -L {options.port}:127.0.0.1:{options.port} THIS-MACHINE
-Faults, in another terminal:     {sim} --control {rig.path('control')} estop press
-                                 {sim} --control {rig.path('control')} help
+Faults, in another terminal:     {sim} --control {rig.path("control")} estop press
+                                 {sim} --control {rig.path("control")} help
 
-Ctrl-C ends it.""", flush=True)
+Ctrl-C ends it.""",
+            flush=True,
+        )
         signal.pause()
     except KeyboardInterrupt:
         print()

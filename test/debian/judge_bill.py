@@ -5,6 +5,7 @@ the web page comes from; and unless this test notices each entry that is missing
 
 usage: judge_bill.py FOLDER     of scripts/sbom.py, which wrote the bill there
 """
+
 import copy
 import functools
 import json
@@ -56,7 +57,11 @@ def judge(document, found):
         said = {kind: {names.get(other, other) for one, its_kind, other in ends if one == mine and its_kind == kind} for kind in NEEDS}
         wrong += [] if entry["checksums"][0].get("checksumValue") == fact["checksum"] else [f"{file} has another checksum"]
         wrong += [] if ("SPDXRef-DOCUMENT", "DESCRIBES", mine) in ends else [f"{file} is not what the document describes"]
-        wrong += [] if any(one in names and kind == "BUILD_TOOL_OF" and other == mine for one, kind, other in ends) or file.endswith(".whl") else [f"what built {file} is not told"]
+        wrong += (
+            []
+            if any(one in names and kind == "BUILD_TOOL_OF" and other == mine for one, kind, other in ends) or file.endswith(".whl")
+            else [f"what built {file} is not told"]
+        )
         wrong += judge_needs(file, fact, said, packages)
     return wrong
 
@@ -66,8 +71,12 @@ def unnoticed(document, found):
     for key in ("packages", "relationships"):
         for at, row in enumerate(document[key]):
             kind = row.get("relationshipType")
-            tools = [other for other in document["relationships"] if other["relationshipType"] == kind == "BUILD_TOOL_OF" and other["relatedSpdxElement"] == row["relatedSpdxElement"]]
-            if len(tools) < 2 and not judge({**document, key: document[key][:at] + document[key][at + 1:]}, found):
+            tools = [
+                other
+                for other in document["relationships"]
+                if other["relationshipType"] == kind == "BUILD_TOOL_OF" and other["relatedSpdxElement"] == row["relatedSpdxElement"]
+            ]
+            if len(tools) < 2 and not judge({**document, key: document[key][:at] + document[key][at + 1 :]}, found):
                 yield f"without {row.get('name') or list(row.values())}"
     for at, row in enumerate(document["packages"]):
         spoilt = copy.deepcopy(document)
@@ -75,7 +84,13 @@ def unnoticed(document, found):
             spoilt["packages"][at]["checksums"][0]["checksumValue"] = "0" * 64
             if not judge(spoilt, found):
                 yield f"another checksum of {row['name']}"
-            spoilt = {**document, "relationships": [*document["relationships"], {"spdxElementId": row["SPDXID"], "relationshipType": "DEPENDS_ON", "relatedSpdxElement": row["SPDXID"]}]}
+            spoilt = {
+                **document,
+                "relationships": [
+                    *document["relationships"],
+                    {"spdxElementId": row["SPDXID"], "relationshipType": "DEPENDS_ON", "relatedSpdxElement": row["SPDXID"]},
+                ],
+            }
             if not judge(spoilt, found):
                 yield f"{row['name']} needs itself"
 

@@ -6,6 +6,7 @@ usage: planted_faults.py [GATE...]      only the cases of these gates: the names
 
 Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
 """
+
 import argparse
 import collections
 import atexit
@@ -26,8 +27,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPTS = ROOT / "scripts"
-ARM = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffreestanding",
-       "-ffunction-sections", "-fstack-usage", "-fcallgraph-info=su"]
+ARM = [
+    "arm-none-eabi-gcc",
+    "-mcpu=cortex-m4",
+    "-mthumb",
+    "-mfloat-abi=soft",
+    "-Os",
+    "-std=c99",
+    "-ffreestanding",
+    "-ffunction-sections",
+    "-fstack-usage",
+    "-fcallgraph-info=su",
+]
 CLEAN = "// SPDX-License-Identifier: MIT\nint iw_f(int a);\nint iw_f(int a)\n{\n    return a + 1;\n}\n"
 
 
@@ -150,9 +161,20 @@ def deviations(folder, fault):
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
-    sources = [*(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
-               "lib/northbound/server/src/observe.c", *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json"))]
-    for name in ("scripts/northbound.py", "test/northbound/described.py", "test/northbound/test_description.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
+    sources = [
+        *(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
+        "lib/northbound/server/src/observe.c",
+        *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json")),
+    ]
+    for name in (
+        "scripts/northbound.py",
+        "test/northbound/described.py",
+        "test/northbound/test_description.py",
+        "share/northbound.json",
+        "docs/northbound.md",
+        "python/src/iwheel/_protocol.py",
+        *sources,
+    ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
         if name == fault[0]:
@@ -182,8 +204,16 @@ def mcdc(folder, calls):
     (folder / "build/mcdc/profiles").mkdir(parents=True)
     (folder / "core/planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
     (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
-    run("clang-19", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc", folder / "main.c",
-        folder / "core/planted.c", "-o", folder / "build/mcdc/unit_planted")
+    run(
+        "clang-19",
+        "-fprofile-instr-generate",
+        "-fcoverage-mapping",
+        "-fcoverage-mcdc",
+        folder / "main.c",
+        folder / "core/planted.c",
+        "-o",
+        folder / "build/mcdc/unit_planted",
+    )
     run("env", f"LLVM_PROFILE_FILE={folder}/build/mcdc/profiles/a.profraw", folder / "build/mcdc/unit_planted")
     inner, outer = re.findall(r'^set\(conditions "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)
     command = outer.replace("${conditions}", inner).replace("\\$", "$").replace('\\"', '"')
@@ -240,7 +270,9 @@ def house(folder, fault):
     flags = [f"-I{folder / part}" for part in ("core/include", "port/stm32_stub", "port/stm32_stub/access", "port/stm32_stub/boards/stm32f103")]
     lamp = str(folder / "port/stm32_stub/lamp.c")
     (folder / "build/default").mkdir(parents=True)
-    (folder / "build/default/compile_commands.json").write_text(json.dumps([{"file": lamp, "directory": str(folder), "command": f"gcc -std=c99 {' '.join(flags)} -o a.o -c {lamp}"}]))
+    (folder / "build/default/compile_commands.json").write_text(
+        json.dumps([{"file": lamp, "directory": str(folder), "command": f"gcc -std=c99 {' '.join(flags)} -o a.o -c {lamp}"}])
+    )
     return run(SCRIPTS / "house.py", "facts", folder)
 
 
@@ -277,8 +309,16 @@ def api(folder, fault):
 
 def pages(folder, fault):
     """A page with one list, and indexes, about a small tree; the fault is (file, old, new), or a file more."""
-    tree = {"app/a.c": "int follow_ms;\n", "app/b.c": "int other;\n", "test/README.md": "| `run` | x |\n", "test/run": "x\n", "scripts/README.md": "| `one.py` | x |\n",
-            "scripts/one.py": "x\n", "docs/README.md": "| `how-to-add.md` | x |\n", "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n"}
+    tree = {
+        "app/a.c": "int follow_ms;\n",
+        "app/b.c": "int other;\n",
+        "test/README.md": "| `run` | x |\n",
+        "test/run": "x\n",
+        "scripts/README.md": "| `one.py` | x |\n",
+        "scripts/one.py": "x\n",
+        "docs/README.md": "| `how-to-add.md` | x |\n",
+        "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
+    }
     name, old, new = fault
     tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
     for name, text in tree.items():
@@ -428,7 +468,7 @@ DEVIATING = {
     ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
     "core/a.c": CLEAN,
     ".cppcheck-suppressions": "# Words.\nzero:core/*\n",
-    "ruff.toml": '[lint]\nignore = [\n]\n',
+    "ruff.toml": "[lint]\nignore = [\n]\n",
 }
 
 # gate, its tool, what is planted, argument, must it be caught
@@ -436,7 +476,7 @@ CASES = [
     (purity, "arm-none-eabi-gcc", "clean", CLEAN, False),
     (purity, "arm-none-eabi-gcc", "counter at file scope", "int iw_count(void);\nstatic int n;\nint iw_count(void) { return ++n; }\n", True),
     (purity, "arm-none-eabi-gcc", "initialised variable", "int iw_n = 7;\n", True),
-    (purity, "arm-none-eabi-gcc", "call of puts", "int puts(const char *);\nint iw_g(void) { return puts(\"\"); }\n", True),
+    (purity, "arm-none-eabi-gcc", "call of puts", 'int puts(const char *);\nint iw_g(void) { return puts(""); }\n', True),
     (purity, "arm-none-eabi-gcc", "floating point", "float iw_g(float a) { return a * 2; }\n", True),
     (purity, "arm-none-eabi-gcc", "constant folded floating point", "int iw_g(void) { return (int)(double)2; }\n", True),
     (purity, "arm-none-eabi-gcc", "header of libc", "#include <stdlib.h>\n" + CLEAN, True),
@@ -500,14 +540,38 @@ CASES = [
     (northbound, "python3", "a state of the memory", ("app/gateway/assumptions/assumptions_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
     (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
-    (northbound, "python3", "a field that the reader does not know", ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "), True),
-    (northbound, "python3", "a request in another place", ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"), True),
-    (northbound, "python3", "a limit of the reader's own", ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"), True),
+    (
+        northbound,
+        "python3",
+        "a field that the reader does not know",
+        ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "),
+        True,
+    ),
+    (
+        northbound,
+        "python3",
+        "a request in another place",
+        ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"),
+        True,
+    ),
+    (
+        northbound,
+        "python3",
+        "a limit of the reader's own",
+        ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"),
+        True,
+    ),
     (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
     (northbound, "python3", "a field that is only documented", ("docs/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
     (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
     (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
-    (northbound, "python3", "an integer without a unit", ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'), True),
+    (
+        northbound,
+        "python3",
+        "an integer without a unit",
+        ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'),
+        True,
+    ),
     (ruff, "ruff", "clean", "import sys\n\nprint(sys.argv)\n", False),
     (ruff, "ruff", "an import that nobody needs", "import sys\n", True),
     (ruff, "ruff", "a name that is nowhere", "print(gone)\n", True),
@@ -520,7 +584,7 @@ CASES = [
     (shellcheck, "shellcheck", "words that are split", "rm -r $1\n", True),
     (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
     (shellcheck, "shellcheck", "a name that is nowhere", 'echo "$gone"\n', True),
-    (shellcheck, "shellcheck", "a status that is lost", "f() { local a=$(false); echo \"$a\"; }\nf\n", True),
+    (shellcheck, "shellcheck", "a status that is lost", 'f() { local a=$(false); echo "$a"; }\nf\n', True),
     (codespell, "codespell", "clean", "The wheels obey its behaviour.\n", False),
     (codespell, "codespell", "two letters in each other's place", "The wheels obey te" + "h gateway.\n", True),
     (style, "lizard", "clean", CLEAN, False),
@@ -546,29 +610,109 @@ CASES = [
     (style_header, "lizard", "an include guard of another name", "PLANTS_H", True),
     (faults, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
     (faults, "python3", "a function is renamed that no fault is in", ("lib/northbound/server/src/requests.c", "void carry_out(", "void carry_it_out("), False),
-    (faults, "python3", "a function is renamed that faults are in", ("lib/northbound/server/src/drive.c", "void iwn_server_twist(", "void iwn_server_turn("), False),
+    (
+        faults,
+        "python3",
+        "a function is renamed that faults are in",
+        ("lib/northbound/server/src/drive.c", "void iwn_server_twist(", "void iwn_server_turn("),
+        False,
+    ),
     (faults, "python3", "a file has another name and place", ("app/gateway/loop.c", "#include", "#include", "app/cycle.c"), False),
     (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
-    (faults, "python3", "the code of a fault occurs twice", ("core/src/sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side]; const bool invert = config->invert[side];"), True),
-    (faults, "python3", "the code of a fault of the daemon is gone", ("app/gateway/loop.c", "events[i].data.u64 == SOCK_TAG_ESTOP", "events[i].data.u32 == SOCK_TAG_ESTOP"), True),
+    (
+        faults,
+        "python3",
+        "the code of a fault occurs twice",
+        (
+            "core/src/sender.c",
+            "const bool invert = config->invert[side];",
+            "const bool invert = config->invert[side]; const bool invert = config->invert[side];",
+        ),
+        True,
+    ),
+    (
+        faults,
+        "python3",
+        "the code of a fault of the daemon is gone",
+        ("app/gateway/loop.c", "events[i].data.u64 == SOCK_TAG_ESTOP", "events[i].data.u32 == SOCK_TAG_ESTOP"),
+        True,
+    ),
     (faults, "python3", "the code of a fault of the board is gone", ("app/board/configure.c", "!brd_host_is_silent(self)", "!is_silent(self)"), True),
     (faults, "python3", "a test that should notice is no test", ("test/faults/gateway.faults", "unit.daemon_watchers", "unit.daemon_watching"), True),
     (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
     (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
-    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
-     "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}"), True),
-    (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
+    (
+        house,
+        "gcc",
+        "a program reads a part of the core",
+        (
+            "port/stm32_stub/lamp.c",
+            '#include "lamp.h"',
+            '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
+            "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}",
+        ),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "a program includes what is private",
+        ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'),
+        True,
+    ),
     (house, "gcc", "a header includes one level more", ("core/src/arithmetic.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
-    (house, "gcc", "two folders need each other", ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/file_store.h"'), True),
-    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/answers_refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'), True),
-    (house, "gcc", "two arrows more", ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/file_store.h"\n#include "box/box.h"'), True),
+    (
+        house,
+        "gcc",
+        "two folders need each other",
+        ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/file_store.h"'),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "another folder's header by its bare name",
+        ("app/gateway/answers/answers_refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "two arrows more",
+        ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/file_store.h"\n#include "box/box.h"'),
+        True,
+    ),
     (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
-    (arch, "python3", "a tool includes a file of the daemon", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "assumptions/assumptions_file.h"'), True),
-    (arch, "python3", "the same by its way", ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'), True),
+    (
+        arch,
+        "python3",
+        "a tool includes a file of the daemon",
+        ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "assumptions/assumptions_file.h"'),
+        True,
+    ),
+    (
+        arch,
+        "python3",
+        "the same by its way",
+        ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'),
+        True,
+    ),
     (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
-    (arch, "python3", "a port looks up to the board's application", ("port/stm32_stub/report.c", '#include "report.h"', '#include "report.h"\n#include "host.h"'), True),
-    (arch, "python3", "the board includes a file of the daemon", ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'), True),
+    (
+        arch,
+        "python3",
+        "a port looks up to the board's application",
+        ("port/stm32_stub/report.c", '#include "report.h"', '#include "report.h"\n#include "host.h"'),
+        True,
+    ),
+    (
+        arch,
+        "python3",
+        "the board includes a file of the daemon",
+        ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'),
+        True,
+    ),
     (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
     (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),

@@ -21,9 +21,7 @@ def generation(build):
 
 def last_line(command, **variables):
     """Runs it; its last line of output. Raises RuntimeError with what it said if it fails."""
-    done = subprocess.run(
-        command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     lines = done.stdout.strip().splitlines() or [""]
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(command)}: {lines[-1]}")

@@ -4,6 +4,7 @@
 
 usage: IWHEEL_FIGURES=FILE IWHEEL_FULL=1 .venv/bin/pytest test/mqtt (as often as you like), then test/mqtt/figures.py BUILD FILE
 """
+
 import subprocess
 import sys
 from pathlib import Path
@@ -23,7 +24,9 @@ def sum_up(rows):
     for fault, often, sent, arrived, doubled, longest_s in rows:
         before = faults.get(fault, (0, 0, 0, 0, 0))
         faults[fault] = (before[0] + often, before[1] + sent, before[2] + arrived, before[3] + doubled, max(before[4], longest_s))
-    return [f"| {fault} | {often} | {sent} | {arrived} | {doubled} | {longest_s:.1f} s |" for fault, (often, sent, arrived, doubled, longest_s) in faults.items()]
+    return [
+        f"| {fault} | {often} | {sent} | {arrived} | {doubled} | {longest_s:.1f} s |" for fault, (often, sent, arrived, doubled, longest_s) in faults.items()
+    ]
 
 
 def rows_in(text):

@@ -188,7 +188,7 @@ class Line(threading.Thread):
         time.sleep(self.delay)
         if self.left is None:
             return data, True
-        data = data[:max(0, self.left)]
+        data = data[: max(0, self.left)]
         self.left -= len(data)
         return data, self.left > 0
 
@@ -210,8 +210,15 @@ class MqttRig(Rig):
         self.fars, self.port = [], free_port()
         self.broker_lines = ["allow_anonymous true", "persistence false", f"user {pwd.getpwuid(os.getuid()).pw_name}"]
         super().__init__(str(build), {section: {**CONFIG.get(section, {}), **(config or {}).get(section, {})} for section in {*CONFIG, *(config or {})}})
-        self.mqtt_settings = {"gateway": {"socket": self.path("gateway.sock" if driving else "watch.sock")}, "machine": {"id": ID}, "broker": {"port": self.port},
-                              "state": {"every_ms": 1000}, "spool": {"directory": self.path("spool")}, "home_assistant": {}, "drive": {}}
+        self.mqtt_settings = {
+            "gateway": {"socket": self.path("gateway.sock" if driving else "watch.sock")},
+            "machine": {"id": ID},
+            "broker": {"port": self.port},
+            "state": {"every_ms": 1000},
+            "spool": {"directory": self.path("spool")},
+            "home_assistant": {},
+            "drive": {},
+        }
         if driving:
             self.mqtt_settings["drive"] = {"enabled": "yes", "allow_reset": "yes"}
         for section, keys in (settings or {}).items():
@@ -242,6 +249,7 @@ class MqttRig(Rig):
             assert self.broker.child.poll() is None, self.broker.text()
             with socket.socket() as one:
                 return one.connect_ex(("127.0.0.1", self.port)) == 0
+
         until(listens, what="the broker listens")
 
     def bring_broker_back(self, line, far):

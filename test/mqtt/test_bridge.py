@@ -139,18 +139,29 @@ def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
     rig.start()
     ha = rig.far("ha", topics=("homeassistant/#", "iwheel/#"))
     rig.online(ha)
-    told = until(lambda: len([1 for topic, *_ in ha.all if topic.startswith("homeassistant/")]) == 10 and [
-        (topic, json.loads(payload), retain) for topic, payload, retain, _ in ha.all if topic.startswith("homeassistant/")], what="ten sensors")
+    told = until(
+        lambda: (
+            len([1 for topic, *_ in ha.all if topic.startswith("homeassistant/")]) == 10
+            and [(topic, json.loads(payload), retain) for topic, payload, retain, _ in ha.all if topic.startswith("homeassistant/")]
+        ),
+        what="ten sensors",
+    )
     state = until(lambda: ha.messages("state"), what="a state")[-1]
     for topic, config, _ in told:
         assert topic.startswith(("homeassistant/sensor/iwheel_w1/", "homeassistant/binary_sensor/iwheel_w1/")) and topic.endswith("/config"), topic
-        assert config["state_topic"] == f"iwheel/{ID}/state" and config["availability_topic"] == f"iwheel/{ID}/availability" and config["device"]["identifiers"] == ["iwheel_w1"]
+        assert (
+            config["state_topic"] == f"iwheel/{ID}/state"
+            and config["availability_topic"] == f"iwheel/{ID}/availability"
+            and config["device"]["identifiers"] == ["iwheel_w1"]
+        )
         value = state
         for part in config["value_template"].split("value_json.")[1].split(" ")[0].split("."):
             assert part in value, (part, config)
             value = value[part]
     assert len({config["unique_id"] for _, config, _ in told}) == 10
-    assert rig.far("later", topics=("homeassistant/#",)) and until(lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained")
+    assert rig.far("later", topics=("homeassistant/#",)) and until(
+        lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
+    )
 
 
 # ---- what it carries out --------------------------------------------------------------------------------------------
@@ -225,14 +236,29 @@ def test_garbage_is_dropped_counted_and_changes_nothing(rig):
     far = rig.online()
     quote = far.quote()
     good = {"from": "far", "seq": 1000, **quote}
-    garbage = [b"", b"stop", b"{", b"[]", b"\xff\xfe", b'{"from":"far"}', b"{" * 5000, b'{"from":"far","from":"far"}',
-               json.dumps({**good, "from": "far/../x"}).encode(), json.dumps({**good, "from": "x" * 33}).encode(), json.dumps({**good, "seq": "1"}).encode(),
-               json.dumps({**good, "seq": 0}).encode(), json.dumps({**good, "t_us": 1.5}).encode(), json.dumps({**good, "t_us": -1}).encode(),
-               json.dumps({**good, "ttl_ms": 1001}).encode(), json.dumps({**good, "speed": 1}).encode(), json.dumps({**good, "boot": None}).encode()]
+    garbage = [
+        b"",
+        b"stop",
+        b"{",
+        b"[]",
+        b"\xff\xfe",
+        b'{"from":"far"}',
+        b"{" * 5000,
+        b'{"from":"far","from":"far"}',
+        json.dumps({**good, "from": "far/../x"}).encode(),
+        json.dumps({**good, "from": "x" * 33}).encode(),
+        json.dumps({**good, "seq": "1"}).encode(),
+        json.dumps({**good, "seq": 0}).encode(),
+        json.dumps({**good, "t_us": 1.5}).encode(),
+        json.dumps({**good, "t_us": -1}).encode(),
+        json.dumps({**good, "ttl_ms": 1001}).encode(),
+        json.dumps({**good, "speed": 1}).encode(),
+        json.dumps({**good, "boot": None}).encode(),
+    ]
     for payload in garbage:
         far.client.publish(f"iwheel/{ID}/cmd/stop", payload, qos=1)
     far.client.publish(f"iwheel/{ID}/cmd/self-destruct", json.dumps(good), qos=1)
-    far.client.publish(f"iwheel/{ID}/cmd/estop", json.dumps({**good, "reason": ["x\n{\"cmd\":\"reset\"}"]}), qos=1)
+    far.client.publish(f"iwheel/{ID}/cmd/estop", json.dumps({**good, "reason": ['x\n{"cmd":"reset"}']}), qos=1)
     until(lambda: counts(far)["garbled"] == len(garbage) + 2, what=f"{len(garbage) + 2} counted: {counts(far)}")
     assert rig.gateway_state()["state"] == "listening" and rig.client(name="a").request("why")["number"] == 0
     assert far.ask("why")["ok"]
@@ -455,6 +481,7 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     def small_files():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+
     line = rig.cut_here()
     rig.start_gateway()
     rig.start_broker()
@@ -519,15 +546,62 @@ def test_campaign_of_kills_each_stop_once_in_order(rig):
 
 def make_certificates(rig):
     """A signer, another one, and certificates of a broker and of the machine."""
+
     def openssl(*words):
         done = subprocess.run(["openssl", *words], cwd=rig.folder, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
+
     for name in ("ca", "other"):
-        openssl("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", f"{name}.key", "-out", f"{name}.pem", "-days", "2", "-subj", f"/CN={name}")
+        openssl(
+            "req",
+            "-x509",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:prime256v1",
+            "-nodes",
+            "-keyout",
+            f"{name}.key",
+            "-out",
+            f"{name}.pem",
+            "-days",
+            "2",
+            "-subj",
+            f"/CN={name}",
+        )
     for name, subject in (("broker", "localhost"), ("machine", ID)):
-        openssl("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={subject}")
+        openssl(
+            "req",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:prime256v1",
+            "-nodes",
+            "-keyout",
+            f"{name}.key",
+            "-out",
+            f"{name}.csr",
+            "-subj",
+            f"/CN={subject}",
+        )
         Path(rig.path(f"{name}.ext")).write_text(f"subjectAltName=DNS:{subject}\n", encoding="ascii")
-        openssl("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-out", f"{name}.pem", "-days", "2", "-extfile", f"{name}.ext")
+        openssl(
+            "x509",
+            "-req",
+            "-in",
+            f"{name}.csr",
+            "-CA",
+            "ca.pem",
+            "-CAkey",
+            "ca.key",
+            "-CAcreateserial",
+            "-out",
+            f"{name}.pem",
+            "-days",
+            "2",
+            "-extfile",
+            f"{name}.ext",
+        )
 
 
 def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):

@@ -51,8 +51,16 @@ def lines(text):
 
 
 def cluster_config(rig, cluster, host="", name="console", **keys):
-    return write_config(rig, host=host or " ".join(HOSTS), port=cluster.mqtt, stream_port=cluster.nats, ca=rig.path("certs/ca.pem"), certificate=rig.path(f"certs/{name}.pem"),
-                        key=rig.path(f"certs/{name}.key"), **keys)
+    return write_config(
+        rig,
+        host=host or " ".join(HOSTS),
+        port=cluster.mqtt,
+        stream_port=cluster.nats,
+        ca=rig.path("certs/ca.pem"),
+        certificate=rig.path(f"certs/{name}.pem"),
+        key=rig.path(f"certs/{name}.key"),
+        **keys,
+    )
 
 
 def machine_at(rig, cluster, name="w2"):
@@ -67,8 +75,16 @@ def publish_stops(far, events, pad=0, qos=1):
     """(boot, number of the event, number of the stop, when it was heard, in s from now)"""
     sent = []
     for boot, number, stop, when_s in events:
-        event = {"id": f"{boot}-{number}", "boot": boot, "heard_wall_us": int((time.time() + when_s) * 1e6), "event": "stop", "number": stop, "cause": "wheel_lost",
-                 "wall_us": int((time.time() + when_s) * 1e6), "sentence": f"left wheel silent, told as {stop}" + "." * pad}
+        event = {
+            "id": f"{boot}-{number}",
+            "boot": boot,
+            "heard_wall_us": int((time.time() + when_s) * 1e6),
+            "event": "stop",
+            "number": stop,
+            "cause": "wheel_lost",
+            "wall_us": int((time.time() + when_s) * 1e6),
+            "sentence": f"left wheel silent, told as {stop}" + "." * pad,
+        }
         sent.append(far.client.publish(f"iwheel/{far.name}/event/stop", json.dumps(event), qos=qos))
     for one in sent:
         one.wait_for_publish(20)
@@ -91,7 +107,9 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     until(lambda: console(rig, config, "history", "--last", "1h")[1].count(" stop   ") == 6, 30, "all of them")
     code, out, err = console(rig, config, "history", "w2", "--last", "1h")
     assert code == 0 and "2 doubles left out" in out and "(stored " in out and ID not in out.split(), (code, out, err)
-    assert re.search(r"-- 2 events before this one are not in the stream.*\n.*told as 3\n.*-- 2 stops before this one are not in the stream.*\n.*told as 6\n", out), out
+    assert re.search(
+        r"-- 2 events before this one are not in the stream.*\n.*told as 3\n.*-- 2 stops before this one are not in the stream.*\n.*told as 6\n", out
+    ), out
     print("        " + out.replace("\n", "\n        "), flush=True)
     *events, total = lines(console(rig, config, "history", "--json", "--last", "1h")[1])
     assert [event["message"]["number"] for event in events if event["machine"] == ID] == [last - 1, last], events
@@ -116,9 +134,11 @@ def test_history_with_a_frozen_first_host_checks_its_end(rig):
     until(lambda: console(rig, config, "history", "w2")[1].count(" stop   ") == 1, 20, "it is stored")
     cluster.servers[HOSTS[0]].signal(signal.SIGSTOP)
     try:
+
         def checked():
             code, out, err = console(rig, config, "history", "w2", "--json", timeout=60)
             return (code == 0 and lines(out)[-1]["end_checked"]) or print("        ", err.strip())
+
         until(checked, 60, "the other two have a leader, and the end is checked")
     finally:
         cluster.servers[HOSTS[0]].signal(signal.SIGCONT)
@@ -135,7 +155,13 @@ def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig)
     *events, total = lines(console(rig, config, "history", "--json")[1])
     assert len(events) == 3000 and total["doubled"] == total["missing"] == 0, total
     print(f"        history of 3,000 stops, {sum(len(json.dumps(event)) for event in events) / 1e6:.1f} MB: {time.monotonic() - begun:.1f} s", flush=True)
-    for subject in ("$JS.API.STREAM.DELETE.iwheel", "$JS.API.STREAM.PURGE.iwheel", "$JS.API.STREAM.MSG.DELETE.iwheel", "$JS.API.STREAM.UPDATE.iwheel", "iwheel.w2.event.stop"):
+    for subject in (
+        "$JS.API.STREAM.DELETE.iwheel",
+        "$JS.API.STREAM.PURGE.iwheel",
+        "$JS.API.STREAM.MSG.DELETE.iwheel",
+        "$JS.API.STREAM.UPDATE.iwheel",
+        "iwheel.w2.event.stop",
+    ):
         assert "Permissions Violation" in nats_says(rig, cluster, "console", subject), subject
     assert "Permissions Violation" in nats_says(rig, cluster, "w2", "$JS.API.CONSUMER.CREATE.iwheel")
     assert cluster.stream("info")[1]["messages"] == 3000
@@ -176,7 +202,11 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
     rig.online()
     make_stops(rig, 1)
     config = write_config(rig, port=rig.port)
-    until(lambda: (rows := lines(console(rig, config, "--for", "1", "--json")[1])) and rows[0]["stop_from"] == "info" and rows[0]["cause"] == "estop_line", 10, "info has it")
+    until(
+        lambda: (rows := lines(console(rig, config, "--for", "1", "--json")[1])) and rows[0]["stop_from"] == "info" and rows[0]["cause"] == "estop_line",
+        10,
+        "info has it",
+    )
     text = console(rig, config, "--for", "1")[1]
     assert "last stops: of each machine's info" in text and "estop_line" in text, text
     page = Path(rig.path("fleet.json"))
@@ -187,8 +217,16 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
     assert console(rig, config, "--for", "3", "--output", "/proc/nowhere/x")[0] == 73
     code, _, err = console(rig, config, "history", ID)
     assert code == 78 and "stream_port" in err and "share/fleet" in err, (code, err)
-    for words in (("history", "--last", "12"), ("history", "a/b"), ("history", "--since", "yesterday"), ("recording",), ("nonsense",), ("recordings", ID, "--all"),
-                  ("history", "--since", "2026-02-02", "--until", "2026-02-01"), ("--json",)):
+    for words in (
+        ("history", "--last", "12"),
+        ("history", "a/b"),
+        ("history", "--since", "yesterday"),
+        ("recording",),
+        ("nonsense",),
+        ("recordings", ID, "--all"),
+        ("history", "--since", "2026-02-02", "--until", "2026-02-01"),
+        ("--json",),
+    ):
         code, out, err = console(rig, config, *words)
         assert code == 64 and out == "" and err.startswith("iwheel-fleet: "), (words, code, err)
 
@@ -297,13 +335,21 @@ class Played(Far):
         if verb != "hello" and asked["boot"] != self.boot:
             reply.update(ok=False, error="other_boot", message="quote the boot and t_us that are here")
         elif verb == "recordings":
-            reply["recordings"] = [{"name": "stop-000001-wheel_lost", "cause": "wheel_lost", "wall_us": 1, "log_bytes": len(self.data), "jsonl_bytes": None, "conf_bytes": None}]
+            reply["recordings"] = [
+                {"name": "stop-000001-wheel_lost", "cause": "wheel_lost", "wall_us": 1, "log_bytes": len(self.data), "jsonl_bytes": None, "conf_bytes": None}
+            ]
         elif verb == "recording":
             self.pieces += 1
-            piece = self.data[asked["offset"]:asked["offset"] + 24576]
+            piece = self.data[asked["offset"] : asked["offset"] + 24576]
             last = asked["offset"] + len(piece) == len(self.data)
-            reply.update(name=asked["name"], offset=asked["offset"], size=len(self.data), data=base64.b64encode(piece).decode(), crc32=zlib.crc32(piece),
-                         file_crc32=zlib.crc32(self.data) if last else None)
+            reply.update(
+                name=asked["name"],
+                offset=asked["offset"],
+                size=len(self.data),
+                data=base64.b64encode(piece).decode(),
+                crc32=zlib.crc32(piece),
+                file_crc32=zlib.crc32(self.data) if last else None,
+            )
             if self.trouble(self, reply) == "lost":
                 return
         self.client.publish(f"iwheel/{self.name}/reply/{asked['from']}", json.dumps(reply))
@@ -329,6 +375,7 @@ def test_recording_with_a_piece_lost_damaged_or_refused_once_is_whole_all_the_sa
         if played.pieces == 6:
             played.boot = "second"
         return None
+
     code, out, err = fetch_from(rig, "w5", data, trouble)
     assert code == 0 and (folder_of(rig) / "x.log").read_bytes() == data and [path.name for path in folder_of(rig).iterdir()] == ["x.log"], (code, out, err)
     assert int(re.search(r"(\d+) asked for again", out).group(1)) >= 4, out
@@ -346,6 +393,7 @@ def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
 
     def other(_played, reply):
         reply["offset"] += 1
+
     for number, trouble in enumerate((each, whole, other)):
         code, out, err = fetch_from(rig, f"w{number}", data, trouble)
         assert code == 65 and "is not as its checksum says" in err and out == "", (code, out, err)
@@ -412,7 +460,10 @@ def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_want
 def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig):
     """By 3.1.1 a broker confirms what its ACL forbids, and nobody knows."""
     acl = Path(rig.path("acl"))
-    acl.write_text("topic read #\ntopic write iwheel/+/state\ntopic write iwheel/+/info\ntopic write iwheel/+/availability\ntopic write iwheel/+/event/estop\n", encoding="ascii")
+    acl.write_text(
+        "topic read #\ntopic write iwheel/+/state\ntopic write iwheel/+/info\ntopic write iwheel/+/availability\ntopic write iwheel/+/event/estop\n",
+        encoding="ascii",
+    )
     rig.broker_lines.append(f"acl_file {acl}")
     rig.start()
     far = rig.online()
@@ -431,7 +482,9 @@ def test_mqtt5_at_a_broker_that_does_not_speak_it_names_the_cure(rig):
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()
-    Path(rig.path("one.conf")).write_text(f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii")
+    Path(rig.path("one.conf")).write_text(
+        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
+    )
     rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
     until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
     code, _, err = console(rig, write_config(rig, port=mqtt, protocol=5), "--for", "2")

@@ -36,8 +36,9 @@ def with_certificate(rig, name):
 
 
 def use_tls(rig, host, port):
-    rig.mqtt_settings["broker"].update({"host": host, "port": port, "ca": rig.path("certs/ca.pem"), "certificate": rig.path(f"certs/{ID}.pem"),
-                                        "key": rig.path(f"certs/{ID}.key")})
+    rig.mqtt_settings["broker"].update(
+        {"host": host, "port": port, "ca": rig.path("certs/ca.pem"), "certificate": rig.path(f"certs/{ID}.pem"), "key": rig.path(f"certs/{ID}.key")}
+    )
 
 
 class Cluster:
@@ -50,15 +51,23 @@ class Cluster:
         self.rig, self.servers = rig, {}
         self.nats, self.mqtt, self.routes = free_port(), free_port(), free_port()
         shutil.copy(FLEET / "nats-server.conf", rig.path("certs"))
-        Path(rig.path("certs/routes.conf")).write_text("routes: [" + ", ".join(f'"nats-route://{host}:{self.routes}"' for host in HOSTS) + "]\n", encoding="ascii")
+        Path(rig.path("certs/routes.conf")).write_text(
+            "routes: [" + ", ".join(f'"nats-route://{host}:{self.routes}"' for host in HOSTS) + "]\n", encoding="ascii"
+        )
         for host in HOSTS:
             self.start(host)
         until(lambda: self.stream("create")[0] == 0, 30, f"the stream: {self.stream('create')}")
 
     def start(self, host):
         name = f"n{host[-1]}"
-        environment = {**os.environ, "NAME": name, "NATS_LISTEN": f"{host}:{self.nats}", "CLUSTER_LISTEN": f"{host}:{self.routes}", "MQTT_LISTEN": f"{host}:{self.mqtt}",
-                       "STORE": self.rig.path(name)}
+        environment = {
+            **os.environ,
+            "NAME": name,
+            "NATS_LISTEN": f"{host}:{self.nats}",
+            "CLUSTER_LISTEN": f"{host}:{self.routes}",
+            "MQTT_LISTEN": f"{host}:{self.mqtt}",
+            "STORE": self.rig.path(name),
+        }
         server = Process(["nats-server", "-c", "nats-server.conf"], self.rig.path(f"{name}.out"), cwd=self.rig.path("certs"), env=environment)
         self.servers[host] = server
         self.rig.processes.append(server)
@@ -108,7 +117,9 @@ def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()
-    Path(rig.path("one.conf")).write_text(f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii")
+    Path(rig.path("one.conf")).write_text(
+        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
+    )
     rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
     until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
 
@@ -119,6 +130,7 @@ def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
                 if line.startswith(b"MSG "):
                     return json.loads(lines.read(int(line.split()[-1])))
         return {}
+
     full = {"name": "full", "subjects": ["iwheel.*.event.>"], "max_msgs": 1, "discard": "new", "storage": "file"}
     assert "error" not in ask(b"$JS.API.STREAM.CREATE.full", json.dumps(full).encode())
     far = Far(mqtt, "w1")
@@ -158,13 +170,20 @@ def test_machine_reaches_nothing_of_another_machine(rig):
     until(lambda: console.all and second.all, what="what is allowed arrives")
     time.sleep(0.3)
     assert [topic for topic, *_ in second.all] == ["iwheel/w2/cmd/stop"], second.all
-    assert [(topic, payload) for topic, payload, *_ in console.all if "/cmd/" not in topic] == [("iwheel/w1/event/stop", b'{"id":"1","event":"stop"}')], console.all
+    assert [(topic, payload) for topic, payload, *_ in console.all if "/cmd/" not in topic] == [("iwheel/w1/event/stop", b'{"id":"1","event":"stop"}')], (
+        console.all
+    )
 
 
 def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
     port = start_fleet_broker(rig)
     central = rig.processes[-1]
-    text = (FLEET / "mosquitto-forward.conf").read_text(encoding="utf-8").replace("/etc/mosquitto/certs", rig.path("certs")).replace("listener 1883", f"listener {rig.port}")
+    text = (
+        (FLEET / "mosquitto-forward.conf")
+        .read_text(encoding="utf-8")
+        .replace("/etc/mosquitto/certs", rig.path("certs"))
+        .replace("listener 1883", f"listener {rig.port}")
+    )
     text = text.replace("broker.example:8883", f"localhost:{port}").replace("/var/lib/mosquitto/", rig.path("spool") + "/")
     Path(rig.path("forward.conf")).write_text(text + rig.broker_lines[-1] + "\n", encoding="utf-8")
     rig.start_gateway()

@@ -33,7 +33,10 @@ class Teller:
         while True:
             link = self.listener.accept()[0]
             self.clients.append(link)
-            self.say(link, {"event": "hello", "t_us": time.monotonic_ns() // 1000, "name": "iwheel-gateway", "api": 1, "client": len(self.clients), "rights": "watch"})
+            self.say(
+                link,
+                {"event": "hello", "t_us": time.monotonic_ns() // 1000, "name": "iwheel-gateway", "api": 1, "client": len(self.clients), "rights": "watch"},
+            )
             threading.Thread(target=self.serve, args=(link,), daemon=True).start()
 
     @staticmethod
@@ -70,9 +73,11 @@ class Teller:
 
 def judge(rig, config, teller, far):
     """What the stream lacks, as counted by the stops that there were; and what the history reports of it."""
+
     def delivered():
         info = (far.messages("info") or [{}])[-1]
         return (info.get("last_stop") or {}).get("number") == teller.number and info["events"]["waiting"] == 0
+
     until(delivered, 90, f"the machine has delivered all: {far.messages('info')[-1:]}, {rig.words()[-2000:]}")
 
     def read():
@@ -80,6 +85,7 @@ def judge(rig, config, teller, far):
         code, out, err = console(rig, config, "history", ID, "--last", "2h", "--json", timeout=120)
         read = lines(out) if code == 0 else []
         return read if read and read[-1]["end_checked"] else print("        ", err.strip(), read[-1:])
+
     *events, total = until(read, 90, "the history with its end checked")
     there = {event["message"]["number"] for event in events if "message" in event}
     missing = set(range(1, teller.number + 1)) - there

@@ -220,8 +220,16 @@ def test_broker_on_a_unix_socket_drives_if_its_user_is_right(rig):
     rig.end_broker()
     os.unlink(rig.path("mqtt.out"))
     os.unlink(path)
-    stranger = Process([sys.executable, "-c", "import os, socket, sys, time\nserver = socket.socket(socket.AF_UNIX)\nserver.bind(sys.argv[1])\nos.chmod(sys.argv[1], 0o777)\n"
-                        "os.setuid(65534)\nserver.listen()\ntime.sleep(60)\n", path], rig.path("stranger.out"))
+    stranger = Process(
+        [
+            sys.executable,
+            "-c",
+            "import os, socket, sys, time\nserver = socket.socket(socket.AF_UNIX)\nserver.bind(sys.argv[1])\nos.chmod(sys.argv[1], 0o777)\n"
+            "os.setuid(65534)\nserver.listen()\ntime.sleep(60)\n",
+            path,
+        ],
+        rig.path("stranger.out"),
+    )
     rig.processes.append(stranger)
     until(lambda: os.path.exists(path), what="it listens")
     time.sleep(0.3)
@@ -242,7 +250,15 @@ def write_settings(rig, **broker):
 
 
 def test_host_that_only_begins_like_loopback_is_another_machine(rig):
-    for host, code in (("127.example.org", 78), ("127.0.0.1.example", 78), ("10.0.0.1", 78), ("127.8.9.1", 0), ("::1", 0), ("localhost", 0), ("/run/broker.sock", 0)):
+    for host, code in (
+        ("127.example.org", 78),
+        ("127.0.0.1.example", 78),
+        ("10.0.0.1", 78),
+        ("127.8.9.1", 0),
+        ("::1", 0),
+        ("localhost", 0),
+        ("/run/broker.sock", 0),
+    ):
         write_settings(rig, host=host)
         assert check(rig)[0] == code, (host, check(rig))
     rig.mqtt_settings["drive"]["enabled"] = "yes"
@@ -270,9 +286,12 @@ def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
     need_root()
     spool, other = Path(rig.path("spool")), Path(rig.path("other"))
     other.write_text("of somebody", encoding="ascii")
-    for prepare, undo in ((lambda: spool.chmod(0o777), lambda: spool.chmod(0o700)), (lambda: os.chown(spool, STRANGER, -1), lambda: os.chown(spool, 0, -1)),
-                          (lambda: (spool / "events").write_bytes(b"") or os.chown(spool / "events", STRANGER, -1), (spool / "events").unlink),
-                          (lambda: os.link(other, spool / "events"), (spool / "events").unlink)):
+    for prepare, undo in (
+        (lambda: spool.chmod(0o777), lambda: spool.chmod(0o700)),
+        (lambda: os.chown(spool, STRANGER, -1), lambda: os.chown(spool, 0, -1)),
+        (lambda: (spool / "events").write_bytes(b"") or os.chown(spool / "events", STRANGER, -1), (spool / "events").unlink),
+        (lambda: os.link(other, spool / "events"), (spool / "events").unlink),
+    ):
         prepare()
         code = rig.start_bridge().wait(5)
         assert code == 73 and "belongs to another user" in rig.words(), (code, rig.words())
@@ -302,7 +321,11 @@ def test_home_assistant_sensors_pass_the_shipped_rights_of_mosquitto(rig):
     home = fleet_far(rig, port, "homeassistant", topics=("homeassistant/#", "iwheel/+/availability"))
     until(lambda: len([1 for topic, *_ in home.all if topic.startswith("homeassistant/")]) == 10, 15, rig.words())
     console_far = fleet_far(rig, port, "console")
-    until(lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10}, 15, "counted in info")
+    until(
+        lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10},
+        15,
+        "counted in info",
+    )
     assert "Home Assistant" not in rig.words(), rig.words()
     second = fleet_far(rig, port, "w2")
     second.client.publish("homeassistant/sensor/iwheel_w1/forged/config", "{}", qos=1).wait_for_publish(3)
@@ -318,7 +341,11 @@ def test_home_assistant_sensors_pass_the_shipped_rights_of_nats(rig):
     rig.start_bridge()
     console_far = Far(cluster.mqtt, "console", topics=("iwheel/+/info",), setup=with_certificate(rig, "console"), host=HOSTS[0])
     rig.fars.append(console_far)
-    until(lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10}, 25, f"counted in info: {rig.words()}")
+    until(
+        lambda: console_far.messages("info")[-1:] and console_far.messages("info")[-1].get("home_assistant") == {"sensors": 10, "passed_on": 10},
+        25,
+        f"counted in info: {rig.words()}",
+    )
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """share/northbound.json for tests: whether what a program sends, or a page shows, fits the description of the protocol."""
+
 import os
 import sys
 

@@ -6,6 +6,7 @@ usage: test_description.py [unittest's arguments]
 
 The gateway itself is compared with the description by python/tests/test_protocol.py.
 """
+
 import json
 import os
 import re
@@ -31,8 +32,11 @@ SOURCES = {
     "evidence": ("lib/northbound/protocol/src/words.c", "iwn_source_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
     "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_memory", {"memory", "file", "state", "reason"}),
-    "fault_alone": [("lib/northbound/server/src/observe.c", "observe_faults", set()), ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),
-                    ("app/gateway/answers/answers_events.c", "observe_health", set())],
+    "fault_alone": [
+        ("lib/northbound/server/src/observe.c", "observe_faults", set()),
+        ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),
+        ("app/gateway/answers/answers_events.c", "observe_health", set()),
+    ],
 }
 DOCUMENT = os.path.join("docs", "northbound.md")
 
@@ -119,8 +123,12 @@ class Document:
         """Numbers that hold for all requests and replies, before the first of them."""
         text = " ".join(self.text.split("## Requests")[0].split())
         limits = self.description.limits
-        told = {"request_bytes": f"A request has at most {limits['request_bytes']} bytes", "line_bytes": f"a reply or event at most {limits['line_bytes']}",
-                "id_text_bytes": f"a string of up to {limits['id_text_bytes']} bytes", "depth": f"nested at most {limits['depth']} deep"}
+        told = {
+            "request_bytes": f"A request has at most {limits['request_bytes']} bytes",
+            "line_bytes": f"a reply or event at most {limits['line_bytes']}",
+            "id_text_bytes": f"a string of up to {limits['id_text_bytes']} bytes",
+            "depth": f"nested at most {limits['depth']} deep",
+        }
         yield from (f"{DOCUMENT}: the limit {name} is not told as {words!r}" for name, words in told.items() if words not in text)
 
     def ranges(self, cmd, part):
@@ -224,8 +232,13 @@ def c_limits(description):
     """Numbers and orders that a header has and the description does not, or the other way round."""
     path = "lib/northbound/protocol/include/iwheel_northbound/{}.h"
     limits, watch = description.limits, description.fields(description.requests["watch"])
-    wanted = {"IWN_LINE_MAX": limits["request_bytes"], "IWN_ID_TEXT_MAX": limits["id_text_bytes"], "IWN_RATE_MAX_HZ": limits["granted_rate_hz"],
-              "IWN_RATE_DEFAULT_HZ": watch["rate_hz"]["default"], "IWN_DEPTH_MAX": limits["depth"]}
+    wanted = {
+        "IWN_LINE_MAX": limits["request_bytes"],
+        "IWN_ID_TEXT_MAX": limits["id_text_bytes"],
+        "IWN_RATE_MAX_HZ": limits["granted_rate_hz"],
+        "IWN_RATE_DEFAULT_HZ": watch["rate_hz"]["default"],
+        "IWN_DEPTH_MAX": limits["depth"],
+    }
     for name, number in wanted.items():
         header = path.format("json_in" if name == "IWN_DEPTH_MAX" else "request")
         found = re.search(rf"^#define {name} +(\d+)U?(?: +//.*)?$", read(header), re.MULTILINE)

@@ -88,7 +88,10 @@ def odometry(t):
     wheels = (status["right"]["distance_mm"] - status["left"]["distance_mm"]) / 540
     t.check(abs(math.remainder(yaw - wheels, 2 * math.pi)) < 0.005, f"heading {yaw:.3f}, by the wheels {wheels:.3f}")
     x_m, y_m, psi = status["pose"]["x_mm"] / 1000, status["pose"]["y_mm"] / 1000, status["pose"]["psi_mrad"] / 1000
-    t.check(abs(pose.position.x) > 0.5 and math.hypot(pose.position.x - x_m, pose.position.y - y_m) < 0.08, f"{pose.position}, the wheel itself says {x_m} {y_m} {psi}")
+    t.check(
+        abs(pose.position.x) > 0.5 and math.hypot(pose.position.x - x_m, pose.position.y - y_m) < 0.08,
+        f"{pose.position}, the wheel itself says {x_m} {y_m} {psi}",
+    )
     t.figure(f"{pose.position.x:.2f} {pose.position.y:.2f} m, {yaw:.2f} rad; the wheel says {x_m:.2f} {y_m:.2f}, {psi:.2f}")
     t.judge(ride.rig)
 
@@ -116,8 +119,15 @@ def wheel_offline(t):
         reader.take()
         bad = [message for _, message, _ in reader.all if not all(map(math.isfinite, numbers_of(message)))]
         t.check(not bad, f"{name}: {len(bad)} of {len(reader.all)} have a part that is no number: {bad[:1]}")
-    late = [message for _, message, _ in readers["joint_states"].all if message.header.stamp.sec + message.header.stamp.nanosec / 1e9 > time.time() - (now_us() - off) / 1e6 + 0.2]
-    t.check(late and all(message.name == ["right_wheel_joint"] and len(message.position) == len(message.velocity) == 1 for message in late), f"the other wheel alone: {late[-1:]}")
+    late = [
+        message
+        for _, message, _ in readers["joint_states"].all
+        if message.header.stamp.sec + message.header.stamp.nanosec / 1e9 > time.time() - (now_us() - off) / 1e6 + 0.2
+    ]
+    t.check(
+        late and all(message.name == ["right_wheel_joint"] and len(message.position) == len(message.velocity) == 1 for message in late),
+        f"the other wheel alone: {late[-1:]}",
+    )
     t.judge(ride.rig, moves=False)
 
 
@@ -569,7 +579,6 @@ def starts(t):
         code, text = call("-c", ride.rig.path("driving.conf"), preexec_fn=become_stranger)
         t.check(code == 77 and "group iwheel" in text, f"user {STRANGER}: {code} {text}")
     t.judge(ride.rig, moves=False)
-
 
 
 @scenario("./demo --ros: a square by DDS messages from outside, back where it began", 30)

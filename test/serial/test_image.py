@@ -92,8 +92,14 @@ class ImageBoard:
         self.uart, theirs = socket.socketpair()
         self.uart.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)  # As much as a tty holds.
         self.link, link = socket.socketpair()
-        command = [sys.executable, os.path.join(HERE, "image.py"), os.environ["IWHEEL_BOARD"], os.environ["IWHEEL_IMAGE"], os.environ["IWHEEL_MODEL"],
-                   str(link.fileno())]
+        command = [
+            sys.executable,
+            os.path.join(HERE, "image.py"),
+            os.environ["IWHEEL_BOARD"],
+            os.environ["IWHEEL_IMAGE"],
+            os.environ["IWHEEL_MODEL"],
+            str(link.fileno()),
+        ]
         self.process = Process(command, rig.path("board.out"), setup=lambda: os.dup2(theirs.fileno(), 0), pass_fds=[theirs.fileno(), link.fileno()])
         theirs.close()
         link.close()
@@ -143,8 +149,14 @@ class ImageRig(SerialRig):
         finished_us = frames[-1].t_us - 20_000 if frames else 0
         of = self.bus.time_of
         timeline = [event._replace(t_us=of(event.t_us), done_us=of(event.done_us) if event.done_us else 0) for event in self.timeline]
-        judge = Judge(self.judge_config(), [frame for frame in frames if frame.t_us <= finished_us], timeline + self.bus.events, moves=moves,
-                      finished_us=finished_us, **options)
+        judge = Judge(
+            self.judge_config(),
+            [frame for frame in frames if frame.t_us <= finished_us],
+            timeline + self.bus.events,
+            moves=moves,
+            finished_us=finished_us,
+            **options,
+        )
         judge.judge()
         judge.found += [Violation("chip", 0, f"the image did what the chip forbids: {text}", False) for text in self.bus.forbidden]
         judge.bus_stalls, judge.machine_stalls = list, self.bus.stalls
@@ -265,4 +277,3 @@ def run_tool(t, rig, *words, code=0):
     done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
     t.check(done.returncode == code, f"iwheelctl {' '.join(words)}: {done.returncode} {done.stdout} {done.stderr}")
     return json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
-

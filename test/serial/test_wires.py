@@ -86,7 +86,9 @@ def tell_speed(t, rig, client):
         spans_us.append(now_us() - sent_us)
         time.sleep(0.05)
     share = (rig.gateway.cpu_seconds() - begin_s) * 1e8 / (now_us() - begin_us)
-    t.figure(f"a drive is answered in {percentile(spans_us, 50) / 1000:.1f} ms, p99 {percentile(spans_us, 99) / 1000:.1f} ms; relay {share:.1f} % of a processor")
+    t.figure(
+        f"a drive is answered in {percentile(spans_us, 50) / 1000:.1f} ms, p99 {percentile(spans_us, 99) / 1000:.1f} ms; relay {share:.1f} % of a processor"
+    )
 
 
 @scenario("a client that is killed while it drives ends its lease at once", 3)
@@ -105,7 +107,7 @@ def client_killed(t):
 @scenario("a relay that was stopped obeys nothing of what waited", 9)
 def relay_stopped(t):
     rig, client = begin(t)
-    for span in (0.6, 0.25, 1.5)[:rig.times(3)]:
+    for span in (0.6, 0.25, 1.5)[: rig.times(3)]:
         t.arm(client)
         t.drive_for(client, 200, 200, 0.4)
         rig.gateway.signal(signal.SIGSTOP)
@@ -284,7 +286,7 @@ class FirstAnswer:
         if at < 0:
             return data
         self.done = True
-        return data[:at] + b"!" + data[at + 1:]
+        return data[:at] + b"!" + data[at + 1 :]
 
 
 @scenario("a wire that damages one line in thirty to the board: what is lost is not obeyed, and a stop always arrives", 12)
@@ -420,8 +422,14 @@ def rights(t):
     rig, client = begin(t)
     watcher = rig.watcher()
     t.check(watcher.wait_event("hello")["rights"] == "watch", "rights")
-    for cmd, fields in (("arm", {}), ("drive", {"left_mm_s": 1, "right_mm_s": 1}), ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}),
-                        ("reset", {}), ("tare", {}), ("confirm", {"item": "wheel_radius"})):
+    for cmd, fields in (
+        ("arm", {}),
+        ("drive", {"left_mm_s": 1, "right_mm_s": 1}),
+        ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}),
+        ("reset", {}),
+        ("tare", {}),
+        ("confirm", {"item": "wheel_radius"}),
+    ):
         t.expect(watcher.request(cmd, **fields), "denied")
     t.drive_for(client, 200, 200, 0.4)
     t.expect(watcher.request("stop"))
@@ -443,7 +451,9 @@ def rights(t):
 @scenario("one port has one relay, and a running gateway keeps its socket", 4)
 def alone(t):
     rig, _ = t.running()
-    second = subprocess.run(rig.relay_command("--socket", rig.path("second.sock"), "--watch-socket", "none"), capture_output=True, text=True, timeout=10, check=False)
+    second = subprocess.run(
+        rig.relay_command("--socket", rig.path("second.sock"), "--watch-socket", "none"), capture_output=True, text=True, timeout=10, check=False
+    )
     t.check(second.returncode == 69 and str(rig.gateway.child.pid) in second.stderr and "two relays" in second.stderr, f"{second}")
     other = subprocess.run(rig.relay_command("--port", "/dev/null"), capture_output=True, text=True, timeout=10, check=False)
     t.check(other.returncode == 69 and "another program answers" in other.stderr, f"{other}")
@@ -456,11 +466,17 @@ def explained(t):
     rig = t.rig()
     chance = random.Random(5)
     noise = bytes(chance.randrange(256) for _ in range(200))
-    cases = ((b"", "nothing comes"), (noise, "baud"), (b"login: \r\nPassword: \r\n", "another protocol"),
-             (framed(b'0 12 {"event":"link"}').replace(b"link", b"lunk"), "wrong CRC"), (b"0 12 {", "no whole line"))
+    cases = (
+        (b"", "nothing comes"),
+        (noise, "baud"),
+        (b"login: \r\nPassword: \r\n", "another protocol"),
+        (framed(b'0 12 {"event":"link"}').replace(b"link", b"lunk"), "wrong CRC"),
+        (b"0 12 {", "no whole line"),
+    )
     for said, words in cases:
         ours, theirs = socket.socketpair()
         from rig import Cable
+
         rig.cable = Cable(rig.path("port"), ours)
         relay = rig.start_relay()
         theirs.sendall(said * 3)

@@ -120,9 +120,7 @@ class Units(unittest.TestCase):
                 text = re.sub("(?m)^Documentation=.*$", "", text)
                 with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
                     file.write(text)
-                done = subprocess.run(
-                    ["systemd-analyze", "verify", os.path.join(folder, name)], capture_output=True, text=True, check=False
-                )
+                done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, name)], capture_output=True, text=True, check=False)
                 ours = [line for line in done.stderr.splitlines() if "iwheel" in line]
                 self.assertEqual((ours, done.returncode), ([], 0), done.stderr)
 
@@ -439,9 +437,7 @@ class Watchers(Rights):
         super().setUp()
         self.rig.gateway.end()
         name = grp.getgrgid(self.GROUP).gr_name
-        self.rig.settings["northbound"].update(
-            watch_socket=self.rig.path("watch/gateway.sock"), watch_group=name, max_watchers=64, max_clients=2
-        )
+        self.rig.settings["northbound"].update(watch_socket=self.rig.path("watch/gateway.sock"), watch_group=name, max_watchers=64, max_clients=2)
         self.rig.write_config()
         self.rig.start_gateway()
         self.driving, self.socket = self.socket, self.rig.path("watch/gateway.sock")
@@ -460,8 +456,9 @@ class Watchers(Rights):
         self.assertRegex(str(refusal.exception), f"user {STRANGER} .process [0-9]+")
 
     def test_iwheelctl_says_by_which_socket_it_watches(self):
-        done = subprocess.run([self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"],
-                              capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"], capture_output=True, text=True, check=False
+        )
         self.assertIn(f"by {self.socket} you may watch, stop and estop, but not drive", done.stderr)
         self.assertIn(f"who may drive uses {self.driving} and is in group daemon", done.stderr)
         self.assertNotEqual(done.returncode, 0)

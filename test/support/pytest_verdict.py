@@ -67,6 +67,7 @@ def pytest_collection_modifyitems(config, items):
 
 # ---- in the process of an attempt ------------------------------------------------------------------------------------
 
+
 def evidence_of(item):
     return [one for one in (getattr(item, "funcargs", None) or {}).values() if isinstance(one, verdict.Evidence)]
 
@@ -134,11 +135,15 @@ def perform(config, items):
     config.pluginmanager.register(listener)
     for item, following in zip(items, [*items[1:], None], strict=True):
         config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-    return {"reports": [config.hook.pytest_report_to_serializable(config=config, report=report) for report in listener.reports],
-            "begin_us": begin_us, "end_us": verdict.now_us()}
+    return {
+        "reports": [config.hook.pytest_report_to_serializable(config=config, report=report) for report in listener.reports],
+        "begin_us": begin_us,
+        "end_us": verdict.now_us(),
+    }
 
 
 # ---- between the processes -------------------------------------------------------------------------------------------
+
 
 def limit_of(items):
     def one(item):
@@ -218,6 +223,7 @@ class Nursery:
 
 # ---- in the process that judges --------------------------------------------------------------------------------------
 
+
 def units_of(items):
     """{name: the tests that are one attempt}"""
     units = {}
@@ -259,8 +265,9 @@ class Run(verdict.Session):
         reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
         failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
         skips = {report.nodeid for report in reports if report.skipped}
-        return verdict.Attempt([verdict.Failure(*failure) for failure in failures], claims=claims, stalls=stalls, tests=len(items), skips=len(skips),
-                               data=reports, **answer)
+        return verdict.Attempt(
+            [verdict.Failure(*failure) for failure in failures], claims=claims, stalls=stalls, tests=len(items), skips=len(skips), data=reports, **answer
+        )
 
     def tell(self, name, kind, attempt, tries):
         """The reports of the last attempt go to pytest's other plugins, with what was decided."""
@@ -278,7 +285,6 @@ class Run(verdict.Session):
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)
-
 
     def add(self, name, attempt, figures):
         """The verdict on something that is no test."""

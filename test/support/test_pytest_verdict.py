@@ -26,24 +26,54 @@ SOURCE = HERE / "pytest_verdict.py"
 # (what, old, new, the test that must fail)
 FAULTS = (
     ("a collected failure is forgotten", "    if found:\n        more", "    if False:\n        more", "test_collected_rule_is_final"),
-    ("an exception behind a collected failure is forgotten", "if error and not isinstance(error, SKIPS) else []", "if False else []", "test_crash_behind_a_collected_failure_is_final"),
+    (
+        "an exception behind a collected failure is forgotten",
+        "if error and not isinstance(error, SKIPS) else []",
+        "if False else []",
+        "test_crash_behind_a_collected_failure_is_final",
+    ),
     ("a skip hides what was found before it", "except (Exception, pytest.skip.Exception,", "except (AssertionError,", "test_skip_hides_no_failure"),
     ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
     ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
     ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
     ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
-    ("the gateway's own word is enough", "claims=claims, stalls=stalls,", "claims=[], stalls=stalls + claims,", "test_gateway_late_on_a_quiet_machine_is_final"),
+    (
+        "the gateway's own word is enough",
+        "claims=claims, stalls=stalls,",
+        "claims=[], stalls=stalls + claims,",
+        "test_gateway_late_on_a_quiet_machine_is_final",
+    ),
     ("a crash is a matter of time", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
     ("a crash passes", "return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])", "return verdict.Attempt()", "test_crash_is_final"),
     ("no end in time", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
     ("what a test leaves behind lives on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
     ("other users are kept from the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
-    ("attempts share their output", "    capture.stop_global_capturing()", "    return_ = None\n    capture.stop_global_capturing if return_ else None", "test_output_is_not_mixed"),
-    ("a failure after the test is forgotten", "    if report.failed:\n        error = call", '    if report.failed and report.when == "call":\n        error = call', "test_failure_before_or_after_the_test_fails"),
-    ("tests of a class are prepared one by one", 'shared = item.cls and "setUpClass" in vars(item.cls)', "shared = False", "test_class_that_prepares_once_is_one_attempt"),
+    (
+        "attempts share their output",
+        "    capture.stop_global_capturing()",
+        "    return_ = None\n    capture.stop_global_capturing if return_ else None",
+        "test_output_is_not_mixed",
+    ),
+    (
+        "a failure after the test is forgotten",
+        "    if report.failed:\n        error = call",
+        '    if report.failed and report.when == "call":\n        error = call',
+        "test_failure_before_or_after_the_test_fails",
+    ),
+    (
+        "tests of a class are prepared one by one",
+        'shared = item.cls and "setUpClass" in vars(item.cls)',
+        "shared = False",
+        "test_class_that_prepares_once_is_one_attempt",
+    ),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
-    ("others hear of each attempt", 'report.outcome, report.longrepr = "skipped"', 'report.told, report.longrepr = "skipped"', "test_late_on_a_late_machine_is_not_judged"),
+    (
+        "others hear of each attempt",
+        'report.outcome, report.longrepr = "skipped"',
+        'report.told, report.longrepr = "skipped"',
+        "test_late_on_a_late_machine_is_not_judged",
+    ),
     ("pytest's own status wins", "session.exitstatus = run.end()", "run.end()", "test_late_on_a_late_machine_is_not_judged"),
     ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
@@ -97,21 +127,41 @@ class Made(unittest.TestCase):
 
     def begin(self, tests, stalls, more=""):
         self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()) if hasattr(self, "enterContext") else tempfile.mkdtemp())
-        for name, text in {"conftest.py": textwrap.dedent(CONFTEST).format(stalls=stalls) + textwrap.dedent(more), "test_it.py": textwrap.dedent(HEAD) + textwrap.dedent(tests),
-                           "pytest.ini": "[pytest]\naddopts = -p no:cacheprovider -p no:anyio -p pytest_verdict\n"}.items():
+        for name, text in {
+            "conftest.py": textwrap.dedent(CONFTEST).format(stalls=stalls) + textwrap.dedent(more),
+            "test_it.py": textwrap.dedent(HEAD) + textwrap.dedent(tests),
+            "pytest.ini": "[pytest]\naddopts = -p no:cacheprovider -p no:anyio -p pytest_verdict\n",
+        }.items():
             (self.folder / name).write_text(text)
 
     def command(self, *options):
-        return [sys.executable, "-m", "pytest", "-v", f"--junitxml={self.folder}/junit.xml", f"--rootdir={self.folder}", "-c", f"{self.folder}/pytest.ini", str(self.folder), *options]
+        return [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-v",
+            f"--junitxml={self.folder}/junit.xml",
+            f"--rootdir={self.folder}",
+            "-c",
+            f"{self.folder}/pytest.ini",
+            str(self.folder),
+            *options,
+        ]
 
     def surroundings(self, **more):
-        return {**{key: value for key, value in os.environ.items() if key != "IWHEEL_FULL"}, "PYTHONPATH": f"{self.plugin}:{HERE}", "TMPDIR": str(self.folder),
-                "PYTHONDONTWRITEBYTECODE": "1", **more}
+        return {
+            **{key: value for key, value in os.environ.items() if key != "IWHEEL_FULL"},
+            "PYTHONPATH": f"{self.plugin}:{HERE}",
+            "TMPDIR": str(self.folder),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **more,
+        }
 
     def run_made(self, tests, *options, stalls=LATE, conftest="", **more):
         self.begin(tests, stalls, conftest)
-        done = subprocess.run(self.command(*options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, env=self.surroundings(**more),
-                              check=False)
+        done = subprocess.run(
+            self.command(*options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, env=self.surroundings(**more), check=False
+        )
         cases, junit, notes = {}, self.folder / "junit.xml", self.folder / "notes"
         if junit.exists():
             for case in xml.etree.ElementTree.parse(junit).getroot().iter("testcase"):
@@ -122,13 +172,17 @@ class Made(unittest.TestCase):
     def final(self, tests, *options, junit="failure", **how):
         """One attempt, and it fails."""
         ran = self.run_made(tests, *options, **how)
-        self.assertEqual((1, "0 passed, 1 failed, 0 skipped", ["tried"], {"test_one": junit}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines))
+        self.assertEqual(
+            (1, "0 passed, 1 failed, 0 skipped", ["tried"], {"test_one": junit}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
+        )
         return "\n".join(ran.lines)
 
     def repeated(self, tests, **how):
         """Four attempts, and it is not judged."""
         ran = self.run_made(tests, **how)
-        self.assertEqual((75, "0 passed, 0 failed, 1 skipped", ["tried"] * 4, {"test_one": "skipped"}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines))
+        self.assertEqual(
+            (75, "0 passed, 0 failed, 1 skipped", ["tried"] * 4, {"test_one": "skipped"}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
+        )
         return ran
 
 
@@ -215,12 +269,13 @@ class Conclusive(Made):
 
     def test_failure_before_or_after_the_test_fails(self):
         for before, after, junit in (("assert False", "", "error"), ("", "verdict.hold(False, 'moved')", "error")):
-            self.final(f"""
+            self.final(
+                f"""
                 @pytest.fixture
                 def rig():
-                    {before or 'pass'}
+                    {before or "pass"}
                     yield 1
-                    {after or 'pass'}
+                    {after or "pass"}
 
                 class TestIt:
                     def test_one(self, rig):
@@ -229,7 +284,10 @@ class Conclusive(Made):
                 @pytest.fixture(autouse=True)
                 def tried():
                     note("tried")
-                """, stalls="[]", junit=junit)
+                """,
+                stalls="[]",
+                junit=junit,
+            )
 
 
 class Inconclusive(Made):
@@ -252,15 +310,20 @@ class Inconclusive(Made):
         self.repeated('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 400_000))\n')
 
     def test_stall_that_the_test_measured_counts(self):
-        self.repeated("""
+        self.repeated(
+            """
             def test_one(t):
                 note("tried")
                 t.stalls.append((verdict.now_us(), 500_000))
                 t.failures.append(verdict.Failure("late"))
-            """, stalls="[]")
+            """,
+            stalls="[]",
+        )
 
     def test_gateway_late_next_to_a_late_machine_is_repeated(self):
-        self.repeated('def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[(verdict.now_us(), 6_000)]")
+        self.repeated(
+            'def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[(verdict.now_us(), 6_000)]"
+        )
 
     def test_rule_broken_in_a_later_attempt_fails(self):
         ran = self.run_made("""
@@ -273,7 +336,8 @@ class Inconclusive(Made):
         self.assertEqual((1, "0 passed, 1 failed, 0 skipped", ["tried"] * 2), (ran.status, ran.last, ran.notes))
 
     def test_pass_in_a_later_attempt_alone_when_others_have_ended(self):
-        ran = self.run_made("""
+        ran = self.run_made(
+            """
             def later():
                 notes = open(os.path.join(os.path.dirname(__file__), "notes")).read()
                 return notes.count("others") == 2
@@ -290,7 +354,10 @@ class Inconclusive(Made):
             def test_others(number):
                 time.sleep(1)
                 note("others")
-            """, "--jobs", "3")
+            """,
+            "--jobs",
+            "3",
+        )
         self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
         self.assertEqual(["one", "two", "others", "others", "one", "two"], [*sorted(ran.notes[:2]), *ran.notes[2:4], *sorted(ran.notes[4:])])
         self.assertEqual({"passed"}, set(ran.cases.values()))
@@ -300,24 +367,31 @@ class Inconclusive(Made):
 
 class Processes(Made):
     def test_nothing_is_left_behind(self):
-        ran = self.run_made("""
+        ran = self.run_made(
+            """
             def test_one():
                 note(str(subprocess.Popen(["sleep", "30"], stdout=subprocess.DEVNULL).pid))
                 subprocess._active = []
 
             def test_two():
                 time.sleep(0.2)
-            """, "--jobs", "1")
+            """,
+            "--jobs",
+            "1",
+        )
         self.assertEqual(0, ran.status, ran.lines)
         self.assertFalse(runs(ran.notes[0]))
 
     def test_other_users_may_enter_the_folder_of_all_tests(self):
-        ran = self.run_made("""
+        ran = self.run_made(
+            """
             import tempfile
 
             def test_one():
                 assert os.stat(tempfile.gettempdir()).st_mode & 0o7777 == 0o1777 and "iwheel-tests-" in tempfile.gettempdir()
-            """, stalls="[]")
+            """,
+            stalls="[]",
+        )
         self.assertEqual("1 passed, 0 failed, 0 skipped", ran.last, ran.lines)
 
     def test_output_is_not_mixed(self):
@@ -366,17 +440,28 @@ class Processes(Made):
                 failures = [verdict.Failure("too much", verdict.TIMING)] if sum(values) > 5 else []
                 run.add("all_together", verdict.Attempt(failures, "not enough" if sum(values) < 3 else None), [f"sum {sum(values)}"])
             """
-        for value, status, last, case in ((1, 0, "2 passed, 0 failed, 1 skipped", "skipped"), (2, 0, "3 passed, 0 failed, 0 skipped", "passed"), (3, 1, "2 passed, 1 failed, 0 skipped", "failure")):
-            ran = self.run_made(f"""
+        for value, status, last, case in (
+            (1, 0, "2 passed, 0 failed, 1 skipped", "skipped"),
+            (2, 0, "3 passed, 0 failed, 0 skipped", "passed"),
+            (3, 1, "2 passed, 1 failed, 0 skipped", "failure"),
+        ):
+            ran = self.run_made(
+                f"""
                 @pytest.mark.parametrize("number", (0, 1))
                 def test_one(t, number):
                     t.data["values"] = [{value}]
-                """, stalls="[]", conftest=conftest)
+                """,
+                stalls="[]",
+                conftest=conftest,
+            )
             self.assertEqual((status, last, case), (ran.status, ran.last, ran.cases["all_together"]), ran.lines)
 
     def test_interrupted_run_ends_with_its_tests(self):
         for number in (signal.SIGINT, signal.SIGTERM):
-            self.begin('def test_one():\n    note(str(os.getpid()))\n    time.sleep(40)\n\ndef test_two():\n    test_one()\n\ndef test_three():\n    test_one()\n', "[]")
+            self.begin(
+                "def test_one():\n    note(str(os.getpid()))\n    time.sleep(40)\n\ndef test_two():\n    test_one()\n\ndef test_three():\n    test_one()\n",
+                "[]",
+            )
             process = subprocess.Popen(self.command(), stdout=subprocess.PIPE, text=True, env=self.surroundings())
             notes, end = self.folder / "notes", time.monotonic() + 20
             while (not notes.exists() or len(notes.read_text().split()) < 2) and time.monotonic() < end:
@@ -396,7 +481,7 @@ class Processes(Made):
 
 
 class Chosen(Made):
-    TWO = '@pytest.mark.full\ndef test_long():\n    pass\n\ndef test_short():\n    pass\n'
+    TWO = "@pytest.mark.full\ndef test_long():\n    pass\n\ndef test_short():\n    pass\n"
 
     def test_long_tests(self):
         for full, last in (("0", "1 passed, 0 failed, 0 skipped"), ("1", "2 passed, 0 failed, 0 skipped")):
@@ -409,7 +494,10 @@ class Chosen(Made):
         self.assertFalse(re.search(r"\d+ passed", "\n".join(ran.lines)))
 
     def test_nothing_that_ran_is_no_success(self):
-        for tests, options, last in ((self.TWO, ("-k", "nothing"), "0 passed, 0 failed, 0 skipped"), ('def test_one():\n    pytest.skip("no port")\n', (), "0 passed, 0 failed, 1 skipped")):
+        for tests, options, last in (
+            (self.TWO, ("-k", "nothing"), "0 passed, 0 failed, 0 skipped"),
+            ('def test_one():\n    pytest.skip("no port")\n', (), "0 passed, 0 failed, 1 skipped"),
+        ):
             ran = self.run_made(tests, *options)
             self.assertEqual((1, last), (ran.status, ran.last), ran.lines)
 
@@ -431,7 +519,9 @@ def seed(old, new, noticer):
         (Path(folder) / SOURCE.name).write_text(text.replace(old, new), encoding="utf-8")
         Made.plugin, result = folder, unittest.TestResult()
         try:
-            unittest.defaultTestLoader.loadTestsFromName(next(f"{one.__name__}.{noticer}" for one in CLASSES if hasattr(one, noticer)), sys.modules[__name__]).run(result)
+            unittest.defaultTestLoader.loadTestsFromName(
+                next(f"{one.__name__}.{noticer}" for one in CLASSES if hasattr(one, noticer)), sys.modules[__name__]
+            ).run(result)
         finally:
             Made.plugin = HERE
     return bool(result.failures or result.errors)
@@ -447,7 +537,11 @@ def main():
     passed = result.testsRun - failed
     for what, old, new, noticer in FAULTS if not failed else ():
         noticed = seed(old, new, noticer)
-        print(f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: {noticer}" + (" does not notice it" if noticed is False else "; its text is not there once" if noticed is None else ""), flush=True)
+        print(
+            f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: {noticer}"
+            + (" does not notice it" if noticed is False else "; its text is not there once" if noticed is None else ""),
+            flush=True,
+        )
         passed, failed = passed + bool(noticed), failed + (not noticed)
     print(f"{passed} passed, {failed} failed, 0 skipped")
     return 1 if failed else 0

@@ -37,8 +37,10 @@ QUIET_US, PATIENCE_S, POLL_S = 1_000_000, 10, 0.1  # before a test runs again
 PROCESSORS_MAX = 4
 PR_SET_PDEATHSIG = 1
 
-DIED = re.compile(r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
-                  r"\bended with -(4|6|7|8|11)\b")
+DIED = re.compile(
+    r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
+    r"\bended with -(4|6|7|8|11)\b"
+)
 GATEWAY_LATE = re.compile(r"gateway\s+itself\s+was\s+held\s+up\s+for\s+(\d+)\s+ms")
 
 

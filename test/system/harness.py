@@ -194,9 +194,7 @@ def wait_connect(path, process, seconds=5.0):
         except OSError as error:
             sock.close()
             if process.child.poll() is not None:
-                raise RuntimeError(
-                    f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}"
-                ) from error
+                raise RuntimeError(f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}") from error
             if time.monotonic() > deadline:
                 raise
             time.sleep(0.005)
@@ -316,10 +314,7 @@ class Rig:
         if wheels:
             self.wait_status(
                 client,
-                lambda s: s["left"]["at_rest"]
-                and s["right"]["at_rest"]
-                and s["bus"]["state"] == "active"
-                and s["estop"]["state"] in ("released", "none"),
+                lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active" and s["estop"]["state"] in ("released", "none"),
             )
         client.close()
         return answered_ms
@@ -442,11 +437,17 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "app/bridge/web", "iwheel-mqtt": "app/bridge/mqtt", "iwheel-fleet": "app/bridge/mqtt",
-              "iwheel-serial": "app/bridge/serial", "iwheel-ros2": "app/bridge/ros2"}[name]
+    folder = {
+        "iwheel-gateway": "app/gateway",
+        "iwheelctl": "app/ctl",
+        "iwheel-sim": "app/sim",
+        "iwheel-web": "app/bridge/web",
+        "iwheel-mqtt": "app/bridge/mqtt",
+        "iwheel-fleet": "app/bridge/mqtt",
+        "iwheel-serial": "app/bridge/serial",
+        "iwheel-ros2": "app/bridge/ros2",
+    }[name]
     for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path
     raise FileNotFoundError(f"{name} is not in {build}; build it first: cmake --build {build} --target {name}")
-
-

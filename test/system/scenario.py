@@ -90,9 +90,7 @@ class Test(Evidence):
     def stopped_by(self, client, cause, state="latched"):
         """`why` names that cause, and the state is as told."""
         why, status = client.request("why"), client.request("status")
-        self.check(
-            why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}"
-        )
+        self.check(why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}")
         self.check(status["state"] == state, f"state {state} expected, it is {status['state']}")
         self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
         return why

@@ -68,6 +68,7 @@ def longest_gap_ms(rig, since_us):
 
 def braking_ms(rig, since_us, seconds=2):
     """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
+
     def found():
         last = {}
         for t_us, wheel, speed in rig.bus.setpoints():

@@ -6,6 +6,7 @@ usage: board_page.py
 
 The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A row that is not true is printed as it must be.
 """
+
 import re
 import shutil
 import subprocess
@@ -17,8 +18,15 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 STM32 = ROOT / "port/stm32_stub"
 PAGE = ROOT / "docs/stm32.md"
 PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
-PINS = {"e-stop": "BRD_ESTOP", "button": "BRD_BUTTON", "lamp": "BRD_LAMP", "CAN receive": "BRD_CAN_RX",
-        "CAN transmit": "BRD_CAN_TX", "serial, from the chip": "BRD_UART_TX", "serial, to the chip": "BRD_UART_RX"}
+PINS = {
+    "e-stop": "BRD_ESTOP",
+    "button": "BRD_BUTTON",
+    "lamp": "BRD_LAMP",
+    "CAN receive": "BRD_CAN_RX",
+    "CAN transmit": "BRD_CAN_TX",
+    "serial, from the chip": "BRD_UART_TX",
+    "serial, to the chip": "BRD_UART_RX",
+}
 NUMBERS = {"core": "BRD_CORE_HZ / 1000000U", "apb1": "BRD_APB1_HZ / 1000000U", "lit": "BRD_LAMP_LIT"}
 
 
@@ -28,8 +36,9 @@ def facts(board, *options):
     program = '#include <stdint.h>\n#include <stdio.h>\n#include "board.h"\nint main(void) {\n'
     program += "".join(f'    printf("%u\\n", (unsigned)({value}));\n' for value in values.values()) + "}\n"
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run(["gcc", "-xc", "-", "-o", f"{folder}/probe", *options, f"-I{STM32}", f"-I{STM32 / 'boards' / board}"], input=program,
-                       text=True, check=True)
+        subprocess.run(
+            ["gcc", "-xc", "-", "-o", f"{folder}/probe", *options, f"-I{STM32}", f"-I{STM32 / 'boards' / board}"], input=program, text=True, check=True
+        )
         told = subprocess.run([f"{folder}/probe"], capture_output=True, text=True, check=True).stdout
     return dict(zip(values, map(int, told.split()), strict=True))
 

@@ -4,6 +4,7 @@
 
 usage: test/web/pictures.py BUILD FOLDER
 """
+
 import sys
 import time
 from pathlib import Path

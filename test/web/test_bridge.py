@@ -112,8 +112,17 @@ def test_proof_replayed_moved_or_altered_is_refused(rig):
     assert send("POST", arm, person.header("GET", arm)) == 401, "another method"
     assert send("POST", arm + "1", person.header("POST", arm)) == 401, "another target"
     parts = person.header("POST", arm).split()
-    for wrong in ([*parts[:3], str(int(parts[3]) + 1), parts[4]], [*parts[:4], "0" * 64], [*parts[:2], "0" * 32, *parts[3:]], [parts[0], "f" * 32, *parts[2:]], parts[:4],
-                  [*parts, "x"], [*parts[:3], "0", parts[4]], [*parts[:3], "-1", parts[4]], [*parts[:3], "99999999999999999999", parts[4]]):
+    for wrong in (
+        [*parts[:3], str(int(parts[3]) + 1), parts[4]],
+        [*parts[:4], "0" * 64],
+        [*parts[:2], "0" * 32, *parts[3:]],
+        [parts[0], "f" * 32, *parts[2:]],
+        parts[:4],
+        [*parts, "x"],
+        [*parts[:3], "0", parts[4]],
+        [*parts[:3], "-1", parts[4]],
+        [*parts[:3], "99999999999999999999", parts[4]],
+    ):
         assert send("POST", arm, " ".join(wrong)) == 401, wrong
     first, second, third = (person.header("GET", "/health") for _ in range(3))
     assert send("GET", "/health", third) == 200
@@ -157,8 +166,13 @@ def test_host_of_another_name_is_refused_everywhere(rig):
 def test_post_from_another_site_changes_nothing(rig):
     rig.start().connected()
     driver = Driver(rig)
-    for header in ({"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": f"http://127.0.0.1:{rig.port + 1}"}, {"Sec-Fetch-Site": "cross-site"},
-                   {"Sec-Fetch-Site": "same-site"}):
+    for header in (
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Origin": f"http://127.0.0.1:{rig.port + 1}"},
+        {"Sec-Fetch-Site": "cross-site"},
+        {"Sec-Fetch-Site": "same-site"},
+    ):
         for path in COMMANDS:
             assert rig.ask("POST", path, headers=header)[0] == 403, (header, path)
     assert gateway_state(rig)["state"] == "armed"
@@ -175,13 +189,24 @@ def test_answers_forbid_frames_foreign_sources_and_caches(rig):
         assert rig.headers["Cache-Control"] == "no-store" and rig.headers["X-Content-Type-Options"] == "nosniff"
         assert "Access-Control-Allow-Origin" not in rig.headers and "Set-Cookie" not in rig.headers
     page = rig.ask("GET", "/")[1] + rig.ask("GET", "/page.js")[1]
-    assert not re.search(r"(src|href)=\"(https?:)?//", page) and "onclick=\"" not in page
+    assert not re.search(r"(src|href)=\"(https?:)?//", page) and 'onclick="' not in page
 
 
 def test_paths_lead_nowhere_but_to_the_routes(rig):
     rig.start().connected()
-    for path in ("/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/page/../../token", "//etc/passwd", "/page.css/../token", "/..%2ftoken", "/%00", "/page.js%00.css",
-                 "/token", "/.git/config", "/index.html"):
+    for path in (
+        "/../../etc/passwd",
+        "/%2e%2e/%2e%2e/etc/passwd",
+        "/page/../../token",
+        "//etc/passwd",
+        "/page.css/../token",
+        "/..%2ftoken",
+        "/%00",
+        "/page.js%00.css",
+        "/token",
+        "/.git/config",
+        "/index.html",
+    ):
         assert rig.ask("GET", path)[0] in (400, 404), path
     for name in ("../token", "..%2Ftoken.log", "/etc/passwd.log", "a%22.log", "stop%00.log", "a.log.log", "", "a" * 80 + ".log", "stop-1.log%0a.log"):
         status, body = rig.ask("GET", f"/api/recording?name={name}")
@@ -204,8 +229,14 @@ def test_header_that_counts_is_there_once(rig):
     length = str(len(behind)).encode()
     token = f"Authorization: Bearer {rig.read_secret}\r\n".encode()
     driver = Driver(rig)
-    for twice in (b"Content-Length: 0\r\nContent-Length: " + length, b"Content-Length: 0\r\nTransfer-Encoding : chunked", b"Host: evil.example", b"host: 127.0.0.1",
-                  b"Transfer-Encoding: identity\r\nTransfer-Encoding: chunked", token + token.strip()):
+    for twice in (
+        b"Content-Length: 0\r\nContent-Length: " + length,
+        b"Content-Length: 0\r\nTransfer-Encoding : chunked",
+        b"Host: evil.example",
+        b"host: 127.0.0.1",
+        b"Transfer-Encoding: identity\r\nTransfer-Encoding: chunked",
+        token + token.strip(),
+    ):
         answer = raw(rig, b"GET /page.js HTTP/1.1\r\nHost: 127.0.0.1\r\n" + twice + b"\r\n\r\n" + behind)
         assert answer.startswith(b"HTTP/1.1 400 ") and answer.count(b"HTTP/1.1 ") == 1, (twice, answer[:200])
     assert gateway_state(rig)["state"] == "armed"
@@ -285,8 +316,15 @@ def test_stop_gets_through_a_flood_of_a_thousand_connections_and_the_gateway_has
 def test_slow_connections_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds(rig):
     rig.start().connected()
     driver, since = Driver(rig), now_us()
-    for bomb in (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X: " + b"a" * 200_000 + b"\r\n\r\n", b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
-                 b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", b"\x16\x03\x01" * 1000, b"\0" * 5000, b"GET / HTTP/9.9\r\n\r\n", b"\r\n" * 9000):
+    for bomb in (
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X: " + b"a" * 200_000 + b"\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
+        b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+        b"\x16\x03\x01" * 1000,
+        b"\0" * 5000,
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"\r\n" * 9000,
+    ):
         answer = raw(rig, bomb)
         assert not answer or re.match(rb"HTTP/1\.[01] (4\d\d|505) ", answer), answer[:80]
     assert rig.ask("GET", "/health")[0] == 200
@@ -418,8 +456,13 @@ def test_page_drives_while_it_asks_and_no_longer(rig):
         status, body = person.drive(terms["key"], number)
         assert status == 200 and body["left_mm_s"] == 150, body
         time.sleep(0.05)
-    for key, sequence, age_us, v in ((terms["key"], number, 0, 150), (terms["key"], number + 1, 400_000, 150), ("0" * 32, number + 1, 0, 150),
-                                     (terms["key"], number + 1, -1_000_000, 150), (terms["key"], number + 1, 0, 301)):
+    for key, sequence, age_us, v in (
+        (terms["key"], number, 0, 150),
+        (terms["key"], number + 1, 400_000, 150),
+        ("0" * 32, number + 1, 0, 150),
+        (terms["key"], number + 1, -1_000_000, 150),
+        (terms["key"], number + 1, 0, 301),
+    ):
         status, body = person.drive(key, sequence, age_us, v)
         assert status == 409 and body["error"] == "dropped", body
     since = now_us()
@@ -777,7 +820,9 @@ def start_with(rig, sockets):
     rig.write_web()
     starter = Path(rig.path("starter"))
     passed = " ".join(f"{3 + i}<&{one.fileno()}" for i, one in enumerate(sockets))
-    starter.write_text(f"#!/bin/bash\nLISTEN_PID=$$ LISTEN_FDS={len(sockets)} exec {rig.program('iwheel-web')} -c {rig.path('web.conf')} {passed}\n", encoding="ascii")
+    starter.write_text(
+        f"#!/bin/bash\nLISTEN_PID=$$ LISTEN_FDS={len(sockets)} exec {rig.program('iwheel-web')} -c {rig.path('web.conf')} {passed}\n", encoding="ascii"
+    )
     starter.chmod(0o755)
     rig.web = Process([str(starter)], rig.path("web.out"), close_fds=False)
     rig.processes.append(rig.web)
@@ -821,8 +866,30 @@ def test_sockets_of_systemd_that_listen_elsewhere_are_refused(rig):
 
 
 def certificate(rig, name):
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "1", "-subj", "/CN=localhost", "-addext",
-                    "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", rig.path(f"{name}.key"), "-out", rig.path(f"{name}.pem")], check=True, capture_output=True)
+    subprocess.run(
+        [
+            "openssl",
+            "req",
+            "-x509",
+            "-newkey",
+            "ec",
+            "-pkeyopt",
+            "ec_paramgen_curve:prime256v1",
+            "-nodes",
+            "-days",
+            "1",
+            "-subj",
+            "/CN=localhost",
+            "-addext",
+            "subjectAltName=DNS:localhost,IP:127.0.0.1",
+            "-keyout",
+            rig.path(f"{name}.key"),
+            "-out",
+            rig.path(f"{name}.pem"),
+        ],
+        check=True,
+        capture_output=True,
+    )
 
 
 def test_tls_needs_the_right_certificate_and_ends_without_its_key(rig):
@@ -902,7 +969,9 @@ def test_tls_is_new_and_authenticated_only(rig):
     until(lambda: "its address with the token" in web.text(), what="it starts")
 
     def speaks(*options):
-        done = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{rig.port}", *options], input="", capture_output=True, text=True, timeout=10, check=False)
+        done = subprocess.run(
+            ["openssl", "s_client", "-connect", f"127.0.0.1:{rig.port}", *options], input="", capture_output=True, text=True, timeout=10, check=False
+        )
         return "Cipher is (NONE)" not in done.stdout and done.returncode == 0
 
     assert speaks("-tls1_3") and speaks("-tls1_2") and speaks("-tls1_2", "-cipher", "ECDHE-ECDSA-AES256-GCM-SHA384")
@@ -963,7 +1032,9 @@ def test_metrics_are_those_of_the_snapshot_and_well_formed(rig):
         elif not line.startswith("# HELP "):
             found = SAMPLE.fullmatch(line)
             assert found, line
-            base = next((found[1][: -len(end)] if end else found[1] for end in ("_total", "_bucket", "") if (found[1][: -len(end)] if end else found[1]) in types), None)
+            base = next(
+                (found[1][: -len(end)] if end else found[1] for end in ("_total", "_bucket", "") if (found[1][: -len(end)] if end else found[1]) in types), None
+            )
             assert base and (types[base] == "counter") == found[1].endswith("_total"), line
             assert (found[1], found[2]) not in seen, line
             seen.add((found[1], found[2]))
@@ -1001,9 +1072,13 @@ def prometheus(rig):
     if not shutil.which("prometheus"):
         raise Skip("prometheus is missing (scripts/install_tools check brings it)")
     port = free_port()
-    Path(rig.path("prometheus.yml")).write_text(PROMETHEUS.format(rules=ROOT / "share/web/prometheus-rules.yml", secret=rig.read_secret, port=rig.port), encoding="utf-8")
-    child = Process(["prometheus", f"--config.file={rig.path('prometheus.yml')}", f"--storage.tsdb.path={rig.path('tsdb')}", f"--web.listen-address=127.0.0.1:{port}"],
-                    rig.path("prometheus.out"))
+    Path(rig.path("prometheus.yml")).write_text(
+        PROMETHEUS.format(rules=ROOT / "share/web/prometheus-rules.yml", secret=rig.read_secret, port=rig.port), encoding="utf-8"
+    )
+    child = Process(
+        ["prometheus", f"--config.file={rig.path('prometheus.yml')}", f"--storage.tsdb.path={rig.path('tsdb')}", f"--web.listen-address=127.0.0.1:{port}"],
+        rig.path("prometheus.out"),
+    )
     rig.processes.append(child)
 
     def ask(path):
@@ -1023,7 +1098,9 @@ def prometheus(rig):
 def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
     rig.start().connected()
     with prometheus(rig) as ask:
-        target = until(lambda: (data := ask("targets")) and (found := data["activeTargets"]) and found[0]["health"] != "unknown" and found[0], what="it scrapes")
+        target = until(
+            lambda: (data := ask("targets")) and (found := data["activeTargets"]) and found[0]["health"] != "unknown" and found[0], what="it scrapes"
+        )
         assert target["health"] == "up", target["lastError"]
 
         def figure(query):
@@ -1046,10 +1123,10 @@ def test_words_of_the_page_are_those_of_iwheelctl(rig):
     advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
     strings = (ROOT / "app/bridge/web/page/strings.js").read_text(encoding="utf-8")
     cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
-    ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {"):], re.MULTILINE))
+    ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {") :], re.MULTILINE))
     assert cures and cures == ours, set(cures.items()) ^ set(ours.items())
     joined = re.sub(r'"\s*\n\s*"', "", advice)
-    for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {"):strings.index("  cures: {")], re.MULTILINE):
+    for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {") : strings.index("  cures: {")], re.MULTILINE):
         plain = re.split(r"\{\w+\}", words)
         assert all(part in joined for part in plain), (name, words)
 
@@ -1071,6 +1148,7 @@ def test_fleet_is_what_iwheel_fleet_wrote_and_nothing_else_is_read(rig):
     def refused():
         status, body = rig.ask_json("GET", "/api/fleet")
         return status == 404 and "see that iwheel-fleet writes" in body["message"]
+
     assert refused()
     source.write_text(text, encoding="ascii")
     assert rig.ask("GET", "/api/fleet") == (200, text)

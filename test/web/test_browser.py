@@ -60,17 +60,25 @@ READ = """() => { show(); const read = {}; for (const e of document.querySelecto
 
 
 def decimal(value, digits, unit):
-    return "unknown" if value is None else f"{value / 10 ** digits:.{digits}f} {unit}"
+    return "unknown" if value is None else f"{value / 10**digits:.{digits}f} {unit}"
 
 
 def wheel_words(wheel):
     """Written here once more, from docs/northbound.md, not from the page."""
     words = {
         "heard": "NOT HEARD" if not wheel["heard"] else "at rest" if wheel["at_rest"] else "turning",
-        "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"), "wanted": decimal(wheel["commanded_mm_s"], 0, "mm/s"), "told": decimal(wheel["applied_mm_s"], 0, "mm/s"),
-        "current": decimal(wheel["applied_mA"], 0, "mA"), "net": decimal(wheel["force_net_mN"], 3, "N"), "offset": decimal(wheel["force_offset_mN"], 3, "N"),
-        "raw": decimal(wheel["force_raw_mN"], 3, "N"), "validity": wheel["force_validity"], "battery": decimal(wheel["battery_dV"], 1, "V"),
-        "temperature": decimal(wheel["temperature_degC"], 0, "°C"), "distance": decimal(wheel["distance_mm"], 3, "m"), "ticks": decimal(wheel["ticks"], 0, "ticks"),
+        "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"),
+        "wanted": decimal(wheel["commanded_mm_s"], 0, "mm/s"),
+        "told": decimal(wheel["applied_mm_s"], 0, "mm/s"),
+        "current": decimal(wheel["applied_mA"], 0, "mA"),
+        "net": decimal(wheel["force_net_mN"], 3, "N"),
+        "offset": decimal(wheel["force_offset_mN"], 3, "N"),
+        "raw": decimal(wheel["force_raw_mN"], 3, "N"),
+        "validity": wheel["force_validity"],
+        "battery": decimal(wheel["battery_dV"], 1, "V"),
+        "temperature": decimal(wheel["temperature_degC"], 0, "°C"),
+        "distance": decimal(wheel["distance_mm"], 3, "m"),
+        "ticks": decimal(wheel["ticks"], 0, "ticks"),
     }
     if wheel["saturated"]["battery"] and wheel["battery_dV"] is not None:
         words["battery"] = ">= " + words["battery"]
@@ -90,7 +98,9 @@ def compare(state, read):
             assert read[f"{side}-{name}"] == words, f"{side} {name}: {read[f'{side}-{name}']!r}, in the snapshot {words!r}"
         assert read[f"{side}-provenance"].startswith(state[side]["offset_provenance"])
     pose = state["pose"]
-    assert all(f"{key} {'unknown' if pose[field] is None else pose[field]}" in read["pose-says"] for key, field in (("x", "x_mm"), ("y", "y_mm"), ("psi", "psi_mrad")))
+    assert all(
+        f"{key} {'unknown' if pose[field] is None else pose[field]}" in read["pose-says"] for key, field in (("x", "x_mm"), ("y", "y_mm"), ("psi", "psi_mrad"))
+    )
     for item, entry in state["ledger"].items():
         assert item in read["ledger"] and entry["reason"] in read["ledger"]
     for name, value in state["counters"].items():
@@ -130,8 +140,10 @@ def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         for press in (page.mouse.down, lambda: page.keyboard.press("s")):  # The finger stays where it is.
             driver = Driver(rig)
-            page.evaluate("addEventListener('pointerdown', () => { window.pressed = performance.now(); }, {capture: true, once: true});"
-                          "addEventListener('keydown', () => { window.pressed = performance.now(); }, {capture: true, once: true})")
+            page.evaluate(
+                "addEventListener('pointerdown', () => { window.pressed = performance.now(); }, {capture: true, once: true});"
+                "addEventListener('keydown', () => { window.pressed = performance.now(); }, {capture: true, once: true})"
+            )
             since = now_us()
             press()
             braked_us = since + braking_ms(rig, since) * 1000
@@ -358,16 +370,52 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
 
 
 def fleet_row(name, **other):
-    return {"machine": name, "online": True, "state": "listening", "version": "0.2.0", "left_battery_dV": 248, "right_battery_dV": 247, "left_zero": "operator", "right_zero": "operator",
-            "cause": None, "stop_wall_us": None, "sentence": None, "stop_from": None, "contradicted": "", "heard_ms": 10, **other}
+    return {
+        "machine": name,
+        "online": True,
+        "state": "listening",
+        "version": "0.2.0",
+        "left_battery_dV": 248,
+        "right_battery_dV": 247,
+        "left_zero": "operator",
+        "right_zero": "operator",
+        "cause": None,
+        "stop_wall_us": None,
+        "sentence": None,
+        "stop_from": None,
+        "contradicted": "",
+        "heard_ms": 10,
+        **other,
+    }
 
 
 def write_fleet(rig, age_s=0.0):
     now_us = int((time.time() - age_s) * 1e6)
     sentence = "left wheel not heard for 204 ms while driving 300/300 mm/s; zero at once, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
-    rows = [fleet_row("walker-1"), fleet_row("walker-2", state="latched", cause="wheel_lost", stop_wall_us=now_us - 3600000000, sentence=sentence, right_zero="doubted", contradicted="wheel_radius"),
-            fleet_row("walker-3", online=False, state=None, left_battery_dV=None, right_battery_dV=None, left_zero=None, right_zero=None, version=None, contradicted="wheel_radius track"),
-            fleet_row("walker-4", cause="<b onclick='x'>x</b>", sentence="<img src=x onerror=alert(1)>", right_battery_dV=None)]
+    rows = [
+        fleet_row("walker-1"),
+        fleet_row(
+            "walker-2",
+            state="latched",
+            cause="wheel_lost",
+            stop_wall_us=now_us - 3600000000,
+            sentence=sentence,
+            right_zero="doubted",
+            contradicted="wheel_radius",
+        ),
+        fleet_row(
+            "walker-3",
+            online=False,
+            state=None,
+            left_battery_dV=None,
+            right_battery_dV=None,
+            left_zero=None,
+            right_zero=None,
+            version=None,
+            contradicted="wheel_radius track",
+        ),
+        fleet_row("walker-4", cause="<b onclick='x'>x</b>", sentence="<img src=x onerror=alert(1)>", right_battery_dV=None),
+    ]
     part = Path(rig.path("fleet.part"))
     part.write_text(json.dumps({"ok": True, "wall_us": now_us, "stream": True, "left_out": 0, "machines": rows}), encoding="ascii")
     part.rename(rig.path("fleet.json"))
@@ -507,8 +555,10 @@ def test_page_never_sends_its_token(rig):
                 peer, _ = one.accept()
                 peer.settimeout(1)
                 got.append(peer.recv(65536))
-                peer.sendall(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: 81\r\nConnection: close\r\n\r\n"
-                             b'{"ok":true,"nonce":"00000000000000000000000000000000","boot":"0000","gateway":"x"}')
+                peer.sendall(
+                    b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: 81\r\nConnection: close\r\n\r\n"
+                    b'{"ok":true,"nonce":"00000000000000000000000000000000","boot":"0000","gateway":"x"}'
+                )
                 peer.close()
             except OSError:
                 if one.fileno() < 0:
@@ -561,7 +611,9 @@ def test_page_stays_smooth_at_50_hz(rig):
     with page_of(rig, "phone") as page:
         live(page)
         page.evaluate("document.querySelector('#left').scrollIntoView()")
-        page.evaluate("window.frames_ms = []; let b = performance.now(); const f = (n) => { frames_ms.push(n - b); b = n; requestAnimationFrame(f); }; requestAnimationFrame(f)")
+        page.evaluate(
+            "window.frames_ms = []; let b = performance.now(); const f = (n) => { frames_ms.push(n - b); b = n; requestAnimationFrame(f); }; requestAnimationFrame(f)"
+        )
         heap = []
         until_s = time.monotonic() + minutes * 60
         while time.monotonic() < until_s:
@@ -571,7 +623,10 @@ def test_page_stays_smooth_at_50_hz(rig):
             heap.append(page.evaluate("performance.memory.usedJSHeapSize") / 1e6)
         times = sorted(page.evaluate("frames_ms.splice(0)"))
         # A sentence for docs/web.md.
-        print(f"{minutes:g} minutes at 50 Hz, 390 x 844: a frame every {times[len(times) // 2]:.1f} ms (median; 99 %: {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms, "
-              f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.", flush=True)
+        print(
+            f"{minutes:g} minutes at 50 Hz, 390 x 844: a frame every {times[len(times) // 2]:.1f} ms (median; 99 %: {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms, "
+            f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.",
+            flush=True,
+        )
         assert times[len(times) // 2] < 34 and heap[-1] < 60
     driver.end()

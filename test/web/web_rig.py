@@ -50,7 +50,9 @@ class Person:
     def ask(self, method, target, **options):
         """(status, JSON). A bridge that was started again does not know the session."""
         for _ in range(2):
-            status, body = self.rig.ask(method, target, headers={"Authorization": self.header(method, target), **options.pop("headers", {})}, token="", **options)
+            status, body = self.rig.ask(
+                method, target, headers={"Authorization": self.header(method, target), **options.pop("headers", {})}, token="", **options
+            )
             answer = json.loads(body)
             if status != 401 or answer["error"] != "bad_session":
                 break
