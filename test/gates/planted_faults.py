@@ -226,6 +226,12 @@ def ruff(folder, code):
     return run("ruff", "check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
 
 
+def ruff_format(folder, code):
+    """A script with that body."""
+    (folder / "planted").write_text(f'#!/usr/bin/env python3\n"""Planted."""\n{code}')
+    return run("ruff", "format", "--check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
+
+
 def shellcheck(folder, code):
     (folder / "planted").write_text(f"#!/usr/bin/env bash\n{code}")
     return run("shellcheck", "-x", folder / "planted")
@@ -580,6 +586,8 @@ CASES = [
     (ruff, "ruff", "a run whose failure nobody sees", "import subprocess\n\nsubprocess.run(['false'])\n", True),
     (ruff, "ruff", "a comparison of what may be shorter", "print([a for a, b in zip('ab', 'a') if a == b])\n", True),
     (ruff, "ruff", "complexity 17", "def f(a):\n" + "".join(f"    if a == {n}:\n        print({n})\n" for n in range(16)), True),
+    (ruff_format, "ruff", "formatted", "print(1, [2, 3])\n", False),
+    (ruff_format, "ruff", "not formatted", "print( 1,[2,3] )\n", True),
     (shellcheck, "shellcheck", "clean", 'echo "$1"\n', False),
     (shellcheck, "shellcheck", "words that are split", "rm -r $1\n", True),
     (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
