@@ -229,6 +229,28 @@ static void test_state_of_a_snapshot_is_read_and_unknown_is_not_zero(void) {
     TEST_ASSERT_EQUAL_INT64(0, state.right.force_net_mN.value);
 }
 
+static void test_state_with_fields_in_another_order_is_the_same(void) {
+    const iwc_message_t message = message_of(
+        " {\"right\":{\"force_age_ms\":5,\"force_validity\":\"valid\",\"force_net_mN\":8,\"speed_mm_s\":-2,\"heard\":"
+        "true},"
+        "\"left\":{\"other\":{\"heard\":true},\"at_rest\":true},\"estop\":{\"line\":\"state\",\"state\":\"released\"},"
+        "\"lease\":{\"remaining_ms\":4,\"holder\":9},\"cause\":\"estop\",\"state\":\"latched\",\"t_us\":6}");
+    iwc_state_t state;
+    TEST_ASSERT_TRUE(iwc_state(gateway, &message, &state));
+    TEST_ASSERT_EQUAL_INT64(6, state.t_us);
+    TEST_ASSERT_EQUAL(IWC_LATCHED, state.machine);
+    TEST_ASSERT_EQUAL_STRING("estop", state.cause);
+    TEST_ASSERT_EQUAL_INT64(9, state.holder.value);
+    TEST_ASSERT_EQUAL_INT64(4, state.remaining_ms.value);
+    TEST_ASSERT_TRUE(state.estop_released);
+    TEST_ASSERT_FALSE(state.bus_active || state.left.heard || state.left.speed_mm_s.known);
+    TEST_ASSERT_EQUAL_INT64(1, state.left.at_rest.value);
+    TEST_ASSERT_TRUE(state.right.heard);
+    TEST_ASSERT_EQUAL_INT64(-2, state.right.speed_mm_s.value);
+    TEST_ASSERT_EQUAL_INT64(8, state.right.force_net_mN.value);
+    TEST_ASSERT_EQUAL_INT64(5, state.right.force_age_ms.value);
+}
+
 static void test_state_of_what_is_no_snapshot_is_untouched(void) {
     static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}",
                                         "{\"event\":\"bus\",\"state\":\"down\"}"};
@@ -252,6 +274,7 @@ int main(void) {
     RUN_TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters);
     RUN_TEST(test_field_json_is_what_stands_there);
     RUN_TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero);
+    RUN_TEST(test_state_with_fields_in_another_order_is_the_same);
     RUN_TEST(test_state_of_what_is_no_snapshot_is_untouched);
     return UNITY_END();
 }

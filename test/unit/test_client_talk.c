@@ -325,6 +325,23 @@ static void test_line_of_garbage_ends_the_connection_behind_the_good_ones(void) 
     }
 }
 
+static void test_event_of_known_shape_is_judged_as_the_first_one(void) {
+    static const char *const bad[] = {
+        "{\"event\":\"a\",\"b\":{\"c\":1,\"c\":2}}\n", "{\"event\":\"a\",\"b\":{\"c\":1},\"ok\":true}\n",
+        "{\"event\":\"a\",\"event\":{\"c\":1}}\n",     "{\"event\":\"a\",\"b\":{\"c\":01}}\n",
+        "{\"event\":\"a\",\"b\":{\"c\":\"\xff\"}}\n",  "{\"event\":\"a\",\"b\":{\"c\":1}\n"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
+        say("{\"event\":\"a\",\"b\":{\"c\":1}}\n{\"event\":\"a\",\"b\":{\"c\":[2]}}\n");
+        expect_event("{\"event\":\"a\",\"b\":{\"c\":1}}");
+        expect_event("{\"event\":\"a\",\"b\":{\"c\":[2]}}");
+        say("{\"event\":\"a\",\"b\":{\"c\":\"x\"}}\n");
+        say(bad[i]);
+        expect_event("{\"event\":\"a\",\"b\":{\"c\":\"x\"}}");
+        TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, iwc_next(gateway, 0, &message), bad[i]);
+    }
+}
+
 static void test_line_that_the_dead_gateway_left_half_is_no_message(void) {
     const iwc_drive_t command = {.left_mm_s = 100};
     say("{\"event\":\"a\"}\n{\"event\":\"b\"}");
@@ -581,6 +598,7 @@ int main(void) {
     RUN_TEST(test_line_longer_than_that_ends_the_connection);
     RUN_TEST(test_line_without_end_ends_the_connection);
     RUN_TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones);
+    RUN_TEST(test_event_of_known_shape_is_judged_as_the_first_one);
     RUN_TEST(test_line_that_the_dead_gateway_left_half_is_no_message);
     RUN_TEST(test_flood_nobody_takes_leaves_the_newest_and_the_count);
     RUN_TEST(test_flood_of_different_things_drops_the_oldest);

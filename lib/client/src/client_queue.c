@@ -49,15 +49,36 @@ static bool admit_reply(iwc_t *self, iwc_span_t line) {
     return !has_id || is_odd(id);
 }
 
-/// False: it is no message.
+/// Its shape, if it is well formed and begins as the gateway's events do; 0: it must be judged in full.
+static uint64_t shape_of(iwc_span_t line) {
+    static const char begin[] = "{\"event\":";
+    const size_t length = sizeof begin - 1U;
+    uint64_t shape = 0;
+    const bool good =
+        line.length > length && memcmp(line.at, begin, length) == 0 && iwc_json_shape(line, &shape) && shape != 0U;
+    return good ? shape : 0U;
+}
+
+/// False: it is no message. Events of one shape have the same names, so that only the first of them is judged name by name.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
-    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length)) {
+    if (line.length > IWC_LINE_MAX) {
+        return false;
+    }
+    const uint64_t shape = shape_of(line);
+    uint64_t *const known = &self->shapes[shape % IWC_SHAPES];
+    if (shape != 0U && *known == shape) {
+        return true;
+    }
+    if (!iwc_json_is_object(line.at, line.length)) {
         return false;
     }
     const bool is_event = iwc_json_find(line, "event").at != NULL;
     const bool is_reply = iwc_json_find(line, "ok").at != NULL;
     if (is_reply && !is_event && !admit_reply(self, line)) {
         self->in[line.at - self->in] = STRUCK;
+    }
+    if (is_event && !is_reply) {
+        *known = shape;
     }
     return is_event != is_reply;
 }
@@ -89,9 +110,8 @@ bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message) {
             const iwc_span_t span = {self->line, length};
             *out_message = (iwc_message_t){.text = self->line, .length = length, .skipped = self->skipped};
             out_message->is_event = iwc_json_find(span, "event").at != NULL;
-            (void)iwc_json_integer(iwc_json_find(span, "id"), &out_message->id);
-            if (out_message->is_event) {
-                out_message->id = 0;
+            if (!out_message->is_event) {
+                (void)iwc_json_integer(iwc_json_find(span, "id"), &out_message->id);
             }
             self->skipped = 0;
             self->answer = 0;
@@ -178,7 +198,7 @@ void iwc_queue_thin(iwc_t *self) {
 }
 
 void iwc_queue_make_room(iwc_t *self) {
-    if (IWC_IN_SIZE - self->end > IWC_LINE_MAX) {
+    if (IWC_IN_SIZE - self->end > IWC_LINE_MAX && self->begin < self->end) {
         return;
     }
     if (self->end - self->begin > IWC_IN_SIZE - IWC_LINE_MAX - 1U) {

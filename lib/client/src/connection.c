@@ -323,7 +323,7 @@ iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
             return IWC_OK;
         }
         iwc_result_t result = iwc_fill(self);
-        if (result == IWC_TIMEOUT) {
+        if (result == IWC_TIMEOUT && timeout_ms != 0) {
             result = iwc_await(self, POLLIN, deadline_us);
         } else if (result == IWC_OK && iwc_now_us() >= deadline_us && !iwc_pending(self)) {
             result = IWC_TIMEOUT; // Something comes all the time, but nothing to hand out.

@@ -16,13 +16,16 @@ bool iwc_json_is_object(const char *text, size_t length) {
     return iwn_json_check(text, length, &work, &root, &fault) && iwn_json_kind(root) == IWN_JSON_OBJECT;
 }
 
-static iwc_span_t find_key(iwc_span_t object, const char *key, size_t length) {
-    iwn_json_t rest = {object.at + 1};
+bool iwc_json_shape(iwc_span_t text, uint64_t *out_shape) {
+    return iwn_json_shape(text.at, text.length, out_shape);
+}
+
+static iwc_span_t find_key(iwn_json_t *rest, const char *key, size_t length) {
     iwn_json_t name;
     iwn_json_t value;
-    while (iwn_json_next(&rest, &name, &value)) {
+    while (iwn_json_next(rest, &name, &value)) {
         if (strncmp(name.at + 1, key, length) == 0 && name.at[length + 1U] == '"') {
-            return (iwc_span_t){value.at, (size_t)(rest.at - value.at)};
+            return (iwc_span_t){value.at, (size_t)(rest->at - value.at)};
         }
     }
     return NOTHING;
@@ -42,12 +45,32 @@ iwc_span_t iwc_json_find(iwc_span_t object, const char *path) {
         if (object.length == 0 || object.at[0] != '{') {
             return NOTHING;
         }
-        object = find_key(object, path, length);
+        iwn_json_t rest = {object.at + 1};
+        object = find_key(&rest, path, length);
         if (path[length] == '\0') {
             return object;
         }
         path += length + 1U;
     }
+}
+
+iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key) {
+    const size_t length = strlen(key);
+    const iwc_span_t object = skip_blanks(self->object);
+    iwn_json_t rest = {self->rest};
+    iwc_span_t value = NOTHING;
+    if (object.length == 0 || object.at[0] != '{') {
+        return NOTHING;
+    }
+    if (rest.at != NULL) {
+        value = find_key(&rest, key, length);
+    }
+    if (value.at == NULL) {
+        rest.at = object.at + 1;
+        value = find_key(&rest, key, length);
+    }
+    self->rest = rest.at;
+    return value;
 }
 
 bool iwc_json_is_text(iwc_span_t value, const char *text) {

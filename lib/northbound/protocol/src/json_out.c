@@ -9,8 +9,6 @@
 #endif
 
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
-/// A byte of a word of the machine, in all of its bytes.
-#define IN_EACH(byte) ((size_t)-1 / 255U * (byte))
 
 /// Room for so many bytes; NULL: there is none, the line is lost.
 static char *take(iwn_out_t *self, size_t length) {
@@ -85,32 +83,6 @@ void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values)
     }
 }
 
-/// Whether a byte stands in a text as it is.
-static bool is_plain(char c) {
-    return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
-}
-
-/// How many of the bytes from there on stand as they are: a word of the machine at a time. In one whose bytes are below
-/// 0x80 a subtraction borrows only behind a byte that is not plain either.
-static size_t plain_length(const char *text, size_t length) {
-    size_t plain = 0;
-    size_t word;
-    for (; plain + sizeof word <= length; plain += sizeof word) {
-        memcpy(&word, &text[plain], sizeof word);
-        const size_t control = word - IN_EACH(0x20U);
-        const size_t quote = (word ^ IN_EACH(0x22U)) - IN_EACH(1U);
-        const size_t backslash = (word ^ IN_EACH(0x5CU)) - IN_EACH(1U);
-        const size_t erase = (word ^ IN_EACH(0x7FU)) - IN_EACH(1U);
-        if (((word | control | quote | backslash | erase) & IN_EACH(0x80U)) != 0U) {
-            break;
-        }
-    }
-    while (plain < length && is_plain(text[plain])) {
-        plain++;
-    }
-    return plain;
-}
-
 /// One character that may have to be written otherwise; how many bytes it has in `text`.
 static size_t put_character(iwn_out_t *self, const char *text) {
     char escape[7];
@@ -135,7 +107,7 @@ static void put_escaped(iwn_out_t *self, const char *text, size_t length) {
     size_t at = 0;
     while (at < length) {
         at += put_character(self, &text[at]);
-        const size_t plain = plain_length(&text[at], length - at);
+        const size_t plain = iwn_plain_length(&text[at], length - at);
         put(self, &text[at], plain);
         at += plain;
     }
@@ -147,7 +119,7 @@ void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text) {
         return;
     }
     const size_t length = strlen(text);
-    const size_t plain = plain_length(text, length);
+    const size_t plain = iwn_plain_length(text, length);
     char *const at = begin(self, name, plain + ((plain == length) ? 2U : 1U));
     if (at == NULL) {
         return;

@@ -5,6 +5,8 @@
 
 /// No more of a wrong token than this is repeated.
 #define NEAR_MAX 20U
+/// An integer of so many bytes has 64 bits.
+#define INTEGER_SAFE 18
 /// The decimal exponent of the largest double.
 #define REAL_EXPONENT_MAX 308
 /// No exponent beyond it means anything else, however many digits come before.
@@ -76,17 +78,23 @@ static size_t character_length(const iwn_scan_t *self) {
     return (iwn_plain_read(copy, &bytes) != IWN_PLAIN_BROKEN) ? bytes : 0U;
 }
 
-/// The next byte, which begins a character or stands in one that has been looked at.
-static int peek(iwn_scan_t *self) {
-    if (self->at == self->end) {
-        return PEEK_END;
-    }
+/// Outside ASCII: the byte, or PEEK_BROKEN, and that is told.
+static int peek_wide(iwn_scan_t *self) {
     const unsigned char byte = (unsigned char)*self->at;
-    if (byte >= 0x80U && character_length(self) == 0U) {
+    if (character_length(self) == 0U) {
         (void)fail_byte(self, "unable to decode byte 0x", byte, "");
         return PEEK_BROKEN;
     }
     return byte;
+}
+
+/// The next byte, which begins a character or stands in one that has been looked at.
+static inline int peek(iwn_scan_t *self) {
+    if (self->at == self->end) {
+        return PEEK_END;
+    }
+    const unsigned char byte = (unsigned char)*self->at;
+    return (byte < 0x80U) ? byte : peek_wide(self);
 }
 
 static int step(iwn_scan_t *self) {
@@ -174,18 +182,9 @@ static bool skip_escape(iwn_scan_t *self, bool *out_unit) {
     return good;
 }
 
-/// Stands in a text and means itself alone.
-static bool is_plain(unsigned char byte) {
-    return byte >= 0x20U && byte < 0x80U && byte != '"' && byte != '\\';
-}
-
 /// What comes behind the bytes that need no look.
 static int skip_plain(iwn_scan_t *self) {
-    const char *at = self->at;
-    while (at < self->end && is_plain((unsigned char)*at)) {
-        at++;
-    }
-    self->at = at;
+    self->at += iwn_plain_length(self->at, (size_t)(self->end - self->at));
     return peek(self);
 }
 
@@ -204,7 +203,7 @@ static int scan_text(iwn_scan_t *self) {
         if (c == PEEK_BROKEN || (c == '\\' && !skip_escape(self, &units))) {
             return IWN_TOKEN_INVALID;
         }
-        self->at += (c >= 0x80) ? character_length(self) : 0U;
+        self->at += (c != '\\') ? character_length(self) : 0U;
     }
     self->at++;
     return units ? check_units(self) : IWN_TOKEN_TEXT;
@@ -212,15 +211,19 @@ static int scan_text(iwn_scan_t *self) {
 
 /// Digits, one at least; `*c` is what they begin with, and then what comes behind them.
 static bool skip_digits(iwn_scan_t *self, int *c) {
-    const bool any = iwn_scan_is_digit(*c);
-    while (iwn_scan_is_digit(*c)) {
-        *c = step(self);
+    const char *const begin = self->at;
+    while (self->at < self->end && iwn_scan_is_digit(*self->at)) {
+        self->at++;
     }
-    return any;
+    *c = peek(self);
+    return self->at > begin;
 }
 
 /// 64 bits.
 static int check_integer(iwn_scan_t *self) {
+    if (self->at - self->token <= INTEGER_SAFE) {
+        return IWN_TOKEN_SCALAR;
+    }
     const bool negative = *self->token == '-';
     const uint64_t most = negative ? (uint64_t)INT64_MAX + 1U : (uint64_t)INT64_MAX;
     uint64_t number = 0;
@@ -328,20 +331,17 @@ static int scan_number(iwn_scan_t *self) {
 }
 
 static int scan_word(iwn_scan_t *self) {
-    static const char *const words[] = {"true", "false", "null"};
-    while (iwn_scan_is_letter(step(self))) {
+    while (self->at < self->end && iwn_scan_is_letter(*self->at)) {
+        self->at++;
     }
     const size_t length = (size_t)(self->at - self->token);
-    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
-        if (length == strlen(words[i]) && memcmp(self->token, words[i], length) == 0) {
-            return IWN_TOKEN_SCALAR;
-        }
-    }
-    return IWN_TOKEN_INVALID;
+    const bool four = length == 4U && (memcmp(self->token, "true", 4U) == 0 || memcmp(self->token, "null", 4U) == 0);
+    const bool known = four || (length == 5U && memcmp(self->token, "false", 5U) == 0);
+    return (peek(self) != PEEK_BROKEN && known) ? IWN_TOKEN_SCALAR : IWN_TOKEN_INVALID;
 }
 
 static bool is_mark(int c) {
-    return c > 0 && strchr("{}[]:,", c) != NULL;
+    return c == ',' || c == ':' || c == '{' || c == '}' || c == '[' || c == ']';
 }
 
 int iwn_scan(iwn_scan_t *self) {
@@ -362,7 +362,7 @@ int iwn_scan(iwn_scan_t *self) {
     if (iwn_scan_is_letter(c)) {
         return scan_word(self);
     }
-    self->at += character_length(self);
+    self->at += (c < 0x80) ? 1U : character_length(self);
     return is_mark(c) ? c : IWN_TOKEN_INVALID;
 }
 

@@ -5,6 +5,8 @@
 
 /// Every character that moves a terminal takes four digits.
 #define ESCAPE_SIZE sizeof "\\uFFFD"
+/// A byte of a word of the machine, in all of its bytes.
+#define IN_EACH(byte) ((size_t)-1 / 255U * (byte))
 
 static const struct {
     uint32_t first;
@@ -66,6 +68,37 @@ bool iwn_plain_text(const char *text) {
         }
     }
     return true;
+}
+
+/// Whether a byte stands in a text as it is.
+static bool is_plain(char c) {
+    return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
+}
+
+/// A word of the machine at a time. In one whose bytes are below 0x80 a subtraction borrows only behind a byte that is not
+/// plain either.
+size_t iwn_plain_length(const char *text, size_t length) {
+    size_t plain = 0;
+    size_t word;
+    for (; plain + sizeof word <= length; plain += sizeof word) {
+        memcpy(&word, &text[plain], sizeof word);
+        const size_t control = word - IN_EACH(0x20U);
+        const size_t quote = (word ^ IN_EACH(0x22U)) - IN_EACH(1U);
+        const size_t backslash = (word ^ IN_EACH(0x5CU)) - IN_EACH(1U);
+        const size_t erase = (word ^ IN_EACH(0x7FU)) - IN_EACH(1U);
+        const size_t odd = (word | control | quote | backslash | erase) & IN_EACH(0x80U);
+        if (odd != 0U) {
+#if !defined(__OPTIMIZE_SIZE__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+            return plain + (size_t)__builtin_ctzll(odd) / 8U; // The lowest bit is of the first such byte.
+#else
+            break;
+#endif
+        }
+    }
+    while (plain < length && is_plain(text[plain])) {
+        plain++;
+    }
+    return plain;
 }
 
 void iwn_plain_copy(const char *text, char *out, size_t size) {
@@ -193,10 +226,12 @@ void iwn_text_int(iwn_text_t *self, int64_t number) {
 }
 
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits) {
-    while (digits > 0U) {
+    while (digits > 0U && self->length + 1U < self->size) {
         digits--;
-        iwn_text_span(self, &"0123456789ABCDEF"[number >> 4U * digits & 15U], 1U);
+        self->data[self->length] = "0123456789ABCDEF"[number >> 4U * digits & 15U];
+        self->length++;
     }
+    self->data[self->length] = '\0';
 }
 
 void iwn_text_join(iwn_text_t *self, const char *const *texts) {

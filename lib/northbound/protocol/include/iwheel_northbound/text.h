@@ -27,6 +27,9 @@ bool iwn_plain_is(uint32_t code_point);
 /// True if all of it is plain.
 bool iwn_plain_text(const char *text);
 
+/// How many of the bytes from there on stand in JSON as they are: ASCII that moves nothing, no quote, no backslash.
+size_t iwn_plain_length(const char *text, size_t length);
+
 /// Copies with a `?` in place of each character that is not plain; what does not fit is left out, never half a character.
 void iwn_plain_copy(const char *text, char *out, size_t size);
 
