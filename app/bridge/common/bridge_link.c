@@ -9,6 +9,8 @@
 
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
+/// Of the request that subscribes.
+#define WATCH_SIZE 128U
 /// The gateway changes the group of its socket after it made it: rights are missing only if that lasts.
 #define DENIED_US 5000000U
 
@@ -105,12 +107,34 @@ static int judge_rights(bridge_link_t *self) {
     return 0;
 }
 
-static void subscribe(bridge_link_t *self) {
-    char request[128];
-    const bridge_sent_t sent = {0, self->now_us + BRIDGE_STOP_US, take_subscribed, self};
-    (void)snprintf(request, sizeof request,
+static void write_watch(bridge_link_t *self, char request[WATCH_SIZE]) {
+    (void)snprintf(request, WATCH_SIZE,
                    "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}",
                    self->terms.rate_hz);
+    self->asked_hz = self->terms.rate_hz;
+}
+
+static void take_rate(void *context, const iwc_message_t *reply) {
+    bridge_link_t *self = context;
+    if (reply == NULL) {
+        self->asked_hz = 0; // Asked again.
+    }
+}
+
+static void ask_rate(bridge_link_t *self) {
+    char request[WATCH_SIZE];
+    if (self->state == BRIDGE_LINK_HERE && self->asked_hz != self->terms.rate_hz) {
+        write_watch(self, request);
+        if (!bridge_link_ask(self, request, take_rate, self, self->now_us)) {
+            self->asked_hz = 0;
+        }
+    }
+}
+
+static void subscribe(bridge_link_t *self) {
+    char request[WATCH_SIZE];
+    const bridge_sent_t sent = {0, self->now_us + BRIDGE_STOP_US, take_subscribed, self};
+    write_watch(self, request);
     if (bridge_line_send(&self->line, request, &sent) != IWC_OK) {
         lose(self);
     }
@@ -144,10 +168,12 @@ static void listen_now(bridge_link_t *self) {
     if (self->terms.latest && self->state == BRIDGE_LINK_HERE) {
         (void)iwc_latest(self->line.gateway); // If it has ended, the next line finds that out.
     }
-    for (unsigned i = 0; i < 256U && bridge_line_next(&self->line, &event); i++) {
+    bool more = true; // Reads once; the descriptor stays readable if there is more than fits.
+    for (unsigned i = 0; i < 256U && more && bridge_line_next(&self->line, &event); i++) {
         if (self->state == BRIDGE_LINK_HERE) {
             self->listener.event(self->listener.context, &event, self->now_us);
         }
+        more = iwc_pending(self->line.gateway);
     }
     (void)bridge_line_expire(&self->line, self->now_us);
     const bool subscribing = bridge_line_in_flight(&self->line) > 0U;
@@ -190,6 +216,7 @@ int bridge_link_step(bridge_link_t *self, uint64_t now_us) {
     if (self->line.state == BRIDGE_HERE) {
         listen_now(self);
     }
+    ask_rate(self);
     send_waiting(self);
     give_up(self);
     return 0;
@@ -201,10 +228,15 @@ uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us) {
     if (self->count > 0U && self->waits[0].until_us < next_us) {
         next_us = self->waits[0].until_us;
     }
-    if (self->state == BRIDGE_LINK_HERE && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
+    if (self->state == BRIDGE_LINK_HERE && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX &&
+        (self->count > 0U || self->asked_hz != self->terms.rate_hz)) {
         return now_us;
     }
     return (stop_us < next_us) ? stop_us : next_us;
+}
+
+void bridge_link_rate(bridge_link_t *self, unsigned rate_hz) {
+    self->terms.rate_hz = rate_hz;
 }
 
 int bridge_link_fd(const bridge_link_t *self) {

@@ -122,12 +122,12 @@ static uint32_t rate_hz(uint32_t every_ms) {
     return (every_ms < 1000U) ? 1000U / every_ms : 1U;
 }
 
-static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
+static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, const char *condition, bool spare) {
     // By MQTT 5: what is older than the next one is of no use.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
     if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) !=
         MQTT_NOT_NOW) {
-        read_condition(state, self->condition, sizeof self->condition);
+        (void)snprintf(self->condition, sizeof self->condition, "%s", condition);
         self->state_us = self->now_us;
     }
 }
@@ -143,7 +143,7 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     const uint32_t line_ms = 1000U / rate_hz(every_ms);
     if (strcmp(condition, self->condition) != 0 ||
         self->now_us - self->state_us >= ((uint64_t)every_ms * 2U - line_ms) * 500U) {
-        tell_state(self, state, true);
+        tell_state(self, state, condition, true);
     }
     if (first) {
         tell_availability(self, false);
@@ -204,9 +204,11 @@ static void gateway_gone(void *context, uint64_t now_us) {
 static void broker_up(void *context) {
     mqtt_bridge_t *self = context;
     iwc_message_t state;
+    char condition[sizeof self->condition];
     tell_availability(self, true);
     if (mqtt_bridge_state(self, &state)) {
-        tell_state(self, &state, false);
+        read_condition(&state, condition, sizeof condition);
+        tell_state(self, &state, condition, false);
     }
     tell_info(self);
     mqtt_sensors_send(self);

@@ -146,8 +146,9 @@ static void take_reply(bridge_t *self, const iwc_message_t *reply) {
 void bridge_listen(bridge_t *self) {
     iwc_message_t message;
     bool fresh = false;
-    iwc_result_t result = iwc_next(self->gateway, 0, &message);
-    for (; result == IWC_OK; result = iwc_next(self->gateway, 0, &message)) {
+    bool more = true; // Reads once; the descriptor stays readable if there is more than fits.
+    iwc_result_t result = IWC_TIMEOUT;
+    while (more && (result = iwc_next(self->gateway, 0, &message)) == IWC_OK) {
         if (!message.is_event) {
             take_reply(self, &message);
         } else if (iwc_is(&message, "event", "state")) {
@@ -158,8 +159,9 @@ void bridge_listen(bridge_t *self) {
         } else if (iwc_is(&message, "event", "ledger")) {
             self->assumptions_due = true;
         }
+        more = iwc_pending(self->gateway);
     }
-    if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
+    if (result != IWC_OK && result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
         bridge_lose(self, "it has ended, or closed the connection");
     } else if (fresh) {
         ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);

@@ -6,6 +6,10 @@
 #include <string.h>
 
 #define STALE_US 2000000U
+/// The state comes no faster while no client reads it, but fast enough that what is read first is fresh.
+#define IDLE_HZ 2U
+/// A client that read the state may read it again within this time.
+#define LOOKED_US 5000000U
 /// The frames after a stop are there then.
 #define WHY_US 2500000U
 /// All places for questions are in use.
@@ -83,6 +87,7 @@ static void forget_state(web_link_t *self) {
 static void gateway_here(void *context, uint64_t now_us) {
     web_link_t *self = context;
     self->why_us = now_us;
+    web_link_look(self, now_us);
     (void)web_feed_add(&self->feed, "gateway", "{\"event\":\"gateway\",\"connected\":true}", 36, false);
 }
 
@@ -97,7 +102,7 @@ static void gateway_gone(void *context, uint64_t now_us) {
 bool web_link_open(web_link_t *self, const char *socket, unsigned rate_hz, bool drives) {
     const bridge_link_terms_t terms = {"iwheel-web", socket, rate_hz, drives, true};
     const bridge_listener_t listener = {self, gateway_here, gateway_gone, take_event};
-    *self = (web_link_t){.why_us = 0};
+    *self = (web_link_t){.rate_hz = rate_hz};
     return bridge_link_open(&self->gateway, &terms, &listener) &&
            bridge_lease_open(&self->lease, socket, self->gateway.epoll_fd);
 }
@@ -112,7 +117,15 @@ void web_link_close(web_link_t *self) {
     }
 }
 
+void web_link_look(web_link_t *self, uint64_t now_us) {
+    self->looked_us = now_us;
+    bridge_link_rate(&self->gateway, self->rate_hz);
+}
+
 int web_link_step(web_link_t *self, uint64_t now_us) {
+    if (now_us - self->looked_us > LOOKED_US && self->rate_hz > IDLE_HZ) {
+        bridge_link_rate(&self->gateway, IDLE_HZ);
+    }
     const int code = bridge_link_step(&self->gateway, now_us);
     bridge_lease_step(&self->lease, now_us);
     if (self->gateway.state == BRIDGE_LINK_HERE && self->why_us != 0U && now_us >= self->why_us) {

@@ -322,6 +322,9 @@ static void let_go(web_server_t *self) {
 
 int web_server_step(web_server_t *self) {
     self->now_us = bridge_now_us();
+    if (self->streams != NULL) {
+        web_link_look(&self->link, self->now_us);
+    }
     const int code = web_link_step(&self->link, self->now_us);
     if (code != 0) {
         return code;
