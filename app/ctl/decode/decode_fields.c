@@ -128,14 +128,14 @@ const char *field_column(field_t field) {
     return words[field].column;
 }
 
-void field_print_all(const decoded_t *decoded, FILE *out) {
+void field_add_all(const decoded_t *decoded, iwn_text_t *line) {
     const char *gap = "";
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
             const field_words_t *word = &words[field];
-            char number[TEXT_CELL];
-            text_number(decoded->value[field], word->digits, word->unit, number);
-            (void)fprintf(out, "%s%s%s%s", gap, word->label, (word->label[0] == '\0') ? "" : " ", number);
+            IWN_TEXT_JOIN(line, gap, word->label, (word->label[0] == '\0') ? "" : " ");
+            text_add_number(line, decoded->value[field], word->digits);
+            IWN_TEXT_JOIN(line, (word->unit[0] == '\0') ? "" : " ", word->unit);
             gap = ", ";
         }
     }

@@ -5,8 +5,7 @@
 
 #include "iwheel/codec.h"
 #include "iwheel/config.h"
-
-#include <stdio.h>
+#include "iwheel_northbound/text.h"
 
 /// Every value that any of the eleven messages carries; the columns of the CSV, in this order.
 typedef enum {
@@ -45,6 +44,6 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
 const char *field_column(field_t field);
 
 /// "battery 24.8 V, ..." : all values for people.
-void field_print_all(const decoded_t *decoded, FILE *out);
+void field_add_all(const decoded_t *decoded, iwn_text_t *line);
 
 #endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "frame.h"
 
-#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,24 +9,65 @@ const char *frame_direction(const candump_t *frame) {
     return (frame->mark == CANDUMP_SENT) ? "T" : (frame->mark == CANDUMP_RECEIVED) ? "R" : "";
 }
 
-void frame_print_bytes(const candump_t *frame, const char *gap) {
+void frame_add_id(const candump_t *frame, iwn_text_t *line) {
+    unsigned digits = frame->extended ? 8U : 3U;
+    while (digits < 8U && frame->id >> 4U * digits != 0U) {
+        digits++;
+    }
+    iwn_text_hex(line, frame->id, digits);
+}
+
+void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) {
     for (size_t i = 0; i < frame->length && !frame->remote; i++) {
-        (void)printf("%s%02X", (i > 0U) ? gap : "", frame->data[i]);
+        iwn_text_add(line, (i > 0U) ? gap : "");
+        iwn_text_hex(line, frame->data[i], 2U);
     }
 }
 
+static void add_blanks(iwn_text_t *line, size_t count) {
+    static const char blanks[] = "            ";
+    iwn_text_span(line, blanks, (count < sizeof blanks - 1U) ? count : sizeof blanks - 1U);
+}
+
+/// Padded to so many columns: on its right, or on its left.
+static void add_cell(iwn_text_t *line, const char *text, size_t columns, bool to_the_right) {
+    const size_t length = strlen(text);
+    const size_t blanks = (length < columns) ? columns - length : 0U;
+    add_blanks(line, to_the_right ? blanks : 0U);
+    iwn_text_span(line, text, length);
+    add_blanks(line, to_the_right ? 0U : blanks);
+}
+
+static void add_undecoded(iwn_text_t *line, const candump_t *frame) {
+    IWN_TEXT_JOIN(line, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
+    iwn_text_int(line, frame->length);
+    IWN_TEXT_JOIN(line, (frame->length == 1U) ? " byte" : " bytes", (frame->length > 0U && !frame->remote) ? ": " : "");
+    frame_add_bytes(frame, " ", line);
+}
+
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded) {
-    (void)printf("%12s  %4" PRIu32 " (0x%0*" PRIX32 ")%-2s %-5s %-8s  ", time_text, frame->id, frame->extended ? 8 : 3,
-                 frame->id, (frame->mark == CANDUMP_SENT) ? " T" : "", decoded->wheel, decoded->message);
+    char text[FRAME_LINE_SIZE];
+    char id[IWN_DIGITS_MAX + 1U] = "";
+    iwn_text_t line = iwn_text_begin(text, sizeof text);
+    add_cell(&line, time_text, 12U, true);
+    iwn_text_add(&line, "  ");
+    add_cell(&line, iwn_digits(frame->id, &id[IWN_DIGITS_MAX]), 4U, true);
+    iwn_text_add(&line, " (0x");
+    frame_add_id(frame, &line);
+    iwn_text_add(&line, (frame->mark == CANDUMP_SENT) ? ") T " : ")   ");
+    add_cell(&line, decoded->wheel, 6U, false);
+    add_cell(&line, decoded->message, 8U, false);
+    iwn_text_add(&line, "  ");
     if (decoded->present != 0U) {
-        field_print_all(decoded, stdout);
+        field_add_all(decoded, &line);
     } else {
-        (void)printf("%s%s%u byte%s%s", frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "", frame->length,
-                     (frame->length == 1U) ? "" : "s", (frame->length > 0U && !frame->remote) ? ": " : "");
-        frame_print_bytes(frame, " ");
+        add_undecoded(&line, frame);
     }
-    (void)printf("%s%s%s\n", (decoded->note[0] != '\0') ? " (" : "", decoded->note,
-                 (decoded->note[0] != '\0') ? ")" : "");
+    if (decoded->note[0] != '\0') {
+        IWN_TEXT_JOIN(&line, " (", decoded->note, ")");
+    }
+    iwn_text_add(&line, "\n");
+    (void)fwrite(text, 1, line.length, stdout);
 }
 
 /// Hexadecimal text as bytes.

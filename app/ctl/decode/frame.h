@@ -11,8 +11,14 @@
 /// "T", "R", or "" if the recording does not tell.
 const char *frame_direction(const candump_t *frame);
 
+/// Room for every line of a frame, with its newline and terminator.
+#define FRAME_LINE_SIZE 1024U
+
+/// The id in hexadecimal: 3 digits, or 8 of an extended one.
+void frame_add_id(const candump_t *frame, iwn_text_t *line);
+
 /// The data in hexadecimal, with `gap` between the bytes.
-void frame_print_bytes(const candump_t *frame, const char *gap);
+void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line);
 
 /// Time (of any form, 12 columns), id, who sent it, and the values; of a frame without any, its bytes.
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded);

@@ -5,13 +5,17 @@
 #include "talk/ctl.h"
 #include "text/ctl_text.h"
 
+#include "iwheel_northbound/json_out.h"
+
+#include <assert.h>
 #include <inttypes.h>
-#include <jansson.h>
 #include <stdio.h>
 #include <string.h>
 
 /// A time before this is not one since 1970.
 #define CALENDAR_US 1000000000000000
+/// Decimals of a time.
+#define SECOND_DIGITS 6U
 
 typedef struct {
     const char *path;
@@ -50,11 +54,8 @@ static void write_text(decode_t *self, const candump_t *frame, const decoded_t *
         self->begin_us = frame->time_us;
         write_begin(self, frame);
     }
-    const int64_t since_us = frame->time_us - self->begin_us;
-    const int64_t size_us = (since_us < 0) ? -since_us : since_us;
-    char time_text[32];
-    (void)snprintf(time_text, sizeof time_text, "%s%" PRId64 ".%06" PRId64, (since_us < 0) ? "-" : "",
-                   size_us / 1000000, size_us % 1000000);
+    char time_text[TEXT_CELL];
+    text_number(frame->time_us - self->begin_us, SECOND_DIGITS, "", time_text);
     frame_print(time_text, frame, decoded);
 }
 
@@ -67,62 +68,77 @@ static void write_csv_header(void) {
 }
 
 static void write_csv(const candump_t *frame, const decoded_t *decoded) {
+    static const char commas[] = ",,,,,,,,,,,,,,,,,"; // One for each field.
+    static_assert(sizeof commas - 1U == FIELDS, "");
+    char text[FRAME_LINE_SIZE];
     char name[CANDUMP_INTERFACE_SIZE];
+    iwn_text_t line = iwn_text_begin(text, sizeof text);
     for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would be another column.
         const char c = frame->interface[i];
         name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
-    (void)printf("%" PRId64 ".%06" PRId64 ",%s,%s,%" PRIu32 ",0x%0*" PRIX32 ",%u,", frame->time_us / 1000000,
-                 frame->time_us % 1000000, name, frame_direction(frame), frame->id, frame->extended ? 8 : 3, frame->id,
-                 frame->length);
-    frame_print_bytes(frame, "");
-    (void)printf(",%s,%s", decoded->wheel, decoded->message);
+    text_add_number(&line, frame->time_us, SECOND_DIGITS);
+    IWN_TEXT_JOIN(&line, ",", name, ",", frame_direction(frame), ",");
+    iwn_text_int(&line, frame->id);
+    iwn_text_add(&line, ",0x");
+    frame_add_id(frame, &line);
+    iwn_text_add(&line, ",");
+    iwn_text_int(&line, frame->length);
+    iwn_text_add(&line, ",");
+    frame_add_bytes(frame, "", &line);
+    IWN_TEXT_JOIN(&line, ",", decoded->wheel, ",", decoded->message);
+    size_t empty = 0;
     for (unsigned field = 0; field < FIELDS; field++) {
+        empty++;
         if ((decoded->present & (1U << field)) != 0U) {
-            (void)printf(",%" PRId32, decoded->value[field]);
-        } else {
-            (void)putchar(',');
+            iwn_text_span(&line, commas, empty);
+            iwn_text_int(&line, decoded->value[field]);
+            empty = 0;
         }
     }
-    (void)printf(",\"%s\"\n", decoded->note);
+    iwn_text_span(&line, commas, empty);
+    IWN_TEXT_JOIN(&line, ",\"", decoded->note, "\"\n");
+    (void)fwrite(text, 1, line.length, stdout);
 }
 
-/// Text, or null if there is none or it is not UTF-8.
-static json_t *text_or_null(const char *text) {
-    json_t *value = (text[0] != '\0') ? json_string(text) : NULL;
-    return (value != NULL) ? value : json_null();
-}
-
-static json_t *bytes_of(const candump_t *frame) {
-    char data[2U * CANDUMP_DATA_MAX + 1U] = "";
-    for (size_t i = 0; i < frame->length && !frame->remote; i++) {
-        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
-    }
-    return json_string(data);
-}
-
-static json_t *values_of(const decoded_t *decoded) {
-    json_t *values = json_object();
-    for (unsigned field = 0; field < FIELDS; field++) {
-        if ((decoded->present & (1U << field)) != 0U) {
-            (void)json_object_set_new(values, field_column((field_t)field), json_integer(decoded->value[field]));
-        }
-    }
-    return values;
+/// Null if there is none.
+static const char *or_null(const char *text) {
+    return (text[0] != '\0') ? text : NULL;
 }
 
 /// One object: when and where, id and bytes, whose message it is, and under `values` what it carries, named as in the CSV.
-/// What is not known is null. False if there was no memory for it: nothing is written.
+/// What is not known is null. False if it does not fit: nothing is written.
 static bool write_json(const candump_t *frame, const decoded_t *decoded) {
-    json_t *line = json_pack(
-        "{s:I, s:o, s:o, s:I, s:b, s:b, s:b, s:i, s:o, s:o, s:s, s:o, s:o}", "t_us", (json_int_t)frame->time_us,
-        "interface", text_or_null(frame->interface), "direction", text_or_null(frame_direction(frame)), "id",
-        (json_int_t)frame->id, "extended", (int)frame->extended, "remote", (int)frame->remote, "fd", (int)frame->fd,
-        "dlc", (int)frame->length, "data", bytes_of(frame), "wheel", text_or_null(decoded->wheel), "message",
-        decoded->message, "values", values_of(decoded), "note", text_or_null(decoded->note));
-    const bool written = line != NULL && text_json_value(line, stdout);
-    json_decref(line);
-    return written;
+    char line[2U * FRAME_LINE_SIZE];
+    char data[2U * CANDUMP_DATA_MAX + 1U];
+    iwn_text_t bytes = iwn_text_begin(data, sizeof data);
+    iwn_out_t out;
+    frame_add_bytes(frame, "", &bytes);
+    iwn_out_init(&out, line, sizeof line);
+    iwn_out_open(&out, NULL, '{');
+    iwn_out_int(&out, "t_us", frame->time_us);
+    iwn_out_text(&out, "interface", or_null(frame->interface));
+    iwn_out_text(&out, "direction", or_null(frame_direction(frame)));
+    iwn_out_int(&out, "id", frame->id);
+    iwn_out_bool(&out, "extended", frame->extended);
+    iwn_out_bool(&out, "remote", frame->remote);
+    iwn_out_bool(&out, "fd", frame->fd);
+    iwn_out_int(&out, "dlc", frame->length);
+    iwn_out_text(&out, "data", data);
+    iwn_out_text(&out, "wheel", or_null(decoded->wheel));
+    iwn_out_text(&out, "message", decoded->message);
+    iwn_out_open(&out, "values", '{');
+    for (unsigned field = 0; field < FIELDS; field++) {
+        if ((decoded->present & (1U << field)) != 0U) {
+            iwn_out_int(&out, field_column((field_t)field), decoded->value[field]);
+        }
+    }
+    iwn_out_close(&out, '}');
+    iwn_out_text(&out, "note", or_null(decoded->note));
+    iwn_out_close(&out, '}');
+    const size_t length = iwn_out_finish(&out);
+    (void)fwrite(line, 1, length, stdout);
+    return length > 0U;
 }
 
 /// An exit code.
@@ -131,7 +147,7 @@ static int write_frame(decode_t *self, const candump_t *frame, bool json) {
     const iw_can_frame_t core = candump_to_core(frame);
     decode_fields(&core, &self->config, &decoded);
     if (json) {
-        return write_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "not enough memory for a line");
+        return write_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "a line is too long");
     }
     if (self->csv) {
         write_csv(frame, &decoded);

@@ -87,17 +87,29 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
 }
 
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]) {
+    iwn_text_t text = iwn_text_begin(out, TEXT_CELL);
+    text_add_number(&text, number, digits);
+    if (unit[0] != '\0') {
+        IWN_TEXT_JOIN(&text, " ", unit);
+    }
+}
+
+void text_add_number(iwn_text_t *text, long long number, unsigned digits) {
     unsigned long long scale = 1;
     for (unsigned i = 0; i < digits; i++) {
         scale *= 10U;
     }
+    if (digits == 0U) {
+        iwn_text_int(text, number);
+        return;
+    }
     const unsigned long long size = (number < 0) ? 0ULL - (unsigned long long)number : (unsigned long long)number;
-    const char *sign = (number < 0) ? "-" : "";
-    const char *gap = (unit[0] != '\0') ? " " : "";
-    if (digits == 0) {
-        (void)snprintf(out, TEXT_CELL, "%s%llu%s%s", sign, size, gap, unit);
-    } else {
-        (void)snprintf(out, TEXT_CELL, "%s%llu.%0*llu%s%s", sign, size / scale, (int)digits, size % scale, gap, unit);
+    iwn_text_add(text, (number < 0) ? "-" : "");
+    iwn_text_int(text, (int64_t)(size / scale));
+    iwn_text_span(text, ".", 1U);
+    while (scale > 1U) {
+        scale /= 10U;
+        iwn_text_span(text, &"0123456789"[size / scale % 10U], 1U);
     }
 }
 

@@ -4,6 +4,7 @@
 #define CTL_TEXT_H
 
 #include "iwheel/config.h"
+#include "iwheel_northbound/text.h"
 
 #include <jansson.h>
 #include <stdarg.h>
@@ -43,6 +44,9 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
 
 /// The same of a number that is known.
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]);
+
+/// The same without a unit, to a text.
+void text_add_number(iwn_text_t *text, long long number, unsigned digits);
 
 /// An age in ms in the unit that suits it: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is none.
 void text_age(const json_t *age_ms, char out[TEXT_CELL]);
