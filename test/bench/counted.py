@@ -16,6 +16,14 @@ INCLUDES = [CORE / "include", HERE / "codec"]
 FRAMES = 617
 COMPILERS = ("gcc", "clang")
 ARM_CPUS = ("cortex-m4", "cortex-m0plus")
+# Instructions for a line.
+READ_LIMITS = {
+    "libiwheel-client, an event `state`": 120000,
+    "the same, and its fields": 160000,
+    "iwheelctl decode": 5000,
+    "iwheelctl decode --csv": 5000,
+    "iwheelctl --json decode": 6000,
+}
 PROFILE_FROM = 40  # instructions of a function in a step
 
 
@@ -37,9 +45,9 @@ def codecs(work):
     }
 
 
-def host_instructions(program, what, rounds):
+def host_instructions(program, *arguments):
     run = subprocess.run(
-        ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), what, str(rounds)], capture_output=True, text=True, check=True
+        ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), *map(str, arguments)], capture_output=True, text=True, check=True
     )
     return int(re.search(r"Collected : (\d+)", run.stderr)[1])
 
@@ -185,6 +193,33 @@ def status_events(build):
     """{what of it is kept: instructions of one event `state` on this machine}, of the gateway as it was built there."""
     program, few, many = Path(build) / "test/bench_status", 20, 120
     return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("kept", "anew")}
+
+
+def client_reads(work, build, *fields):
+    """Instructions of libiwheel-client from the socket to one event `state`, or to its fields, system calls not counted."""
+    line = work / "state.jsonl"
+    told = subprocess.run([Path(build) / "test/bench_status", "line"], capture_output=True, check=True).stdout
+    line.write_bytes(next(row for row in told.splitlines(keepends=True) if row.startswith(b'{"event":"state"')))
+    program, few, many = Path(build) / "test/bench_client", 20, 120
+    return round((host_instructions(program, line, many, *fields) - host_instructions(program, line, few, *fields)) / (many - few))
+
+
+def decode_writes(work, build, form):
+    """Instructions of `iwheelctl decode` for a line of a recording."""
+    lines = [line for line in (ROOT / "test/recordings/estop.log").read_text().splitlines(keepends=True) if line.startswith("(")]
+    counts = []
+    for count in (500, 2000):
+        recording = work / f"recording-{count}.log"
+        recording.write_text("".join(lines[:count]))
+        counts.append(host_instructions(Path(build) / "app/ctl/iwheelctl", *form.split(), recording))
+    return round((counts[1] - counts[0]) / 1500)
+
+
+def read_lines(work, build):
+    """Rows of (what, instructions for a line, limit)."""
+    figures = {"libiwheel-client, an event `state`": client_reads(work, build), "the same, and its fields": client_reads(work, build, "fields")}
+    figures |= {f"iwheelctl {form}": decode_writes(work, build, form) for form in ("decode", "decode --csv", "--json decode")}
+    return [[what, str(figure), f"≤ {READ_LIMITS[what]}"] for what, figure in figures.items()]
 
 
 def everything(work, compiler):
