@@ -8,6 +8,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -49,7 +50,7 @@ void tearDown(void) {
         open_box = false;
     }
     (void)umount2(config.record.directory, MNT_DETACH);
-    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
+    (void)snprintf(command, sizeof command, "rm -rf %s /dev/shm/%s", folder, strrchr(folder, '/') + 1);
     TEST_ASSERT_EQUAL(0, system(command));
 }
 
@@ -330,17 +331,61 @@ static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
     }
 }
 
-/// The second number of recordings needs more than one pass over the directory.
-static void test_rotation_of_ten_thousand_recordings_keeps_motion(void) {
-    const int directory = gw_box_files_open(config.record.directory);
+/// The record directory in memory, for tests of very many files.
+static int open_in_memory(void) {
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "/dev/shm/%s", strrchr(folder, '/') + 1);
+    return gw_box_files_open(config.record.directory);
+}
+
+static unsigned long calls; // That read an entry of a directory, or the state of a file.
+
+struct dirent *__wrap_readdir(DIR *list);
+struct dirent *__real_readdir(DIR *list);
+int __wrap_fstatat(int directory, const char *name, struct stat *out_status, int flags);
+int __real_fstatat(int directory, const char *name, struct stat *out_status, int flags);
+
+struct dirent *__wrap_readdir(DIR *list) {
+    calls++;
+    return __real_readdir(list);
+}
+
+int __wrap_fstatat(int directory, const char *name, struct stat *out_status, int flags) {
+    calls++;
+    return __real_fstatat(directory, name, out_status, flags);
+}
+
+/// Two passes read each entry, and the first the state of each file.
+static void test_rotation_costs_each_recording_the_same(void) {
+    static const unsigned counts[] = {32, 1000, 10000};
+    const int directory = open_in_memory();
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+        for (unsigned number = 1; number <= counts[i]; number++) {
+            for (unsigned ending = 0; ending < GW_BOX_ENDINGS; ending++) {
+                char name[64];
+                (void)snprintf(name, sizeof name, "stop-%06u-made%s", number, gw_box_endings[ending]);
+                const int fd = openat(directory, name, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+                TEST_ASSERT_GREATER_OR_EQUAL(0, close(fd));
+            }
+        }
+        calls = 0;
+        gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, counts[i] + 1U, true});
+        TEST_ASSERT_LESS_OR_EQUAL(9UL * counts[i] + 100UL, calls);
+        TEST_ASSERT_EQUAL(8U * GW_BOX_ENDINGS, count_files());
+    }
+    (void)close(directory);
+}
+
+/// They need more than one pass over the directory.
+static void test_rotation_of_33000_recordings_keeps_motion(void) {
+    const int directory = open_in_memory();
     make_recordings(1, 3, 500);
-    make_recordings(4, 10000, 0);
-    gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, 10000, false});
+    make_recordings(4, 33000, 0);
+    gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, 33000, false});
     TEST_ASSERT_EQUAL(8, count_files());
     TEST_ASSERT_TRUE(is_there("stop-000001-made.jsonl"));
     TEST_ASSERT_TRUE(is_there("stop-000003-made.jsonl"));
-    TEST_ASSERT_FALSE(is_there("stop-009995-made.jsonl"));
-    TEST_ASSERT_TRUE(is_there("stop-009996-made.jsonl"));
+    TEST_ASSERT_FALSE(is_there("stop-032995-made.jsonl"));
+    TEST_ASSERT_TRUE(is_there("stop-032996-made.jsonl"));
     (void)close(directory);
 }
 
@@ -588,7 +633,8 @@ int main(void) {
     RUN_TEST(test_harmless_stops_keep_recordings_of_motion);
     RUN_TEST(test_wheel_that_turns_without_command_is_motion);
     RUN_TEST(test_recordings_of_earlier_versions_are_judged_by_command);
-    RUN_TEST(test_rotation_of_ten_thousand_recordings_keeps_motion);
+    RUN_TEST(test_rotation_costs_each_recording_the_same);
+    RUN_TEST(test_rotation_of_33000_recordings_keeps_motion);
     RUN_TEST(test_recording_of_a_single_file_can_be_dropped);
     RUN_TEST(test_reserve_that_cannot_be_allocated_leaves_no_file);
     RUN_TEST(test_full_disk_costs_harmless_recordings_first);

@@ -120,11 +120,11 @@ static void take_file(int directory, const char *name, void *context) {
     survey_t *survey = (survey_t *)context;
     struct stat status;
     const uint32_t number = number_of(name);
-    if (number == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
+    if (number != 0U && survey->files == GW_BOX_SURVEYED) {
+        survey->partial = true;
         return;
     }
-    if (survey->files == GW_BOX_SURVEYED) {
-        survey->partial = true;
+    if (number == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
         return;
     }
     found_t *file = &survey->file[survey->files++];

@@ -32,8 +32,9 @@ int gw_box_files_open(const char *directory);
 /// The number after the highest there is.
 uint32_t gw_box_files_next(int directory);
 
-/// Files that one pass over the directory looks at; more take more passes.
-#define GW_BOX_SURVEYED 8192U
+/// Files that one pass over the directory looks at, those of 10,900 recordings; more take more passes. Memory is used for files that
+/// are there only.
+#define GW_BOX_SURVEYED 32768U
 
 /// What may stay in the directory, and what may be removed for it.
 typedef struct {
