@@ -44,10 +44,10 @@ static bool jansson_takes(const char *text, size_t length) {
 }
 
 static void compare(const char *text, size_t length) {
-    if (iwc_json_is_object(text, length) != jansson_takes(text, length)) {
+    if (iwc_json_is_object(text, length, false) != jansson_takes(text, length)) {
         char why[200];
         (void)snprintf(why, sizeof why, "%.*s", (length < 190) ? (int)length : 190, text);
-        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length), why);
+        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length, false), why);
     }
 }
 
@@ -66,7 +66,7 @@ static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
             memcpy(text, STATUS, sizeof(STATUS));
             text[at] = bytes[i];
             compare(text, sizeof(STATUS) - 1U);
-            taken += iwc_json_is_object(text, sizeof(STATUS) - 1U) ? 1U : 0U;
+            taken += iwc_json_is_object(text, sizeof(STATUS) - 1U, false) ? 1U : 0U;
         }
     }
     TEST_ASSERT_GREATER_THAN(1000, taken); // Both sides saw good ones too.
@@ -132,7 +132,7 @@ static void test_json_a_nul_stands_nowhere(void) {
     for (size_t at = 0; at < sizeof(STATUS); at++) {
         memcpy(text, STATUS, sizeof(STATUS));
         text[at] = '\0';
-        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U)));
+        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U), false));
     }
 }
 
@@ -143,7 +143,7 @@ static void test_json_depth_is_bounded(void) {
         memset(text + 5, '[', depth);
         memset(text + 5 + depth, ']', depth);
         text[5 + 2U * depth] = '}';
-        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth));
+        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth, false));
     }
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
@@ -155,7 +155,7 @@ static void test_json_many_keys_cost_no_more_than_their_length(void) {
         used += (size_t)snprintf(text + used, sizeof text - used, ",\"%x\":0", i + 0x10U);
     }
     used += (size_t)snprintf(text + used, sizeof text - used, ",\"a\":2}");
-    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are remembered to the end.
+    TEST_ASSERT_FALSE(iwc_json_is_object(text, used, false)); // The first keys are remembered to the end.
 }
 
 static void test_field_integers_are_whole_and_fit(void) {

@@ -107,28 +107,10 @@ static int judge_rights(bridge_link_t *self) {
     return 0;
 }
 
-static void write_watch(bridge_link_t *self, char request[WATCH_SIZE]) {
+static void write_watch(const bridge_link_t *self, char request[WATCH_SIZE]) {
     (void)snprintf(request, WATCH_SIZE,
                    "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}",
                    self->terms.rate_hz);
-    self->asked_hz = self->terms.rate_hz;
-}
-
-static void take_rate(void *context, const iwc_message_t *reply) {
-    bridge_link_t *self = context;
-    if (reply == NULL) {
-        self->asked_hz = 0; // Asked again.
-    }
-}
-
-static void ask_rate(bridge_link_t *self) {
-    char request[WATCH_SIZE];
-    if (self->state == BRIDGE_LINK_HERE && self->asked_hz != self->terms.rate_hz) {
-        write_watch(self, request);
-        if (!bridge_link_ask(self, request, take_rate, self, self->now_us)) {
-            self->asked_hz = 0;
-        }
-    }
 }
 
 static void subscribe(bridge_link_t *self) {
@@ -216,7 +198,6 @@ int bridge_link_step(bridge_link_t *self, uint64_t now_us) {
     if (self->line.state == BRIDGE_HERE) {
         listen_now(self);
     }
-    ask_rate(self);
     send_waiting(self);
     give_up(self);
     return 0;
@@ -228,15 +209,10 @@ uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us) {
     if (self->count > 0U && self->waits[0].until_us < next_us) {
         next_us = self->waits[0].until_us;
     }
-    if (self->state == BRIDGE_LINK_HERE && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX &&
-        (self->count > 0U || self->asked_hz != self->terms.rate_hz)) {
+    if (self->state == BRIDGE_LINK_HERE && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
         return now_us;
     }
     return (stop_us < next_us) ? stop_us : next_us;
-}
-
-void bridge_link_rate(bridge_link_t *self, unsigned rate_hz) {
-    self->terms.rate_hz = rate_hz;
 }
 
 int bridge_link_fd(const bridge_link_t *self) {
@@ -255,6 +231,17 @@ bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t a
     *question = (bridge_question_t){.until_us = now_us + BRIDGE_ANSWER_US, .answer = answer, .context = context};
     (void)snprintf(question->request, sizeof question->request, "%s", request);
     return true;
+}
+
+void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us) {
+    const unsigned before_hz = self->terms.rate_hz;
+    char request[WATCH_SIZE];
+    self->terms.rate_hz = rate_hz;
+    write_watch(self, request);
+    if (rate_hz != before_hz && self->state == BRIDGE_LINK_HERE &&
+        !bridge_link_ask(self, request, NULL, NULL, now_us)) {
+        self->terms.rate_hz = before_hz; // The next call tries again.
+    }
 }
 
 void bridge_link_forget(bridge_link_t *self, const void *context) {

@@ -53,7 +53,6 @@ typedef struct {
     bridge_link_state_t state;
     uint64_t try_us;    ///< When to connect next.
     uint64_t wait_us;   ///< Between two tries.
-    unsigned asked_hz;  ///< The rate that the gateway was asked for last; 0: it must be asked.
     uint64_t denied_us; ///< Since when the socket may not be used; 0: it may.
     uint64_t connections;
     uint64_t random;
@@ -72,8 +71,8 @@ int bridge_link_step(bridge_link_t *self, uint64_t now_us);
 /// When `step` has something to do, if no byte comes.
 uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us);
 
-/// Changes the rate of the event `state`; the next `step` asks the gateway for it.
-void bridge_link_rate(bridge_link_t *self, unsigned rate_hz);
+/// Asks for another rate of the event `state`, if it is another one.
+void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us);
 
 /// For poll(): readable when `step` has something to do. It stands for all connections to the gateway, those of lease.h too.
 int bridge_link_fd(const bridge_link_t *self);

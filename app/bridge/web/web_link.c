@@ -119,12 +119,12 @@ void web_link_close(web_link_t *self) {
 
 void web_link_look(web_link_t *self, uint64_t now_us) {
     self->looked_us = now_us;
-    bridge_link_rate(&self->gateway, self->rate_hz);
+    bridge_link_rate(&self->gateway, self->rate_hz, now_us);
 }
 
 int web_link_step(web_link_t *self, uint64_t now_us) {
     if (now_us - self->looked_us > LOOKED_US && self->rate_hz > IDLE_HZ) {
-        bridge_link_rate(&self->gateway, IDLE_HZ);
+        bridge_link_rate(&self->gateway, IDLE_HZ, now_us);
     }
     const int code = bridge_link_step(&self->gateway, now_us);
     bridge_lease_step(&self->lease, now_us);

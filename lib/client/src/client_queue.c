@@ -7,6 +7,7 @@
 #define KINDS_MAX 128U
 /// In the place of a line's first byte: nobody will ask for it.
 #define STRUCK '\0'
+static const char EVENT[] = "{\"event\":";
 /// A `lost` event is only a number, which is added up.
 #define KIND_LOST UINT64_C(0)
 
@@ -49,36 +50,16 @@ static bool admit_reply(iwc_t *self, iwc_span_t line) {
     return !has_id || is_odd(id);
 }
 
-/// Its shape, if it is well formed and begins as the gateway's events do; 0: it must be judged in full.
-static uint64_t shape_of(iwc_span_t line) {
-    static const char begin[] = "{\"event\":";
-    const size_t length = sizeof begin - 1U;
-    uint64_t shape = 0;
-    const bool good =
-        line.length > length && memcmp(line.at, begin, length) == 0 && iwc_json_shape(line, &shape) && shape != 0U;
-    return good ? shape : 0U;
-}
-
-/// False: it is no message. Events of one shape have the same names, so that only the first of them is judged name by name.
+/// False: it is no message. In a line that begins as the gateway's events do names are not compared.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
-    if (line.length > IWC_LINE_MAX) {
+    const bool begins = line.length > sizeof EVENT && memcmp(line.at, EVENT, sizeof EVENT - 1U) == 0;
+    if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, begins)) {
         return false;
     }
-    const uint64_t shape = shape_of(line);
-    uint64_t *const known = &self->shapes[shape % IWC_SHAPES];
-    if (shape != 0U && *known == shape) {
-        return true;
-    }
-    if (!iwc_json_is_object(line.at, line.length)) {
-        return false;
-    }
-    const bool is_event = iwc_json_find(line, "event").at != NULL;
-    const bool is_reply = iwc_json_find(line, "ok").at != NULL;
+    const bool is_event = begins || iwc_json_find(line, "event").at != NULL;
+    const bool is_reply = !begins && iwc_json_find(line, "ok").at != NULL;
     if (is_reply && !is_event && !admit_reply(self, line)) {
         self->in[line.at - self->in] = STRUCK;
-    }
-    if (is_event && !is_reply) {
-        *known = shape;
     }
     return is_event != is_reply;
 }

@@ -18,9 +18,6 @@
 /// Room for two lines that are kept, one that is coming, and one to read into.
 #define IWC_IN_SIZE (4U * ((size_t)IWC_LINE_MAX + 1U))
 
-/// Of events that come often: `state`, `force`, `frame` and one more.
-#define IWC_SHAPES 4U
-
 struct iwc {
     int fd;            ///< -1: closed; what came before may still be taken.
     pid_t owner;       ///< The process that connected: a forked child may not speak for it.
@@ -35,7 +32,6 @@ struct iwc {
     int64_t awaited;  ///< The id that a call waits for; 0: none.
     size_t answer;    ///< The length of the answer to it in `line`; 0: not there yet.
     int64_t driven[IWC_DRIVES_MAX]; ///< Ids of drive commands without reply; 0: free.
-    uint64_t shapes[IWC_SHAPES];    ///< Of events that were judged in full, each at its remainder; 0: none.
     uint64_t skipped;               ///< Events left out since the last message that was taken.
     size_t begin;
     size_t whole;

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#define WALK(walk, key) iwc_json_walk((walk), (key), sizeof(key) - 1U)
+
 static iwc_span_t field(const iwc_message_t *message, const char *path) {
     return iwc_json_find((iwc_span_t){message->text, message->length}, path);
 }
@@ -79,20 +81,20 @@ const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out
 static void read_wheel(iwc_span_t span, iwc_wheel_t *out_wheel) {
     iwc_walk_t wheel = {span, NULL};
     memset(out_wheel, 0, sizeof *out_wheel);
-    out_wheel->heard = truth_of(iwc_json_walk(&wheel, "heard")).value == 1;
-    out_wheel->at_rest = truth_of(iwc_json_walk(&wheel, "at_rest"));
-    out_wheel->speed_mm_s = integer_of(iwc_json_walk(&wheel, "speed_mm_s"));
-    out_wheel->commanded_mm_s = integer_of(iwc_json_walk(&wheel, "commanded_mm_s"));
-    out_wheel->applied_mm_s = integer_of(iwc_json_walk(&wheel, "applied_mm_s"));
-    out_wheel->speed_age_ms = integer_of(iwc_json_walk(&wheel, "speed_age_ms"));
-    out_wheel->battery_dV = integer_of(iwc_json_walk(&wheel, "battery_dV"));
-    out_wheel->temperature_degC = integer_of(iwc_json_walk(&wheel, "temperature_degC"));
-    out_wheel->distance_mm = integer_of(iwc_json_walk(&wheel, "distance_mm"));
-    const iwc_value_t force_net_mN = integer_of(iwc_json_walk(&wheel, "force_net_mN"));
-    if (iwc_json_is_text(iwc_json_walk(&wheel, "force_validity"), "valid")) {
+    out_wheel->heard = truth_of(WALK(&wheel, "heard")).value == 1;
+    out_wheel->at_rest = truth_of(WALK(&wheel, "at_rest"));
+    out_wheel->speed_mm_s = integer_of(WALK(&wheel, "speed_mm_s"));
+    out_wheel->commanded_mm_s = integer_of(WALK(&wheel, "commanded_mm_s"));
+    out_wheel->applied_mm_s = integer_of(WALK(&wheel, "applied_mm_s"));
+    out_wheel->speed_age_ms = integer_of(WALK(&wheel, "speed_age_ms"));
+    out_wheel->battery_dV = integer_of(WALK(&wheel, "battery_dV"));
+    out_wheel->temperature_degC = integer_of(WALK(&wheel, "temperature_degC"));
+    out_wheel->distance_mm = integer_of(WALK(&wheel, "distance_mm"));
+    const iwc_value_t force_net_mN = integer_of(WALK(&wheel, "force_net_mN"));
+    if (iwc_json_is_text(WALK(&wheel, "force_validity"), "valid")) {
         out_wheel->force_net_mN = force_net_mN;
     }
-    out_wheel->force_age_ms = integer_of(iwc_json_walk(&wheel, "force_age_ms"));
+    out_wheel->force_age_ms = integer_of(WALK(&wheel, "force_age_ms"));
 }
 
 static iwc_machine_t machine_of(iwc_span_t state) {
@@ -108,14 +110,14 @@ static iwc_machine_t machine_of(iwc_span_t state) {
 
 bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state) {
     iwc_walk_t snapshot = {{message->text, message->length}, NULL};
-    const iwc_span_t t_us = iwc_json_walk(&snapshot, "t_us");
-    const iwc_span_t state = iwc_json_walk(&snapshot, "state");
-    const iwc_span_t cause = iwc_json_walk(&snapshot, "cause");
-    iwc_walk_t lease = {iwc_json_walk(&snapshot, "lease"), NULL};
-    iwc_walk_t bus = {iwc_json_walk(&snapshot, "bus"), NULL};
-    iwc_walk_t estop = {iwc_json_walk(&snapshot, "estop"), NULL};
-    const iwc_span_t left = iwc_json_walk(&snapshot, "left");
-    const iwc_span_t right = iwc_json_walk(&snapshot, "right");
+    const iwc_span_t t_us = WALK(&snapshot, "t_us");
+    const iwc_span_t state = WALK(&snapshot, "state");
+    const iwc_span_t cause = WALK(&snapshot, "cause");
+    iwc_walk_t lease = {WALK(&snapshot, "lease"), NULL};
+    iwc_walk_t bus = {WALK(&snapshot, "bus"), NULL};
+    iwc_walk_t estop = {WALK(&snapshot, "estop"), NULL};
+    const iwc_span_t left = WALK(&snapshot, "left");
+    const iwc_span_t right = WALK(&snapshot, "right");
     if (left.at == NULL || right.at == NULL || lease.object.at == NULL || state.at == NULL) {
         return false;
     }
@@ -123,11 +125,11 @@ bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out
     out_state->t_us = integer_of(t_us).value;
     out_state->machine = machine_of(state);
     (void)text_of(cause, out_state->cause, sizeof out_state->cause);
-    out_state->holder = integer_of(iwc_json_walk(&lease, "holder"));
+    out_state->holder = integer_of(WALK(&lease, "holder"));
     out_state->ours = out_state->holder.known && self->number != 0 && out_state->holder.value == self->number;
-    out_state->remaining_ms = integer_of(iwc_json_walk(&lease, "remaining_ms"));
-    out_state->estop_released = iwc_json_is_text(iwc_json_walk(&estop, "state"), "released");
-    out_state->bus_active = iwc_json_is_text(iwc_json_walk(&bus, "state"), "active");
+    out_state->remaining_ms = integer_of(WALK(&lease, "remaining_ms"));
+    out_state->estop_released = iwc_json_is_text(WALK(&estop, "state"), "released");
+    out_state->bus_active = iwc_json_is_text(WALK(&bus, "state"), "active");
     read_wheel(left, &out_state->left);
     read_wheel(right, &out_state->right);
     return true;

@@ -12,11 +12,8 @@ typedef struct {
     size_t length;
 } iwc_span_t;
 
-/// True if the text is one object and nothing else but blanks.
-bool iwc_json_is_object(const char *text, size_t length);
-
-/// As `iwn_json_shape`.
-bool iwc_json_shape(iwc_span_t text, uint64_t *out_shape);
+/// True if the text is one object and nothing else but blanks. A trusted one may have a name twice.
+bool iwc_json_is_object(const char *text, size_t length, bool trusted);
 
 /// The value at a path of keys, "left.speed_mm_s", in an object for which `iwc_json_is_object` holds; keys are compared as written.
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
@@ -27,8 +24,8 @@ typedef struct {
     const char *rest; ///< NULL: nothing is read yet.
 } iwc_walk_t;
 
-/// The value at a key of its own, as `iwc_json_find`.
-iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key);
+/// The value at a key of its own, as `iwc_json_find`; of one that is there twice either.
+iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length);
 
 /// True if the value is exactly that text, as written between its quotes.
 bool iwc_json_is_text(iwc_span_t value, const char *text);

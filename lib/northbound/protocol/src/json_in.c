@@ -7,8 +7,7 @@
 
 typedef struct {
     iwn_scan_t scan;
-    uint16_t *name_at; ///< NULL: names are not compared but go into `shape`, with the brackets around them.
-    uint64_t shape;
+    uint16_t *name_at;             ///< NULL: names are not compared.
     unsigned names;                ///< Of all objects that are open.
     uint16_t first[IWN_DEPTH_MAX]; ///< The first of them, per object.
     bool is_list[IWN_DEPTH_MAX];
@@ -25,43 +24,11 @@ static bool fail(check_t *self, const char *what) {
 static int compare_names(const char *one, const char *other) {
     uint32_t a;
     uint32_t b;
-    while (*one == *other && *one != '"' && *one != '\\') { // UTF-8 is in the order of what it means.
-        one++;
-        other++;
-    }
-    if (*one != '\\' && *other != '\\') {
-        a = (*one == '"') ? 0U : (unsigned char)*one;
-        b = (*other == '"') ? 0U : (unsigned char)*other;
-        return (int)a - (int)b;
-    }
     do {
         a = iwn_scan_character(&one);
         b = iwn_scan_character(&other);
     } while (a == b && a != 0U);
     return (a < b) ? -1 : (a > b) ? 1 : 0;
-}
-
-static void mix(check_t *self, uint64_t word) {
-    self->shape = (self->shape ^ word) * UINT64_C(0x9E3779B97F4A7C15);
-    self->shape ^= self->shape >> 32;
-}
-
-/// The token with its quotes, a word at a time; the last one overlaps the one before.
-static void mix_name(check_t *self) {
-    const char *at = self->scan.token;
-    const char *const end = self->scan.at;
-    uint64_t word = 0;
-    if (end - at < (ptrdiff_t)sizeof word) {
-        memcpy(&word, at, (size_t)(end - at));
-        mix(self, word);
-        return;
-    }
-    for (; end - at > (ptrdiff_t)sizeof word; at += sizeof word) {
-        memcpy(&word, at, sizeof word);
-        mix(self, word);
-    }
-    memcpy(&word, end - sizeof word, sizeof word);
-    mix(self, word);
 }
 
 /// Puts the token among the names of its object. False, and that is told, if it is there already.
@@ -97,9 +64,7 @@ static bool check_name(check_t *self, int *token) {
     if (self->scan.has_nul) {
         return fail(self, "NUL byte in object key not supported");
     }
-    if (self->name_at == NULL) {
-        mix_name(self);
-    } else if (!add_name(self)) {
+    if (self->name_at != NULL && !add_name(self)) {
         return false;
     }
     if (!iwn_scan_skip(&self->scan, ':') && iwn_scan(&self->scan) != ':') {
@@ -120,7 +85,6 @@ static int closing(const check_t *self) {
 static void close_container(check_t *self) {
     self->depth--;
     self->names = self->first[self->depth];
-    mix(self, self->depth);
 }
 
 /// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which closes it.
@@ -131,7 +95,6 @@ static bool open_container(check_t *self, int *token) {
     self->is_list[self->depth] = *token == '[';
     self->first[self->depth] = (uint16_t)self->names;
     self->depth++;
-    mix(self, self->depth);
     *token = iwn_scan(&self->scan);
     if (*token == closing(self)) {
         close_container(self);
@@ -177,33 +140,19 @@ static bool check_next(check_t *self) {
     return (in_list(self) || check_name(self, &token)) && check_value(self, token);
 }
 
-static bool check_text(check_t *self, size_t length, iwn_json_t *out_root) {
-    const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self->scan) : IWN_TOKEN_END;
-    if (token != '{' && token != '[') {
-        return fail(self, "'[' or '{' expected");
-    }
-    out_root->at = self->scan.token;
-    bool good = check_value(self, token);
-    while (good && self->depth > 0U) {
-        good = check_next(self);
-    }
-    return good && (iwn_scan(&self->scan) == IWN_TOKEN_END || fail(self, "end of file expected"));
-}
-
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
     check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault},
-                    .name_at = work->name_at};
-    return check_text(&self, length, out_root);
-}
-
-bool iwn_json_shape(const char *text, size_t length, uint64_t *out_shape) {
-    char reason[1]; // Nobody asks for it.
-    iwn_text_t fault = iwn_text_begin(reason, sizeof reason);
-    check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = &fault}};
-    iwn_json_t root;
-    const bool good = check_text(&self, length, &root);
-    *out_shape = self.shape;
-    return good;
+                    .name_at = (work != NULL) ? work->name_at : NULL};
+    const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
+    if (token != '{' && token != '[') {
+        return fail(&self, "'[' or '{' expected");
+    }
+    out_root->at = self.scan.token;
+    bool good = check_value(&self, token);
+    while (good && self.depth > 0U) {
+        good = check_next(&self);
+    }
+    return good && (iwn_scan(&self.scan) == IWN_TOKEN_END || fail(&self, "end of file expected"));
 }
 
 // Walking what has been checked ---------------------------------------------------------------------------------------
@@ -215,49 +164,28 @@ static const char *skip_blanks(const char *at) {
     return at;
 }
 
-/// What must be looked at when a value is skipped.
-static const bool is_special[256] = {
-    ['"'] = true, ['\\'] = true, ['{'] = true, ['['] = true, ['}'] = true, [']'] = true};
-
-static const char *skip_plain(const char *at) {
-    while (!is_special[(unsigned char)*at]) {
-        at++;
-    }
-    return at;
-}
-
 static const char *skip_text(const char *at) {
-    for (at = skip_plain(at + 1); *at != '"'; at = skip_plain(at + 1)) {
+    while (*++at != '"') {
         at += (*at == '\\') ? 1 : 0;
     }
     return at + 1;
 }
 
-/// From the bracket that opens an object or list to behind the one that closes it; a brace is a bracket with 0x20 added.
-static const char *skip_container(const char *at) {
+/// A brace is a bracket with 0x20 added.
+static const char *skip_value(const char *at) {
     unsigned depth = 0;
     do {
-        at = skip_plain(at);
         if (*at == '"') {
             at = skip_text(at);
-        } else {
-            depth += ((*at | 0x20) == '{') ? 1U : -1U;
-            at++;
+            continue;
+        }
+        depth += ((*at | 0x20) == '{') ? 1U : 0U;
+        depth -= ((*at | 0x20) == '}') ? 1U : 0U;
+        at++;
+        while (depth == 0U && *at > ' ' && *at != ',' && (*at | 0x20) != '}') {
+            at++; // Of a number or word.
         }
     } while (depth > 0U);
-    return at;
-}
-
-static const char *skip_value(const char *at) {
-    if (*at == '"') {
-        return skip_text(at);
-    }
-    if ((*at | 0x20) == '{') {
-        return skip_container(at);
-    }
-    while (*at > ' ' && *at != ',' && (*at | 0x20) != '}') {
-        at++;
-    }
     return at;
 }
 

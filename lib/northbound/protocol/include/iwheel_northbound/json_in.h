@@ -49,12 +49,8 @@ typedef struct {
 } iwn_json_t;
 
 /// True: the text, of at most IWN_JSON_MAX bytes, is one object or list, and `*out_root` is that. False: the reason is added to
-/// `fault`, in printable ASCII.
+/// `fault`, in printable ASCII. Without `work` a name may be there twice in an object: for what a trusted program has written.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
-
-/// As `iwn_json_check`, but a name may be there twice: for a text whose shape is that of one that `iwn_json_check` has passed. The shape
-/// is a hash of all names in their order and nesting.
-bool iwn_json_shape(const char *text, size_t length, uint64_t *out_shape);
 
 /// What it is, by its first bytes.
 iwn_json_kind_t iwn_json_kind(iwn_json_t value);
