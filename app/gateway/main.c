@@ -65,6 +65,7 @@ static void tell_start(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     gw_report_start(&daemon->config, wheels->hal.estop_ops->simulated, daemon->clients.listener[SOCK_WATCH].fd >= 0,
                     &daemon->log);
+    gw_report_room(iwl_hal_link(&wheels->hal), &daemon->log);
     for (uint32_t i = 0; i < wheels->warnings; i++) {
         sock_log(&daemon->log, SOCK_LOG_WARNING, "%s", wheels->warning[i]);
     }

@@ -53,6 +53,17 @@ void gw_report_start(const gateway_config_t *config, bool simulated, bool watche
     }
 }
 
+void gw_report_room(const iwl_bus_link_t *link, sock_log_t *log) {
+    static inspect_findings_t findings; // Too large for a stack.
+    char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
+    inspect_begin(&findings);
+    inspect_room(link, &findings);
+    if (findings.count > 0U) {
+        inspect_sentence(&findings.finding[0], sentence, sizeof sentence);
+        sock_log(log, (findings.finding[0].verdict == INSPECT_OK) ? SOCK_LOG_INFO : SOCK_LOG_WARNING, "%s", sentence);
+    }
+}
+
 void gw_report_unopened(const gateway_config_t *config, const char *cause, int error, FILE *err) {
     static inspect_findings_t findings; // Too large for a stack.
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];

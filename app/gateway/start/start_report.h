@@ -14,6 +14,9 @@ struct sock_log;
 /// watch by.
 void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct sock_log *log);
 
+/// The room for frames that the kernel has granted, and its consequence: to the log.
+void gw_report_room(const iwl_bus_link_t *link, struct sock_log *log);
+
 /// What the bus, the e-stop and a socket are to be, by the configuration.
 inspect_config_t gw_report_config(const struct gateway_config *config);
 iwl_estop_config_t gw_report_estop(const struct gateway_config *config);

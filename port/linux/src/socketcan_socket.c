@@ -63,6 +63,7 @@ int iwl_socketcan_socket_open(iwl_socketcan_socket_t *self, int interface, iwl_s
     }
     (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
     (void)set(fd, SOL_SOCKET, SO_RCVBUF, (int)IWL_LINK_ROOM_BYTES);
+    (void)set(fd, SOL_SOCKET, SO_RCVBUFFORCE, (int)IWL_LINK_ROOM_BYTES); // As root: beyond net.core.rmem_max.
     if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
         (void)close(fd);

@@ -51,7 +51,7 @@ typedef struct {
 #define IWL_LINK_QUEUE_MAX 4U
 
 /// Room that is asked for; granted, the kernel counts it twice (`room_bytes`), and each frame as about 780 bytes: half
-/// a second of a full bus. It gives no more than net.core.rmem_max, as a rule a twentieth of this.
+/// a second of a full bus. Without CAP_NET_ADMIN it gives no more than net.core.rmem_max, as a rule a twentieth of this.
 #define IWL_LINK_ROOM_BYTES (4U * 1024U * 1024U)
 
 /// What the link's timing is beside the wheels'.
