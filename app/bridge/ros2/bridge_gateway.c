@@ -146,9 +146,9 @@ static void take_reply(bridge_t *self, const iwc_message_t *reply) {
 void bridge_listen(bridge_t *self) {
     iwc_message_t message;
     bool fresh = false;
-    bool more = true; // Reads once; the descriptor stays readable if there is more than fits.
-    iwc_result_t result = IWC_TIMEOUT;
-    while (more && (result = iwc_next(self->gateway, 0, &message)) == IWC_OK) {
+    iwc_result_t result =
+        iwc_next(self->gateway, 0, &message); // Reads once; what does not fit leaves the descriptor readable.
+    while (result == IWC_OK) {
         if (!message.is_event) {
             take_reply(self, &message);
         } else if (iwc_is(&message, "event", "state")) {
@@ -159,7 +159,10 @@ void bridge_listen(bridge_t *self) {
         } else if (iwc_is(&message, "event", "ledger")) {
             self->assumptions_due = true;
         }
-        more = iwc_pending(self->gateway);
+        if (!iwc_pending(self->gateway)) {
+            break;
+        }
+        result = iwc_next(self->gateway, 0, &message);
     }
     if (result != IWC_OK && result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
         bridge_lose(self, "it has ended, or closed the connection");

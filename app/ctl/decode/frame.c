@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define CELL_MAX 12U
+
 const char *frame_direction(const candump_t *frame) {
     return (frame->mark == CANDUMP_SENT) ? "T" : (frame->mark == CANDUMP_RECEIVED) ? "R" : "";
 }
@@ -24,18 +26,14 @@ void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) 
     }
 }
 
-static void add_blanks(iwn_text_t *line, size_t count) {
-    static const char blanks[] = "            ";
-    iwn_text_span(line, blanks, (count < sizeof blanks - 1U) ? count : sizeof blanks - 1U);
-}
-
-/// Padded to so many columns: on its right, or on its left.
+/// Padded to so many columns, at most CELL_MAX, on its right or on its left.
 static void add_cell(iwn_text_t *line, const char *text, size_t columns, bool to_the_right) {
+    static const char blanks[CELL_MAX + 1U] = "            ";
     const size_t length = strlen(text);
-    const size_t blanks = (length < columns) ? columns - length : 0U;
-    add_blanks(line, to_the_right ? blanks : 0U);
+    const size_t gap = (length < columns) ? columns - length : 0U;
+    iwn_text_span(line, blanks, to_the_right ? gap : 0U);
     iwn_text_span(line, text, length);
-    add_blanks(line, to_the_right ? 0U : blanks);
+    iwn_text_span(line, blanks, to_the_right ? 0U : gap);
 }
 
 static void add_undecoded(iwn_text_t *line, const candump_t *frame) {
@@ -49,7 +47,7 @@ void frame_print(const char *time_text, const candump_t *frame, const decoded_t 
     char text[FRAME_LINE_SIZE];
     char id[IWN_DIGITS_MAX + 1U] = "";
     iwn_text_t line = iwn_text_begin(text, sizeof text);
-    add_cell(&line, time_text, 12U, true);
+    add_cell(&line, time_text, CELL_MAX, true);
     iwn_text_add(&line, "  ");
     add_cell(&line, iwn_digits(frame->id, &id[IWN_DIGITS_MAX]), 4U, true);
     iwn_text_add(&line, " (0x");
