@@ -18,7 +18,7 @@ import loop
 
 START_S = 30
 SETTLE_S = 7.0  # The web bridge goes on at its full rate for 5 s after it has connected.
-# Instructions in a second: what was measured (260 000, 1 755 000, 14 200 000) and a fifth more.
+# Instructions in a second: what was measured (200 000 to 260 000, 1 650 000, 14 200 000) and a fifth more.
 LIMITS = {"iwheel-web, nobody connected": 320000, "iwheel-mqtt, a state every 100 ms": 2200000, "iwheel-ros2, odometry at 50 Hz": 17000000}
 PROGRAMS = {"iwheel-web": "web", "iwheel-mqtt": "mqtt", "iwheel-ros2": "ros2"}
 
