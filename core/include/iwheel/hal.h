@@ -53,11 +53,11 @@ typedef struct {
     /// Removes every setpoint that is not on the bus yet from every queue and mailbox. Without acknowledgement a
     /// controller repeats a frame without end, and the frame reaches the wheels when they get power again.
     ///
-    ///     > 0  Done. None of these setpoints reaches the bus after the call, and `receive` returns no echo of them: not
-    ///          of a frame that was sent during the purge, and not an echo that was received before it.
+    ///     > 0  Done. None of these setpoints reaches the bus after the call, and `receive` returns no echo of them:
+    ///          neither of a frame that was sent during the purge, nor one that was received before it.
     ///     0    Not finished within the call (the port does not wait for an abort without a time limit). A purged frame
-    ///          has no echo; a frame that was not purged has one. The rest is gone after a loss of the bus, or after the
-    ///          next call that returns > 0.
+    ///          has no echo; a frame that was not purged has one. The rest is gone after a loss of the bus, or after
+    ///          the next call that returns > 0.
     ///     < 0  The port cannot purge.
     ///
     /// The core calls it once during the zeros of a stop if a setpoint is not echoed in time, once after these zeros if
