@@ -499,7 +499,6 @@ static char complaints[4096]; // The log.
 static void run_logged(bool (*play)(void)) {
     char path[64];
     (void)snprintf(path, sizeof path, "%s/log", folder);
-    (void)fflush(stderr);
     const int kept = dup(STDERR_FILENO);
     const int file = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     (void)dup2(file, STDERR_FILENO);
@@ -533,8 +532,7 @@ static void assert_told_at(unsigned at, const char *words) {
 }
 
 static void device_sends(const char *bytes) {
-    memcpy(&to_relay[to_relay_length], bytes, strlen(bytes));
-    to_relay_length += strlen(bytes);
+    to_relay_length += (size_t)snprintf(&to_relay[to_relay_length], sizeof to_relay - to_relay_length, "%s", bytes);
 }
 
 /// Nothing comes for 3 s; then a device of another rate talks, then one of another protocol, which says less.
