@@ -31,6 +31,7 @@ static const char LOOPBACK[] =
 #define HASH_WRENCH      HASH("8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77")
 #define HASH_BATTERY     HASH("4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741")
 #define HASH_BOOL        HASH("feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9")
+#define HASH_GRAPH       HASH("e725f4a506958c79f95dd693b965722c57b19cd18e7eff984f49561b93dc985d")
 #define HASH_DIAGNOSTICS HASH("5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e")
 
 static const ros_topic_t written[WRITERS] = {
@@ -167,7 +168,7 @@ static bool announce(ros_t *self) {
                                       : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
     type.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
     const dds_entity_t topic = dds_create_topic(self->participant, &type, "ros_discovery_info", NULL, NULL);
-    self->graph = ros_writer(self, topic, ros_qos("", 1, true, true));
+    self->graph = ros_writer(self, topic, ros_qos(old ? "" : HASH_GRAPH, 1, true, true));
 
     // Both kinds of node differ in the size of what the buffers hold only.
     rmw_dds_common_msg_dds__NodeEntitiesInfo_ node = {
