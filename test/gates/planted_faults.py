@@ -290,6 +290,14 @@ def arch(folder, fault):
     return run(SCRIPTS / "house.py", "layers", folder)
 
 
+def arch_of_names(folder, more):
+    """The same with one file more."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    (folder / more).write_text("// SPDX-License-Identifier: MIT\n")
+    return run(SCRIPTS / "house.py", "layers", folder)
+
+
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
     for part in ("core", "port", "lib", "app", "python", "test/faults"):
@@ -723,6 +731,9 @@ CASES = [
     ),
     (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
     (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch_of_names, "python3", "clean", "app/ctl/text/a_name_of_its_own.c", False),
+    (arch_of_names, "python3", "a source of a program with the name of another's", "app/ctl/text/host.c", True),
+    (arch_of_names, "python3", "a header of a library with the name of the port's", "lib/config/frame_ring.h", True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
     (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
     (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
