@@ -21,7 +21,7 @@
 
 /// What a wheel may stay below or above its expected speed without counting. Ours.
 #define IW_DIVERGE_DROOP_PERCENT 4
-/// A wheel below this share of its expected speed has hardly any: zero at once. Ours: docs/pair.md has the table.
+/// A wheel below this share of its expected speed has hardly any: zero at once. Ours: docs/user/pair.md has the table.
 #define IW_DIVERGE_SLOW_PERCENT 80
 /// A wheel below this share of its expected speed is as good as blocked, and its difference counts double: no kerb does
 /// that. Ours.

@@ -9,9 +9,9 @@
 /// follows from it. What the wheels do is a pure function of configuration, times, frames and requests: the same
 /// recording gives the same bytes on every port.
 ///
-/// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
+/// Size: docs/developer/sizes.md. No heap, no floating point, no file-scope state.
 ///
-/// R1 to R19 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R19 in the core's comments are rules of docs/developer/safety-case.md, fault numbers are its catalogue's rows.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
