@@ -7,7 +7,7 @@ usage: house.py facts|layers|pages|pins [ROOT]
 facts    the table of facts in docs/developer/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
          with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
 layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md.
-pages    the lists of docs/developer/how-to-add.md, and the indexes of test/, scripts/ and docs/. A list stands below a comment
+pages    the lists of docs/developer/how-to-add.md, the indexes of test/, scripts/ and docs/, links of Markdown and names of pages in every file. A list stands below a comment
          `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have the pattern are those whose names stand in the list, each
          after its number. A file of test/ may be named too, and must have it then.
 pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
@@ -285,8 +285,29 @@ def judge_index(folder, deep=()):
     return wrong + [f"{page}: take the line of `{name}` out: it is not there" for name in sorted(set(indexed) - entries)], len(entries)
 
 
+PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
+LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
+PLANTS = "test/gates/planted_faults.py"  # Names pages that must not exist.
+
+
+def judge_names():
+    """Pages that a file names from the root, and links of Markdown relative to their page, that do not exist."""
+    wrong, count = [], 0
+    for file in files("."):
+        text = (ROOT / file).read_text(errors="replace") if file != PLANTS else ""
+        named = [(found, ROOT / found[0]) for found in PAGE_NAMED.finditer(text)]
+        if file.endswith(".md"):
+            named += [(found, (ROOT / file).parent / found[1]) for found in LINK.finditer(text)]
+        count += len(named)
+        wrong += [f"{file}:{text.count(chr(10), 0, found.start()) + 1}: {there} does not exist" for found, there in named if not there.exists()]
+    return [line.replace(f"{ROOT}/", "") for line in wrong], count
+
+
 def pages():
     findings, lists = judge_how_to_add()
+    more, names = judge_names()
+    findings += more
+    print(f"{names} names of pages and links")
     for folder, deep in {"test": (), "scripts": (), "docs": ("user", "developer")}.items():
         more, entries = judge_index(folder, deep)
         findings += more
