@@ -72,7 +72,7 @@ test(idle house.layers check lint "" "" 2 scripts/house.py layers)
 test(idle house.pages quick lint "" "" 1 scripts/house.py pages)
 test(idle house.pins check lint "" py:pip 2 ${PY} scripts/house.py pins)
 # Without "/// @file" at its head Doxygen leaves out a header's functions and macros without a warning.
-test(idle api check lint "" doxygen 2 sh -c "headers=\$(sed -n 's/^INPUT *= *//p' docs/Doxyfile) && ! grep -rL --include=*.h --include=*.hpp '^/// @file$' \$headers | grep . && mkdir -p build/api && IWHEEL_VERSION=\$(scripts/version) doxygen docs/Doxyfile")
+test(idle api check lint "" doxygen 2 sh -c "headers=\$(sed -n 's/^INPUT *= *//p' docs/developer/Doxyfile) && ! grep -rL --include=*.h --include=*.hpp '^/// @file$' \$headers | grep . && mkdir -p build/api && IWHEEL_VERSION=\$(scripts/version) doxygen docs/developer/Doxyfile")
 test(idle gates ci faults "default;arm" "" 154 env "PATH=${ROOT}/.venv/bin:$ENV{PATH}" python3 test/gates/planted_faults.py)
 test(idle target ci+full target sanitize "" 189 test/target/run --sanitized ${S} host timing options emulate image faults uart unit)
 test(idle portability ci+full portability "" "" 166 test/portability/run)

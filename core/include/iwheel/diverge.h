@@ -21,7 +21,8 @@
 
 /// A difference from the expected speed of up to this share does not count. Chosen by us.
 #define IW_DIVERGE_DROOP_PERCENT 4
-/// A wheel below this share of its expected speed is slow: zero immediately. Chosen by us: docs/pair.md has the table.
+/// A wheel below this share of its expected speed is slow: zero immediately. Chosen by us: docs/user/pair.md has the
+/// table.
 #define IW_DIVERGE_SLOW_PERCENT 80
 /// A wheel below this share of its expected speed is practically blocked, and its difference counts double: a kerb does
 /// not slow a wheel so much. Chosen by us.

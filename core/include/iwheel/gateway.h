@@ -9,9 +9,11 @@
 /// execution. A step directly after a request sends its result without delay. The commands to the wheels depend only on
 /// configuration, times, frames and requests: the same recording gives the same bytes on every port.
 ///
-/// The core uses no heap, no floating point and no file-scope state. docs/sizes.md has the size of `iw_gateway_t`.
+/// The core uses no heap, no floating point and no file-scope state. docs/developer/sizes.md has the size of
+/// `iw_gateway_t`.
 ///
-/// R1 to R19 in the comments of the core are the rules of docs/safety-case.md. Fault numbers are rows of its catalogue.
+/// R1 to R19 in the comments of the core are the rules of docs/developer/safety-case.md. Fault numbers are rows of its
+/// catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
