@@ -2,14 +2,15 @@
 """pytest runs the tests, verdict.py judges them: a conclusive verdict is final, an inconclusive test runs again, alone, when all others have ended.
 
 Each attempt is a process of its own, so that a test that crashes or hangs is one failure and takes nothing with it. Processes without threads fork them
-(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt. Other plugins, as --junitxml, hear of the
-last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
+(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt, and so are tests marked
+`together(name)`. Other plugins, as --junitxml, hear of the last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
 
     --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
     --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
 
 A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
-@pytest.mark.full: only with IWHEEL_FULL=1. What passing tests print, -rP shows.
+@pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: nothing in it is a matter of time. record_property("tests", N): it counts as that many.
+What passing tests print, -rP shows.
 """
 
 import contextlib
@@ -51,6 +52,8 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "full: only with IWHEEL_FULL=1")
+    config.addinivalue_line("markers", "exact: what fails, no stall of the machine explains")
+    config.addinivalue_line("markers", "together(name): tests of this name share what they prepare: they are one attempt")
     config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s; those for IWHEEL_FULL: {FULL_LIMIT_S} s")
     if config.option.jobs < 1:
         raise pytest.UsageError("--jobs must be at least 1")
@@ -228,8 +231,9 @@ def units_of(items):
     """{name: the tests that are one attempt}"""
     units = {}
     for item in items:
-        shared = item.cls and "setUpClass" in vars(item.cls)
-        units.setdefault(item.parent.nodeid if shared else item.nodeid, []).append(item)
+        shared, mark = item.cls and "setUpClass" in vars(item.cls), item.get_closest_marker("together")
+        name = f"{item.path.name}: {mark.args[0]}" if mark else item.parent.nodeid if shared else item.nodeid
+        units.setdefault(name, []).append(item)
     return units
 
 
@@ -264,10 +268,12 @@ class Run(verdict.Session):
             return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])
         reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
         failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
+        if items[0].get_closest_marker("exact"):
+            failures = [(text, verdict.RULE) for text, *_ in failures]
         skips = {report.nodeid for report in reports if report.skipped}
-        return verdict.Attempt(
-            [verdict.Failure(*failure) for failure in failures], claims=claims, stalls=stalls, tests=len(items), skips=len(skips), data=reports, **answer
-        )
+        tests = sum(dict(report.user_properties).get("tests", 1) for report in reports if report.when == "teardown")
+        failures = [verdict.Failure(*failure) for failure in failures]
+        return verdict.Attempt(failures, claims=claims, stalls=stalls, tests=tests, skips=len(skips), data=reports, **answer)
 
     def tell(self, name, kind, attempt, tries):
         """The reports of the last attempt go to pytest's other plugins, with what was decided."""

@@ -67,6 +67,9 @@ FAULTS = (
         "shared = False",
         "test_class_that_prepares_once_is_one_attempt",
     ),
+    ("tests that are together run apart", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
+    ("a stall explains what is exact", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
+    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_what_a_test_counts_as"),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     (
         "others hear of each attempt",
@@ -189,6 +192,9 @@ class Made(unittest.TestCase):
 class Conclusive(Made):
     def test_broken_rule_is_final(self):
         self.assertIn("nonzero after e-stop", self.final('def test_one():\n    note("tried")\n    verdict.hold(False, "nonzero after e-stop")\n'))
+
+    def test_exact_test_is_final(self):
+        self.final('@pytest.mark.exact\ndef test_one():\n    note("tried")\n    assert False, "2 != 3"\n')
 
     def test_collected_rule_is_final(self):
         self.assertIn("rule: moved", self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n'))
@@ -381,6 +387,24 @@ class Processes(Made):
         )
         self.assertEqual(0, ran.status, ran.lines)
         self.assertFalse(runs(ran.notes[0]))
+
+    def test_tests_together_are_one_attempt(self):
+        ran = self.run_made(
+            """
+            SEEN = []
+
+            @pytest.mark.parametrize("number", [pytest.param(number, marks=pytest.mark.together(str(number % 2))) for number in range(4)])
+            def test_one(number):
+                SEEN.append(number)
+                assert len(SEEN) == 1 + number // 2
+            """,
+            stalls="[]",
+        )
+        self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
+
+    def test_what_a_test_counts_as(self):
+        ran = self.run_made('def test_one(record_property):\n    record_property("tests", 7)\n')
+        self.assertEqual((0, "7 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
 
     def test_other_users_may_enter_the_folder_of_all_tests(self):
         ran = self.run_made(
