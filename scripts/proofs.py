@@ -37,7 +37,7 @@ LISTED = {
 }
 COUNTED = {
     "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^ *RUN_TEST\("),
-    "unit.ctl": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"),
+    "ctl.tests": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"),
     "unit.client": ("tests of the C client's example", "test/client/test_*.py", r"^    def test_"),
     "faults.table": ("seeded faults", "test/faults/*.faults", r"^@@ .* \| "),
     "target.driver": ("tests of the STM32 driver", "test/target/*.c", r"^ *RUN_TEST\("),
