@@ -85,7 +85,7 @@ FAULTS = (
         "virtual time is real",
         '(self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)',
         "Nursery",
-        "test_nothing_is_excused_in_virtual_time",
+        "test_each_test_of_each_share_is_judged_once_inside",
     ),
     (
         "what a kernel did not get to passes",
@@ -550,9 +550,10 @@ class Virtual(Made):
     def told(self, ran):
         return ran.status, ran.last, ran.notes
 
-    def test_each_test_of_each_share_is_judged_once(self):
-        ran = self.virtual(self.TWO.format("pass"), "--jobs", "2")
-        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+    def test_each_test_of_each_share_is_judged_once_inside(self):
+        where = 'note("inside" if request.config.option.inside else "outside")'
+        ran = self.virtual(f"def test_one(request):\n    {where}\n\ndef test_two(request):\n    {where}\n", "--jobs", "2")
+        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.told(ran), ran.lines)
         self.assertEqual({"test_one": "passed", "test_two": "passed"}, ran.cases)
 
     def test_nothing_is_excused_in_virtual_time(self):
