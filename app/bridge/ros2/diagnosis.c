@@ -155,6 +155,22 @@ static void tell_unmatched(const ros_unmatched_t *unmatched, ros_status_t *statu
     }
 }
 
+/// Publishers that are not received, or too many of them. Returns false if there is nothing to report.
+static bool tell_publishers(const ros_commands_t *commands, ros_status_t *status) {
+    if (commands->unmatched.count > 0U) {
+        tell_unmatched(&commands->unmatched, status);
+        return true;
+    }
+    if (commands->publishers > 1U) {
+        say(status, ROS_WARN,
+            "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
+            "twist_mux in between",
+            commands->publishers);
+        return true;
+    }
+    return false;
+}
+
 static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     const ros_commands_t *commands = &facts->commands;
     const int64_t lease_ms = (facts->machine.lease_ms > 0) ? facts->machine.lease_ms : 200;
@@ -174,13 +190,8 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
         say(status, ROS_WARN,
             "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine; it only "
             "watches");
-    } else if (commands->unmatched.count > 0U) {
-        tell_unmatched(&commands->unmatched, status);
-    } else if (commands->publishers > 1U) {
-        say(status, ROS_WARN,
-            "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
-            "twist_mux in between",
-            commands->publishers);
+    } else if (tell_publishers(commands, status)) {
+        return;
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
     } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {
