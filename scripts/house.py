@@ -1,12 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The facts of the house that docs/architecture.md tells in a table: prints them, and fails where one passes its limit.
+"""The structure of the sources: what docs/architecture.md, docs/how-to-add.md and the indexes promise of it. Fails where that is not so.
 
-usage: house.py [BUILD_FOLDER...]
+usage: house.py facts|layers|pages|pins [ROOT]
 
-BUILD_FOLDERs hold a compile_commands.json (default: build/default, build/arm and build/arm-m3, those that there are). What they compile outside core/
-and test/ is compiled once more, with the members of `iw_gateway_t` called otherwise: whoever names one does not compile.
+facts    the table of facts in docs/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
+         with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
+layers   who may include whom: every include from one library or program into another must be in the table of docs/architecture.md.
+pages    the lists of docs/how-to-add.md, and the indexes of test/, scripts/ and docs/. A list stands below a comment
+         `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have the pattern are those whose names stand in the list, each
+         after its number. A file of test/ may be named too, and must have it then.
+pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
+         of the tree calls pip without checksums.
+
+No tool does it: clang-tidy has no check of includes between folders, and include-what-you-use judges one file; `uv lock --check` compares with uv.lock, not with lists for pip.
 """
+
 import json
 import os
 import re
@@ -17,15 +26,13 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(sys.argv[2] if len(sys.argv) > 2 else Path(__file__).resolve().parent.parent).resolve()
+BUILDS = ("default", "arm", "arm-m3")
 HEADERS = ROOT / "core/include"
-INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">]+)[">]', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "lib", "port", "app")
-# Libraries and programs: where each looks for headers of its own.
-COMPONENTS = {"core": ("core/include", "core/src"), "lib/northbound/protocol": ("lib/northbound/protocol/include", "lib/northbound/protocol/src"), "lib/client": ("lib/client/include", "lib/client/src"),
-              "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/board": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
-              "lib/begin": (), "lib/config": (), "lib/recording": (), "lib/inspect": (), "lib/sockets": ()}
+DEPTH = {"core": 4, "app/bridge/ros2": 6}  # Of any other: 5.
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
 
 
@@ -40,8 +47,10 @@ def name(path):
 def files_of_a_message():
     """Production files that name every telemetry message: each new one touches them."""
     texts = {path: path.read_text() for path in sources(*PRODUCTION)}
-    of = [{path for path, text in texts.items() if re.search(rf"\bIW_(CODEC|ID_LEFT|ID_RIGHT|DLC)_{kind}\b|\biw_codec_{kind.lower()}_t\b", text)}
-          for kind in TELEMETRY]
+    of = [
+        {path for path, text in texts.items() if re.search(rf"\bIW_(CODEC|ID_LEFT|ID_RIGHT|DLC)_{kind}\b|\biw_codec_{kind.lower()}_t\b", text)}
+        for kind in TELEMETRY
+    ]
     return sorted(name(path) for path in set.intersection(*of))
 
 
@@ -60,15 +69,16 @@ def depth(path, folders, known):
     return known[path]
 
 
-def deepest(headers, component):
+def deepest(component):
     """(levels, where) of the file with the most headers of its own library or program below it."""
-    known, folders = {}, [ROOT / folder for folder in headers]
+    known, folders = {}, [ROOT / component / folder for folder in ("include", "src", ".")]
     return max(((depth(path.resolve(), folders, known), name(path)) for path in sources(component)), default=(0, component))
 
 
 def private_includes():
-    return sorted(f"{name(path)} includes {included}" for path in sources(*OUTSIDE) for included in INCLUDE.findall(path.read_text())
-                  if "iwheel/private/" in included)
+    return sorted(
+        f"{name(path)} includes {included}" for path in sources(*OUTSIDE) for included in INCLUDE.findall(path.read_text()) if "iwheel/private/" in included
+    )
 
 
 def members_renamed(folder):
@@ -82,7 +92,7 @@ def members_renamed(folder):
 def compiled_anew(job):
     entry, folder = job
     command = [word for word in shlex.split(entry["command"]) if word not in ("ccache", "-c")]
-    command[command.index("-o"):command.index("-o") + 2] = ["-fsyntax-only"]
+    command[command.index("-o") : command.index("-o") + 2] = ["-fsyntax-only"]
     command = [word.replace(str(HEADERS), folder) for word in command]
     run = subprocess.run(command, cwd=entry["directory"], capture_output=True, text=True, check=False)
     return [line for line in run.stderr.splitlines() if "error:" in line]
@@ -136,33 +146,202 @@ def fact_of_arrows(program, limit):
     circle = needing_each_other(used)
     percent = 100 * len(used) / possible
     print(f"arrows between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
-    return [*bare, *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
-            *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else [])]
+    return [
+        *bare,
+        *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
+        *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else []),
+    ]
+
+
+def facts():
+    builds = [ROOT / "build" / build for build in BUILDS if (ROOT / "build" / build / "compile_commands.json").is_file()]
+    compiled, parts = uses_of_parts(builds)
+    counted = [
+        ("files that name every telemetry message", files_of_a_message(), 8),
+        ("public headers of the core", public_headers(), 11),
+        ("private headers included outside the core", private_includes(), 0),
+        (f"parts of iw_gateway_t named outside the core, in {compiled} files compiled", parts, 0),
+        (
+            "lines of app/gateway that name gw_daemon_t, the whole of it",
+            [line.strip() for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line],
+            60,
+        ),
+    ]
+    findings = ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
+    for what, found, limit in counted:
+        print(f"{what}: {len(found)} (limit {limit})")
+        findings += [f"{what}: {one}" for one in found] if len(found) > limit else []
+    levels = {component: deepest(component) for component in permitted()}
+    for component, (count, where) in sorted(levels.items()):
+        limit = DEPTH.get(component, 5)
+        print(f"include depth of {component}: {count} (limit {limit}), at {where}")
+        findings += [f"{where} includes {count} levels deep"] if count > limit else []
+    return [*findings, *fact_of_arrows("app/gateway", 42), *fact_of_arrows("app/ctl", 40)]
+
+
+# ---- layers ---------------------------------------------------------------------------------------------------------
+
+ARCHITECTURE = "docs/architecture.md"
+ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|nobody) \|$", re.MULTILINE)
+
+
+def permitted():
+    """{library or program: those that it may include}, by the table under its heading."""
+    table = (ROOT / ARCHITECTURE).read_text().partition("\n## Who may include whom\n")[2].partition("\n## ")[0]
+    return {who: set(re.findall(r"`([\w/]+)`", whom)) for who, whom in ROW.findall(table)}
+
+
+def owner(path, names):
+    """The longest name of the table in whose folder the file is."""
+    return max((name for name in names if path.as_posix().startswith(f"{name}/")), key=len, default=path.parts[0])
+
+
+def layers():
+    table = permitted()
+    files = [path.relative_to(ROOT) for path in sources(*PRODUCTION)]
+    owners = {path: owner(path, table) for path in files}
+    headers = {}
+    for path in files:
+        headers.setdefault(path.name, []).append(path)
+    wrong, used = [], set()
+    for path in files:
+        for included in INCLUDE.findall((ROOT / path).read_text()):
+            plain = re.sub(r"^(?:.*/)?\.\./", "", included)  # However it gets there, it ends in the name of a file.
+            there = {owners[other] for other in headers.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
+            if there and owners[path] not in there:
+                there = there & table.get(owners[path], set()) or there  # Of several headers of that name it is the one in reach.
+                used |= {(owners[path], other) for other in there}
+                wrong += [f"{path} includes {included} of {other}" for other in sorted(there - table.get(owners[path], set()))]
+    unused = sorted(f"{who} -> {whom}" for who, all_of in table.items() for whom in all_of if (who, whom) not in used)
+    strangers = sorted(set(owners.values()) - set(table))
+    wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [
+        f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused
+    ]
+    print(f"{len(files)} files of {len(table)} libraries and programs, {len(used)} permitted arrows")
+    return wrong or ([] if table else [f"{ARCHITECTURE} has no table"])
+
+
+# ---- pages ----------------------------------------------------------------------------------------------------------
+
+PAGE = "docs/how-to-add.md"
+MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
+
+
+def files(*places):
+    """What git knows or would add; without git everything there."""
+    run = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "--", *places], capture_output=True, text=True, check=False)
+    names = (
+        run.stdout.split("\n")
+        if run.returncode == 0
+        else [str(path.relative_to(ROOT)) for place in places for path in ([ROOT / place] if (ROOT / place).is_file() else (ROOT / place).rglob("*"))]
+    )
+    return sorted(name for name in set(names) if name and (ROOT / name).is_file())
+
+
+def line_of(name, pattern):
+    """The number of the first line with the pattern; None: there is none."""
+    text = (ROOT / name).read_text(errors="replace") if (ROOT / name).is_file() else ""
+    found = re.search(pattern, text)
+    return text.count("\n", 0, found.start()) + 1 if found else None
+
+
+def judge_list(title, section):
+    mark = MARK.search(section)
+    if not mark:
+        return [f'{PAGE}, "{title}": the list has no comment `<!-- pattern: REGEX  in: PLACE... -->`']
+    pattern, places = mark[1], mark[2].split()
+    listed = [name for line in re.findall(r"^\d+\. .*$", section, re.MULTILINE) for name in re.findall(r"^\d+\. `([^`]+)`", line)]
+    there = {name: line for name in files(*places) if (line := line_of(name, pattern))}
+    where = f'{PAGE}, "{title}"'
+    wrong = [f"{where}: add a numbered line for `{name}`, which has the pattern in line {line}" for name, line in there.items() if name not in listed]
+    for name in listed:
+        if not (ROOT / name).is_file():
+            wrong.append(f"{where}: `{name}` is not there: take its line out, or name the file that does this now")
+        elif not line_of(name, pattern):
+            wrong.append(f"{where}: take the line of `{name}` out: nothing in it is like {pattern} any more")
+    wrong += [f"{where}: `{name}` is listed twice" for name in set(listed) if listed.count(name) > 1]
+    beside = [name for name in re.findall(r"`([\w./-]+/[\w.-]+\.\w+)`", MARK.sub("", section)) if not (ROOT / name).exists()]
+    return wrong + [f"{where}: `{name}` is not there" for name in sorted(set(beside) - set(listed))]
+
+
+def judge_how_to_add():
+    text = (ROOT / PAGE).read_text(encoding="utf-8")
+    sections = re.findall(r"^## (.+)\n((?:(?!^## ).*\n)*)", text, re.MULTILINE)
+    found = [line for title, section in sections for line in judge_list(title, section)]
+    return found if sections else [f"{PAGE}: no list is found"], len(sections)
+
+
+def judge_index(folder):
+    page = f"{folder}/README.md"
+    indexed = re.findall(r"^\| `([^`]+)` \|", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
+    parts = [name.split("/")[1:] for name in files(folder)]
+    entries = {part[0] + ("/" if len(part) > 1 else "") for part in parts} - {"README.md"}
+    wrong = [f"{page}: add a line `| \\`{name}\\` | what it is for |`" for name in sorted(entries - set(indexed))]
+    return wrong + [f"{page}: take the line of `{name}` out: it is not there" for name in sorted(set(indexed) - entries)], len(entries)
+
+
+def pages():
+    findings, lists = judge_how_to_add()
+    for folder in ("test", "scripts", "docs"):
+        more, entries = judge_index(folder)
+        findings += more
+        print(f"index of {folder}/: {entries} entries")
+    print(f"{PAGE}: {lists} lists")
+    return findings
+
+
+# ---- pins -----------------------------------------------------------------------------------------------------------
+
+PYTHONS, MACHINES = ("3.11", "3.12", "3.13"), ("x86_64", "aarch64")
+PIN = re.compile(r"^([\w.-]+)==([^\s;]+)(?: ; ([^\\\n]+?))?((?: *\\\n? *--hash=sha256:[0-9a-f]{64})*)\n((?:    # .*\n)*)", re.MULTILINE)
+# Programs of this tree that call pip, and what must stand next to "install".
+CALLS_PIP = re.compile(r"""(?:\bpip3?"?|/pip"|"pip",)\s+"?install\b""")
+SAFE = re.compile(r"--require-hashes|--no-index|\(pip install|^\s*#")
+
+
+def wishes(group, table):
+    return [wish for one in table[group] for wish in (wishes(one["include-group"], table) if isinstance(one, dict) else [one])]
+
+
+def pins_of_group(group, table):
+    from pip._vendor.packaging.markers import Marker
+    from pip._vendor.packaging.requirements import Requirement
+
+    file = f"requirements/{group}.txt"
+    found = [
+        (name.lower(), version, Marker(marker or "os_name != ''"), sums, via) for name, version, marker, sums, via in PIN.findall((ROOT / file).read_text())
+    ]
+    wanted = [Requirement(wish) for wish in wishes(group, table)]
+    print(f"{file}: {len(found)} pins of {len(wanted)} wishes")
+    yield from (f"{file}: {name} {version} has no checksum" for name, version, _, sums, _ in found if not sums)
+    yield from (f"{file}: {name} is pinned, but nothing wants it" for name, *_, via in found if "via" not in via and name not in {wish.name for wish in wanted})
+    for wish, python, machine in ((wish, python, machine) for wish in wanted for python in PYTHONS for machine in MACHINES):
+        where = {"python_version": python, "python_full_version": f"{python}.0", "platform_machine": machine, "sys_platform": "linux"}
+        fits = [name for name, version, marker, *_ in found if name == wish.name and wish.specifier.contains(version) and marker.evaluate(where)]
+        if len(fits) != 1 and (wish.marker is None or wish.marker.evaluate(where)):
+            yield f"{file}: {wish}: {len(fits)} pins for Python {python} on {machine}; write the list again: see pyproject.toml"
+
+
+def pins():
+    import tomllib
+
+    table = tomllib.loads((ROOT / "requirements/pyproject.toml").read_text())["dependency-groups"]
+    wrong = [what for group in table for what in pins_of_group(group, table)]
+    for file in (file for file in files(".") if os.access(ROOT / file, os.X_OK)):
+        for number, line in enumerate((ROOT / file).read_text(errors="replace").splitlines(), 1):
+            if CALLS_PIP.search(line) and not SAFE.search(line):
+                wrong.append(f"{file}:{number}: pip without --require-hashes or --no-index")
+    return wrong
 
 
 def main(arguments):
-    builds = [Path(argument).resolve() for argument in arguments] or [ROOT / "build" / build for build in ("default", "arm", "arm-m3")]
-    builds = [build for build in builds if (build / "compile_commands.json").is_file()]
-    message, headers, private = files_of_a_message(), public_headers(), private_includes()
-    levels = {component: deepest(headers, component) for component, headers in COMPONENTS.items()}
-    deep = max((fact, component) for component, fact in levels.items() if component != "core")[0]
-    compiled, parts = uses_of_parts(builds)
-    daemon = [line for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line]
-    print(f"files that name every telemetry message: {len(message)} (limit 8): {', '.join(message)}")
-    print(f"public headers of the core: {len(headers)} (limit 11): {', '.join(headers)}")
-    print(f"include depth of the core: {levels['core'][0]} (limit 4), at {levels['core'][1]}; of any other library or program: {deep[0]} (limit 5), at {deep[1]}")
-    print(f"private headers included outside the core: {len(private)} (limit 0)")
-    print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
-    print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
-    findings = [*private, *parts, *fact_of_arrows("app/gateway", 42), *fact_of_arrows("app/ctl", 40)]
-    findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
-    findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
-    findings += [f"{len(headers)} public headers"] if len(headers) > 11 else []
-    findings += [f"{where} includes {count} levels deep" for component, (count, where) in levels.items() if count > (4 if component == "core" else 5)]
-    findings += ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
+    what = {"facts": facts, "layers": layers, "pages": pages, "pins": pins}.get(arguments[1] if len(arguments) in (2, 3) else "")
+    if what is None:
+        sys.exit(__doc__)
+    findings = what()
     print(*findings, sep="\n")
     return 1 if findings else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(sys.argv))

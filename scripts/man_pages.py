@@ -10,7 +10,7 @@
 
 usage: man_pages.py PAGE.scd [--depends FILE PAGE]    FILE: for make, what PAGE is made of
 
-It runs none of the programs: a cross build makes the same pages.
+It runs none of the programs: a cross build makes the same pages. No tool does it: scdoc includes no files and reads no Markdown; help2man runs programs.
 """
 
 import argparse
@@ -54,7 +54,9 @@ class Sources:
 
     def header(self, name):
         """Without what only a compiler needs."""
-        text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", self.read(name), flags=re.M)
+        text = re.sub(
+            r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", self.read(name), flags=re.M
+        )
         return literal(re.sub(r"\n{3,}", "\n\n", text.replace("IWC_API ", "")))
 
     def document(self, name):
@@ -117,7 +119,7 @@ def main():
     def block(match):
         kind, names = match.groups()
         if kind not in ("file", "document", "header", "iwheelctl", "verbs"):
-            sys.exit(f"{options.page}: there is no \"; {kind}\"")
+            sys.exit(f'{options.page}: there is no "; {kind}"')
         return getattr(sources, kind)(*names.split())
 
     print(LINE.sub(block, sources.read(os.path.abspath(options.page))), end="")

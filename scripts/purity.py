@@ -5,8 +5,10 @@
 usage: purity.py [--strings] [--on BASE] LIBRARY SOURCE_DIR
 
 LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too,
-with --on what another library has, which is as portable.
+with --on what another library has, which is as portable. No tool does it: `nm` lists the symbols (this judges them), and gcc has no warning for data
+that is mutable.
 """
+
 import argparse
 import re
 import subprocess
@@ -17,8 +19,10 @@ MUTABLE = set("bBdDCsSgGvV")
 LIBC = {"memcpy", "memset", "memmove", "memcmp"}
 STRINGS = {"strlen", "strcmp", "strchr"}
 # Integer helpers of the compiler's run-time library: division, multiplication and shifts of 64 bits, switch tables.
-RUNTIME = re.compile(r"__aeabi_(u?idiv(mod)?|u?ldivmod|lmul|ll?s[lr]|lasr|u?lcmp|mem(cpy|set|move|clr)[48]?|idiv0|ldiv0)$"
-                     r"|__gnu_thumb1_case_\w+$|__clzsi2$|__ctzsi2$|__popcountsi2$")
+RUNTIME = re.compile(
+    r"__aeabi_(u?idiv(mod)?|u?ldivmod|lmul|ll?s[lr]|lasr|u?lcmp|mem(cpy|set|move|clr)[48]?|idiv0|ldiv0)$"
+    r"|__gnu_thumb1_case_\w+$|__clzsi2$|__ctzsi2$|__popcountsi2$"
+)
 HEADERS = {"stdbool.h", "stddef.h", "stdint.h", "limits.h", "string.h"}
 COMMENT = re.compile(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", re.DOTALL)
 

@@ -9,8 +9,10 @@ BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compil
 know, are found through the relocations; they and mem* are charged a fixed amount. Calls through the HAL end here: a port adds its own.
 
 --frames: no function of these folders may take more than that by itself. BUILD_DIR is any that tells how it compiles
-(compile_commands.json); each source is compiled once more, to nothing.
+(compile_commands.json); each source is compiled once more, to nothing. No tool does it: -Wstack-usage of gcc judges one function; avstack (Perl) and
+puncover (PyPI) add up, but know neither the run-time library nor what the linker optimised, and do not fail.
 """
+
 import json
 import os
 import re
@@ -53,7 +55,7 @@ def add_runtime_calls(objects, size, calls):
                 section = header[1] if header else None
             called = re.search(r"\s(__aeabi_\w+|__gnu_\w+)$", line)
             if section and called:
-                for name in size: # The linker's object has another name in its graph.
+                for name in size:  # The linker's object has another name in its graph.
                     if name == section or name.endswith((f"{path.stem}:{section}", f"{path.stem.removesuffix('.ltrans')}.o:{section}")):
                         calls.setdefault(name, set()).add(called[1])
 
@@ -74,7 +76,7 @@ class Depth:
     def of(self, name):
         """(bytes, path) from this function down."""
         if name in self.open:
-            self.cycles.append([*self.open[self.open.index(name):], name])
+            self.cycles.append([*self.open[self.open.index(name) :], name])
             return 0, [name]
         if name not in self.known:
             self.open.append(name)

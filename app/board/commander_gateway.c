@@ -9,7 +9,6 @@
 #include "console.h"
 #include "cortex_m.h"
 #include "host.h"
-#include "pins.h"
 #include "report.h"
 #include "serial.h"
 

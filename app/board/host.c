@@ -3,8 +3,6 @@
 
 #include "serial.h"
 
-#include "iwheel_server/target.h"
-
 #include <string.h>
 
 #define CHANNEL_LINK 0U

@@ -157,7 +157,6 @@ bool brd_host_is_silent(const brd_host_t *self);
 /// True once the board is to begin anew.
 bool brd_host_wants_restart(const brd_host_t *self);
 
-/// Carries out `config`.
 void brd_host_config(brd_host_t *self, iwn_client_t *client);
 /// Carries out `confirm`: the operator's word on an assumption, for this run.
 void brd_host_confirm(brd_host_t *self, iwn_client_t *client);

@@ -70,10 +70,6 @@ static const char *verb_choice(unsigned number) {
     return (number < VERBS) ? verbs[number].name : NULL;
 }
 
-const verb_t *help_verb(unsigned number) {
-    return (number < VERBS) ? &verbs[number] : NULL;
-}
-
 const verb_t *help_find(const char *name) {
     for (size_t i = 0; i < VERBS; i++) {
         if (strcmp(verbs[i].name, name) == 0) {

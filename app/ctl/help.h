@@ -23,9 +23,6 @@ const verb_t *help_find(const char *name);
 /// The page of the program.
 void help_print(FILE *out);
 
-/// The verb of that place in the program's page, or a null pointer behind the last.
-const verb_t *help_verb(unsigned number);
-
 /// Tells that there is no such verb and which one may be meant; with "" that there is none at all. Returns CTL_USAGE.
 int help_unknown(const char *name);
 

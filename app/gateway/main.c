@@ -11,12 +11,10 @@
 #include "gateway_texts.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sysexits.h>
-#include <unistd.h>
 
 static int open_hal(gw_daemon_t *daemon) {
     const char *cause;

@@ -6,7 +6,6 @@
 #include <linux/can/error.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 /// Messages taken from one client before the others have their turn.
 #define BATCH 32

@@ -25,7 +25,6 @@ void sim_button_close(sim_button_t *self);
 
 void sim_button_press(sim_button_t *self, bool pressed);
 
-/// Presses until `until_us`.
 void sim_button_pulse(sim_button_t *self, iw_time_us_t until_us);
 
 /// Cuts the wire, or mends it.

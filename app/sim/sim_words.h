@@ -36,7 +36,6 @@ bool sim_words_choice(const char *word, sim_choice_t choice, bool *out_one);
 /// left, right or both, as a mask: bit n is side n. The other accepts no both.
 bool sim_words_sides(const char *word, unsigned *out_mask);
 
-/// A decimal integer.
 bool sim_words_integer(const char *word, sim_range_t range, int64_t *out_value);
 
 /// A decimal number with at most three digits behind the point, in thousandths. The range too.

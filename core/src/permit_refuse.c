@@ -57,7 +57,6 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
 }
 
-/// Reasons against giving the lease to this client now.
 static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
     if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
         return IW_REFUSE_BUSY;

@@ -399,7 +399,6 @@ static void keep_silent(iw_gateway_t *self) {
     self->counters.left_behind += (self->left_behind && !was_left) ? 1U : 0U;
 }
 
-/// Sends what is due under the permission's demand.
 static void send_due(iw_gateway_t *self) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
     iw_setpoint_demand(&self->setpoint, self->now_us, demand);

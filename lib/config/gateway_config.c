@@ -5,6 +5,8 @@
 
 #include "config/settings.h"
 
+#include "gateway_keys.h"
+
 #include <string.h>
 
 #define WATCHDOG_MS        1000U
@@ -71,158 +73,86 @@ static void format_ratio(const void *values, char out[SETTINGS_MESSAGE_SIZE]) {
 }
 
 static const settings_key_t keys[] = {
-    {"bus", "interface", "", "CAN interface, or unix:PATH for a local bus (its hub is iwheel-sim).",
-     TEXT(bus.interface, wrong_interface)},
-    {"bus", "bitrate", " bit/s", "Expected of the kernel and checked against it, never set by the gateway.",
-     NUMBER(bus.bitrate, 10000, 1000000)},
-    {"bus", "sample_point_permille", " permille",
-     "Expected sample point. Off by more than 5: warning; by more than 25: mismatch; not reported: warning.",
-     NUMBER(bus.sample_point_permille, 500, 900)},
-    {"bus", "on_mismatch", "", "What a wrong bit rate or sample point does: refuse to arm, or only warn.",
-     WORD(bus.on_mismatch, mismatch)},
+    {"bus", "interface", "", TEXT(bus.interface, wrong_interface)},
+    {"bus", "bitrate", " bit/s", NUMBER(bus.bitrate, 10000, 1000000)},
+    {"bus", "sample_point_permille", " permille", NUMBER(bus.sample_point_permille, 500, 900)},
+    {"bus", "on_mismatch", "", WORD(bus.on_mismatch, mismatch)},
 
-    {"wheels", "setpoint_type", "",
-     "Byte 0 of every setpoint. The wheels' document lists no values, so there is no default and the gateway does\n"
-     "not arm until it is set. Take it from the vendor, or from a recording of a controller that works.",
-     NUMBER(core.setpoint_type, 0, 255), .set = offsetof(gateway_config_t, core.setpoint_type_set)},
-    {"wheels", "current_role", "",
-     "What the current beside the speed means to the wheel. The document does not say: no default, no arming until\n"
-     "it is set. limit: zero is speed 0 with max_current_mA. setpoint: zero is speed 0 with current 0.",
-     WORD(core.current_role, roles)},
-    {"wheels", "rpm_of", "", "Whose turns the measured rpm count.", WORD(core.rpm_of_rotor, wheel_rotor)},
-    {"wheels", "radius_mm", " mm", "Of the wheel. The document says approximately 192; measure it.",
-     CORE(radius_mm, IW_CONFIG_RADIUS), RULE("rule R15, a wrong radius makes every speed and distance wrong")},
-    {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
-     .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
-    {"wheels", "track_mm", " mm",
-     "Between the wheels, for all that turns: no default, no arming until it is set. `iwheelctl bringup` measures it.",
-     CORE(track_mm, IW_CONFIG_TRACK), .unset_is_0 = true},
-    {"wheels", "setpoint_dlc", "", "Length of a setpoint frame, zero padded; the document's table has 5 bytes.",
-     CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
+    {"wheels", "setpoint_type", "", NUMBER(core.setpoint_type, 0, 255),
+     .set = offsetof(gateway_config_t, core.setpoint_type_set)},
+    {"wheels", "current_role", "", WORD(core.current_role, roles)},
+    {"wheels", "rpm_of", "", WORD(core.rpm_of_rotor, wheel_rotor)},
+    {"wheels", "radius_mm", " mm", CORE(radius_mm, IW_CONFIG_RADIUS),
+     RULE("rule R15, a wrong radius makes every speed and distance wrong")},
+    {"wheels", "gear_ratio", "", .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
+    {"wheels", "track_mm", " mm", CORE(track_mm, IW_CONFIG_TRACK), .unset_is_0 = true},
+    {"wheels", "setpoint_dlc", "", CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
 
-    {"left", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
-     WORD(core.invert[IW_LEFT], settings_no_yes)},
-    {"left", "force_unit", "", "Unit of the raw normal force. cN as documented; `iwheelctl status` shows the evidence.",
-     WORD(core.force_unit[IW_LEFT], units)},
-    {"right", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
-     WORD(core.invert[IW_RIGHT], settings_no_yes)},
-    {"right", "force_unit", "",
-     "Unit of the raw normal force. dN as documented; `iwheelctl status` shows the evidence.",
-     WORD(core.force_unit[IW_RIGHT], units)},
+    {"left", "invert", "", WORD(core.invert[IW_LEFT], settings_no_yes)},
+    {"left", "force_unit", "", WORD(core.force_unit[IW_LEFT], units)},
+    {"right", "invert", "", WORD(core.invert[IW_RIGHT], settings_no_yes)},
+    {"right", "force_unit", "", WORD(core.force_unit[IW_RIGHT], units)},
 
-    {"drive", "period_ms", " ms", "Spacing of setpoint pairs, the keep-alive of the wheels.",
-     CORE(period_ms, IW_CONFIG_PERIOD)},
-    {"drive", "lease_ms", " ms",
-     "How long a drive command holds: three periods of the client. It cannot be disabled.\n"
-     "lease_ms + period_ms + 1000 * max_speed_mm_s / decel_mm_s2 must not exceed 1000 ms, the wheels' own watchdog.",
-     CORE(lease_ms, IW_CONFIG_LEASE),
+    {"drive", "period_ms", " ms", CORE(period_ms, IW_CONFIG_PERIOD)},
+    {"drive", "lease_ms", " ms", CORE(lease_ms, IW_CONFIG_LEASE),
      .not_zero = "the lease cannot be disabled, it stops the wheels when the client dies"},
-    {"drive", "accel_mm_s2", " mm/s2", "Slope away from zero.", CORE(accel_mm_s2, IW_CONFIG_ACCEL)},
-    {"drive", "decel_mm_s2", " mm/s2", "Slope towards zero, also after a lost client.",
-     CORE(decel_mm_s2, IW_CONFIG_DECEL)},
-    {"drive", "max_speed_mm_s", " mm/s", "Faster commands are scaled down, both wheels by one factor.",
-     CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
-    {"drive", "max_yaw_mrad_s", " mrad/s", "A command that turns faster is scaled down, both wheels by one factor.",
-     CORE(max_yaw_mrad_s, IW_CONFIG_MAX_YAW)},
-    {"drive", "yaw_accel_mrad_s2", " mrad/s2", "So fast may turning grow under a command; no stop is slowed by it.",
-     CORE(yaw_accel_mrad_s2, IW_CONFIG_YAW_ACCEL)},
-    {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT),
+    {"drive", "accel_mm_s2", " mm/s2", CORE(accel_mm_s2, IW_CONFIG_ACCEL)},
+    {"drive", "decel_mm_s2", " mm/s2", CORE(decel_mm_s2, IW_CONFIG_DECEL)},
+    {"drive", "max_speed_mm_s", " mm/s", CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
+    {"drive", "max_yaw_mrad_s", " mrad/s", CORE(max_yaw_mrad_s, IW_CONFIG_MAX_YAW)},
+    {"drive", "yaw_accel_mrad_s2", " mrad/s2", CORE(yaw_accel_mrad_s2, IW_CONFIG_YAW_ACCEL)},
+    {"drive", "max_current_mA", " mA", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT),
      RULE("rule R15, with less a loaded wheel may have no torque to brake with")},
-    {"drive", "min_current_mA", " mA",
-     "With current_role limit no limit of a client is lower: it is raised to this, as a wheel without torque cannot "
-     "brake.",
-     CORE(min_current_mA, IW_CONFIG_MIN_CURRENT)},
-    {"drive", "asymmetric_current", "",
-     "no: both wheels get the larger limit of a client, since unequal torque turns the machine.",
-     WORD(core.asymmetric_current, settings_no_yes)},
-    {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
-    {"drive", "hold_max_s", " s", "With a wheel still moving zeros go on, but end after this: then the parking brake.",
-     CORE(hold_max_s, IW_CONFIG_HOLD_MAX)},
-    {"drive", "after_stop", "",
-     "release: silence when the zeros after a stop end, and the wheels may roll. hold: zeros until iwheelctl release "
-     "or\n"
-     "arm, also in a latch; not against another sender of setpoints. The parking brake is not replaced.",
-     WORD(core.hold, release_hold)},
+    {"drive", "min_current_mA", " mA", CORE(min_current_mA, IW_CONFIG_MIN_CURRENT)},
+    {"drive", "asymmetric_current", "", WORD(core.asymmetric_current, settings_no_yes)},
+    {"drive", "zero_hold_ms", " ms", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
+    {"drive", "hold_max_s", " s", CORE(hold_max_s, IW_CONFIG_HOLD_MAX)},
+    {"drive", "after_stop", "", WORD(core.hold, release_hold)},
 
-    {"limits", "wheel_silent_ms", " ms",
-     "A wheel not heard for this long is lost; raise it for adapters that deliver late.",
-     CORE(wheel_silent_ms, IW_CONFIG_WHEEL_SILENT)},
-    {"limits", "echo_ms", " ms", "A setpoint not seen on the bus after this long is stalled.",
-     CORE(echo_ms, IW_CONFIG_ECHO)},
-    {"limits", "rest_rpm", " rpm",
-     "At rest means |rpm| not above this: at most 60 mm/s at the wheel. Left out: the largest whole number that is at\n"
-     "most 45 mm/s at the wheel, at least 1 ...",
-     CORE(rest_rpm, IW_CONFIG_REST_RPM), RULE(REST_RULE)},
-    {"limits", "rest_ms", " ms", "... for this long.", CORE(rest_ms, IW_CONFIG_REST)},
-    {"limits", "follow_mm_s", " mm/s", "A wheel faster than it was told by this ...",
-     CORE(follow_mm_s, IW_CONFIG_FOLLOW_SPEED), RULE("rule R13, a wheel that runs away must latch")},
-    {"limits", "follow_ms", " ms", "... for this long latches.", CORE(follow_ms, IW_CONFIG_FOLLOW),
+    {"limits", "wheel_silent_ms", " ms", CORE(wheel_silent_ms, IW_CONFIG_WHEEL_SILENT)},
+    {"limits", "echo_ms", " ms", CORE(echo_ms, IW_CONFIG_ECHO)},
+    {"limits", "rest_rpm", " rpm", CORE(rest_rpm, IW_CONFIG_REST_RPM), RULE(REST_RULE)},
+    {"limits", "rest_ms", " ms", CORE(rest_ms, IW_CONFIG_REST)},
+    {"limits", "follow_mm_s", " mm/s", CORE(follow_mm_s, IW_CONFIG_FOLLOW_SPEED),
      RULE("rule R13, a wheel that runs away must latch")},
-    {"limits", "blocked_ms", " ms", "A wheel below 20 % of its command for this long stops the pair.",
-     CORE(blocked_ms, IW_CONFIG_BLOCKED), RULE("rule R13, a blocked wheel must stop the pair")},
-    {"limits", "pair_mm", " mm", "The pair stops when it leaves its commanded path by this, right wheel against left.",
-     CORE(pair_mm, IW_CONFIG_PAIR), RULE("rule R14, a machine that turns by itself must stop")},
-    {"limits", "pair_leak_ms", " ms", "An older deviation counts less and less, with this time constant.",
-     CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK), RULE("rule R14, a machine that turns by itself must stop")},
-    {"limits", "wheel_lag_ms", " ms", "A wheel follows its setpoint with this time constant.",
-     CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
-    {"limits", "battery_low_dV", " dV",
-     "A wheel whose battery is below this for 5 s is a fault: told, never a stop. The document gives no limit.",
-     NUMBER(health.battery_low_dV, 10, 254), .set = offsetof(gateway_config_t, health.has_battery)},
-    {"limits", "temperature_high_degC", " degC", "The same of a wheel that is hotter than this.",
-     NUMBER(health.temperature_high_degC, 20, 200), .set = offsetof(gateway_config_t, health.has_temperature)},
+    {"limits", "follow_ms", " ms", CORE(follow_ms, IW_CONFIG_FOLLOW),
+     RULE("rule R13, a wheel that runs away must latch")},
+    {"limits", "blocked_ms", " ms", CORE(blocked_ms, IW_CONFIG_BLOCKED),
+     RULE("rule R13, a blocked wheel must stop the pair")},
+    {"limits", "pair_mm", " mm", CORE(pair_mm, IW_CONFIG_PAIR),
+     RULE("rule R14, a machine that turns by itself must stop")},
+    {"limits", "pair_leak_ms", " ms", CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK),
+     RULE("rule R14, a machine that turns by itself must stop")},
+    {"limits", "wheel_lag_ms", " ms", CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
+    {"limits", "battery_low_dV", " dV", NUMBER(health.battery_low_dV, 10, 254),
+     .set = offsetof(gateway_config_t, health.has_battery)},
+    {"limits", "temperature_high_degC", " degC", NUMBER(health.temperature_high_degC, 20, 200),
+     .set = offsetof(gateway_config_t, health.has_temperature)},
 
-    {"estop", "line", "", "gpiod line name, gpiochipN:OFFSET, unix:PATH (the simulator's button), or none.",
-     TEXT(estop.line, settings_wrong_address)},
-    {"estop", "active", "",
-     "Level that means pressed. high: a contact normally closed to ground, with a pull-up, so that a cut wire reads "
-     "as\n"
-     "pressed. low is accepted with a warning: a cut wire would go unseen.",
-     WORD(estop.active_high, low_high)},
-    {"estop", "debounce_ms", " ms", "On release only; a press acts at once.", NUMBER(estop.debounce_ms, 0, 1000)},
-    {"estop", "chip", "",
-     "Label of the line's chip when its button was seen to work (bringup writes it; gpiodetect shows it); any: not\n"
-     "compared. A line of another chip is not read: it counts as pressed. Kernels renumber chips.",
-     TEXT(estop.chip, settings_wrong_address)},
-    {"estop", "chip_line", "", "The line's own name then (gpioinfo shows it); any: not compared.",
-     TEXT(estop.chip_line, settings_wrong_address)},
-    {"estop", "line2", "",
-     "The button's second contact, as line: pressed if either says so, released only if both do. none: there is none.",
-     TEXT(estop.line2, settings_wrong_address)},
-    {"estop", "line2_active", "", "Level of line2 that means pressed, as active.", WORD(estop.active2_high, low_high)},
-    {"estop", "chip2", "", "Of line2, as chip.", TEXT(estop.chip2, settings_wrong_address)},
-    {"estop", "chip2_line", "", "Of line2, as chip_line.", TEXT(estop.chip2_line, settings_wrong_address)},
-    {"estop", "estop_discrepancy_ms", " ms",
-     "If the contacts differ for longer, the stop latches until both were seen pressed, then released.",
-     NUMBER(estop.discrepancy_ms, 50, 1000)},
+    {"estop", "line", "", TEXT(estop.line, settings_wrong_address)},
+    {"estop", "active", "", WORD(estop.active_high, low_high)},
+    {"estop", "debounce_ms", " ms", NUMBER(estop.debounce_ms, 0, 1000)},
+    {"estop", "chip", "", TEXT(estop.chip, settings_wrong_address)},
+    {"estop", "chip_line", "", TEXT(estop.chip_line, settings_wrong_address)},
+    {"estop", "line2", "", TEXT(estop.line2, settings_wrong_address)},
+    {"estop", "line2_active", "", WORD(estop.active2_high, low_high)},
+    {"estop", "chip2", "", TEXT(estop.chip2, settings_wrong_address)},
+    {"estop", "chip2_line", "", TEXT(estop.chip2_line, settings_wrong_address)},
+    {"estop", "estop_discrepancy_ms", " ms", NUMBER(estop.discrepancy_ms, 50, 1000)},
 
-    {"northbound", "socket", "", "Where clients connect.", TEXT(northbound.socket, settings_wrong_socket)},
-    {"northbound", "mode", "", "Permissions of the socket, octal: who may connect may move the wheels.",
-     .kind = SETTINGS_MODE, AT(northbound.mode)},
-    {"northbound", "group", "", "Group of the socket; none: the gateway's own.",
-     TEXT(northbound.group, settings_wrong_group)},
-    {"northbound", "max_clients", " clients", "Connections at the same time.", NUMBER(northbound.max_clients, 1, 64)},
-    {"northbound", "watch_socket", "",
-     "Where clients connect that may look, stop and e-stop, but never drive; none: there is no such socket. Tools find "
-     "it\n"
-     "as watch/NAME.sock in the directory of socket NAME.sock.",
-     TEXT(northbound.watch_socket, settings_wrong_socket)},
-    {"northbound", "watch_mode", "", "Permissions of that socket, octal: who may connect may stop the wheels.",
-     .kind = SETTINGS_MODE, AT(northbound.watch_mode)},
-    {"northbound", "watch_group", "", "Group of that socket; none: the gateway's own.",
-     TEXT(northbound.watch_group, settings_wrong_group)},
-    {"northbound", "max_watchers", " clients", "Connections to it at the same time; they take none of max_clients.",
-     NUMBER(northbound.max_watchers, 1, 64)},
-    {"northbound", "max_age_ms", " ms",
-     "An arm, reset, release or confirm that says since when it is wanted (t_us) may be so old; an older one is "
-     "refused.",
-     NUMBER(northbound.max_age_ms, 200, 2000)},
+    {"northbound", "socket", "", TEXT(northbound.socket, settings_wrong_socket)},
+    {"northbound", "mode", "", .kind = SETTINGS_MODE, AT(northbound.mode)},
+    {"northbound", "group", "", TEXT(northbound.group, settings_wrong_group)},
+    {"northbound", "max_clients", " clients", NUMBER(northbound.max_clients, 1, 64)},
+    {"northbound", "watch_socket", "", TEXT(northbound.watch_socket, settings_wrong_socket)},
+    {"northbound", "watch_mode", "", .kind = SETTINGS_MODE, AT(northbound.watch_mode)},
+    {"northbound", "watch_group", "", TEXT(northbound.watch_group, settings_wrong_group)},
+    {"northbound", "max_watchers", " clients", NUMBER(northbound.max_watchers, 1, 64)},
+    {"northbound", "max_age_ms", " ms", NUMBER(northbound.max_age_ms, 200, 2000)},
 
-    {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",
-     NUMBER(record.blackbox_s, 0, 600)},
-    {"record", "directory", "", "Where recordings are written.", TEXT(record.directory, settings_wrong_address)},
-    {"record", "keep_stops", "", "Number of recordings on disk; those of stops in motion are removed last.",
-     NUMBER(record.keep_stops, 8, 256)},
+    {"record", "blackbox_s", " s", NUMBER(record.blackbox_s, 0, 600)},
+    {"record", "directory", "", TEXT(record.directory, settings_wrong_address)},
+    {"record", "keep_stops", "", NUMBER(record.keep_stops, 8, 256)},
 };
 
 static void find_range(uint16_t range, uint32_t *out_min, uint32_t *out_max) {
@@ -240,15 +170,20 @@ static const char *hint(const char *key) {
                : NULL;
 }
 
+static const settings_form_t form;
+
+static unsigned line_of(const char *key, const unsigned *lines) {
+    return lines[settings_find(&form, NULL, key) - keys];
+}
+
 /// Of the last key of the stop budget that was given.
 static unsigned last_line(const unsigned *lines) {
+    static const char *const budget[] = {"period_ms", "lease_ms", "decel_mm_s2", "max_speed_mm_s"};
     unsigned last = 0;
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        const uint16_t range = keys[i].range;
-        const bool involved = range == IW_CONFIG_PERIOD || range == IW_CONFIG_LEASE || range == IW_CONFIG_DECEL ||
-                              range == IW_CONFIG_MAX_SPEED;
-        if (involved && lines[i] > last) {
-            last = lines[i];
+    for (size_t i = 0; i < sizeof budget / sizeof budget[0]; i++) {
+        const unsigned line = line_of(budget[i], lines);
+        if (line > last) {
+            last = line;
         }
     }
     return last;
@@ -274,20 +209,9 @@ static void budget_cures(const iw_config_t *core, char *out, size_t size) {
 /// Without a value standstill follows from radius and gear.
 static void complete(void *values, const unsigned *lines) {
     iw_config_t *core = &((gateway_config_t *)values)->core;
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (keys[i].range == IW_CONFIG_REST_RPM && lines[i] == 0U) {
-            core->rest_rpm = iw_config_rest(core).standard;
-        }
+    if (line_of("rest_rpm", lines) == 0U) {
+        core->rest_rpm = iw_config_rest(core).standard;
     }
-}
-
-static unsigned line_of(uint16_t range, const unsigned *lines) {
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (keys[i].range == range) {
-            return lines[i];
-        }
-    }
-    return 0;
 }
 
 static void complain_rest(settings_report_t *report, const iw_config_t *core, unsigned line) {
@@ -297,18 +221,9 @@ static void complain_rest(settings_report_t *report, const iw_config_t *core, un
                       core->rest_rpm, core->radius_mm, iw_config_rest(core).max, iw_config_rest(core).standard);
 }
 
-static unsigned line_of_key(const char *name, const unsigned *lines) {
-    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-        if (strcmp(keys[i].section, "estop") == 0 && strcmp(keys[i].key, name) == 0) {
-            return lines[i];
-        }
-    }
-    return 0;
-}
-
 static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
     const iw_config_t *core = &((const gateway_config_t *)values)->core;
-    config_relate_contacts(values, report, line_of_key("line2", lines), line_of_key("estop_discrepancy_ms", lines));
+    config_relate_contacts(values, report, line_of("line2", lines), line_of("estop_discrepancy_ms", lines));
     char cures[SETTINGS_MESSAGE_SIZE];
     const iw_config_fault_t fault = iw_config_check(core);
     if (fault == IW_CONFIG_STOP_BUDGET) {
@@ -320,10 +235,10 @@ static void relate(settings_report_t *report, const void *values, const unsigned
             core->lease_ms, core->period_ms, core->max_speed_mm_s, core->decel_mm_s2,
             (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
     } else if (fault == IW_CONFIG_REST_SPEED) {
-        complain_rest(report, core, line_of(IW_CONFIG_REST_RPM, lines));
+        complain_rest(report, core, line_of("rest_rpm", lines));
     } else if (fault == IW_CONFIG_MIN_CURRENT) {
         settings_complain(
-            report, line_of(IW_CONFIG_MIN_CURRENT, lines),
+            report, line_of("min_current_mA", lines),
             "min_current_mA = %u is more than max_current_mA = %u: rule R15, no limit of a client would be "
             "permitted; write min_current_mA = %u at most, or max_current_mA = %u at least",
             core->min_current_mA, core->max_current_mA, core->max_current_mA, core->min_current_mA);
@@ -335,6 +250,7 @@ static void relate(settings_report_t *report, const void *values, const unsigned
 
 static const settings_form_t form = {
     .keys = keys,
+    .help = gateway_keys,
     .count = sizeof keys / sizeof keys[0],
     .program = "the gateway",
     .missing = "create it from share/gateway.conf, or give another with -c FILE",

@@ -47,7 +47,6 @@ typedef struct {
     const char *section;
     const char *key;
     const char *unit; ///< For messages, with a leading space; may be empty.
-    const char *help; ///< Printed above the key; lines end with '\n' except the last.
     settings_kind_t kind;
     uint16_t offset; ///< Into the values.
     uint16_t size;   ///< Of the field: a number of 1, 2 or 4 bytes, or a text with its terminator.
@@ -67,6 +66,13 @@ typedef struct {
     void (*format)(const void *values, char out[SETTINGS_MESSAGE_SIZE]);
 } settings_key_t;
 
+/// The comment above one key, as in its file in share/, from which it is made (iwheel_keys in cmake/iwheel_texts.cmake).
+typedef struct {
+    const char *section;
+    const char *key;
+    const char *text; ///< Whole lines, each with its "; ".
+} settings_help_t;
+
 /// Where complaints go.
 typedef struct {
     const char *name; ///< The file, or where else the value came from.
@@ -76,10 +82,11 @@ typedef struct {
 
 /// All that may stand in one file.
 typedef struct settings_form {
-    const settings_key_t *keys; ///< In the order in which they are printed.
-    size_t count;               ///< At most SETTINGS_KEYS_MAX.
-    const char *program;        ///< Whose file it is, as in "no configuration of the gateway".
-    const char *missing;        ///< What to do if there is no file: "create it from share/gateway.conf".
+    const settings_key_t *keys;  ///< In the order in which they are printed.
+    const settings_help_t *help; ///< Has every key; ends with a null section.
+    size_t count;                ///< At most SETTINGS_KEYS_MAX.
+    const char *program;         ///< Whose file it is, as in "no configuration of the gateway".
+    const char *missing;         ///< What to do if there is no file: "create it from share/gateway.conf".
     /// The range of rows that name one; null: none does.
     void (*range)(uint16_t range, uint32_t *out_min, uint32_t *out_max);
     /// Why this key cannot be and what to do, for keys that people look for; null: nothing to say.

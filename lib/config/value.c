@@ -266,16 +266,21 @@ static bool settings_value_format(const settings_key_t *row, const void *values,
 /// Where the remark after a value begins.
 #define REMARK_COLUMN 34
 
+static const char *help_of(const settings_form_t *form, const settings_key_t *row) {
+    const settings_help_t *help = form->help;
+    while (help->section != NULL && (strcmp(help->section, row->section) != 0 || strcmp(help->key, row->key) != 0)) {
+        help++;
+    }
+    return (help->section != NULL) ? help->text : "";
+}
+
 static void print_key(const settings_form_t *form, const settings_key_t *row, const void *values, const void *defaults,
                       FILE *out) {
     char choices[64];
     char value[SETTINGS_MESSAGE_SIZE];
-    (void)fputs("; ", out);
-    for (const char *c = row->help; *c != '\0'; c++) {
-        (void)fputs((*c == '\n') ? "\n; " : (char[2]){*c, '\0'}, out);
-    }
+    (void)fputs(help_of(form, row), out);
     const bool set = settings_value_format(row, values, value);
-    const int width = fprintf(out, "\n%s%s = %s", set ? "" : ";", row->key, set ? value : "?") - 1;
+    const int width = fprintf(out, "%s%s = %s", set ? "" : ";", row->key, set ? value : "?");
     settings_value_choices(form, row, choices, sizeof choices);
     const bool has_default = settings_value_format(row, defaults, value);
     (void)fprintf(out, "%*s ; %s%s%s%s\n", (width < REMARK_COLUMN) ? REMARK_COLUMN - width : 0, "", choices,

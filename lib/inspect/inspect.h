@@ -84,7 +84,6 @@ typedef struct {
 
 void inspect_heard_begin(inspect_heard_t *self);
 
-/// Takes one frame.
 void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame);
 
 /// Listens for so long; blocks. The HAL must be open.

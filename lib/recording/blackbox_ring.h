@@ -34,7 +34,6 @@ typedef struct {
     blackbox_block_t block[];
 } blackbox_ring_t;
 
-/// Bytes for a ring of that many seconds.
 size_t blackbox_ring_size(uint32_t seconds);
 
 /// `memory` holds blackbox_ring_size(seconds) bytes, aligned for uint64_t.

@@ -52,7 +52,6 @@ void sock_folder_close(sock_folder_t *self);
 /// errno, which may be one of the reasons above.
 int sock_folder_open_own(const char *path);
 
-/// The folder of a path, as text.
 void sock_folder_of(const char *path, char *out_folder, size_t size);
 
 /// What is wrong, and what mends it, of an errno or one of the reasons.

@@ -100,7 +100,6 @@ bool sock_client_flushed(const sock_client_t *self);
 /// It cannot be read or written any more.
 void sock_client_break(sock_client_t *self);
 
-/// It is being closed.
 static inline bool sock_client_is_closing(const sock_client_t *self) {
     return self->phase == SOCK_CLOSING || self->phase == SOCK_GONE;
 }

@@ -24,8 +24,7 @@
 
 #define BRD_FLASH_WAIT_STATES ((BRD_CORE_HZ > 48000000U) ? 2U : 1U)
 
-/// The watchdog's oscillator: nominal and fastest.
-#define BRD_LSI_HZ     40000U
+/// The watchdog's oscillator at its fastest; nominal 40 kHz.
 #define BRD_LSI_MAX_HZ 60000U
 
 #define BRD_RCC_ADDRESS       0x40021000U

@@ -33,8 +33,7 @@
 
 #define BRD_FLASH_WAIT_STATES 5U ///< Above 150 MHz at 2.7 to 3.6 V.
 
-/// The watchdog's oscillator: nominal and fastest.
-#define BRD_LSI_HZ     32000U
+/// The watchdog's oscillator at its fastest; nominal 32 kHz.
 #define BRD_LSI_MAX_HZ 47000U
 
 #define BRD_RCC_ADDRESS       0x40023800U

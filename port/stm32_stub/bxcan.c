@@ -302,11 +302,6 @@ iw_bus_state_t brd_bxcan_bus_state(void *context) {
     return (self->phase < BRD_BXCAN_RUNNING) ? IW_BUS_DOWN : IW_BUS_OFF;
 }
 
-brd_bxcan_errors_t brd_bxcan_errors(const brd_bxcan_t *self) {
-    const uint32_t esr = brd_register_read(&self->config.registers->ESR);
-    return (brd_bxcan_errors_t){(uint8_t)BRD_ESR_TEC(esr), (uint8_t)BRD_ESR_REC(esr), (uint8_t)BRD_ESR_LEC(esr)};
-}
-
 /// Lost frames are counted, not waited for: this runs in an interrupt.
 static void put(brd_bxcan_t *self, const iw_can_frame_t *frame) {
     if (!brd_frame_ring_put(&self->ring, frame, self->epoch)) {

@@ -79,13 +79,6 @@ typedef struct {
     uint8_t epoch;              ///< Counts purges: echoes from before one are not delivered.
 } brd_bxcan_t;
 
-/// What the controller counts. Transmit errors above 255 are bus-off.
-typedef struct {
-    uint8_t transmit_errors;
-    uint8_t receive_errors;
-    uint8_t last_error; ///< 0 none, 1 stuff, 2 form, 3 acknowledgement, 4 recessive bit, 5 dominant bit, 6 CRC.
-} brd_bxcan_errors_t;
-
 /// Takes the device out of sleep and asks for initialisation mode. Configuration follows in `bus_state`. Does not wait.
 /// Two devices that share filter banks must both be initialised before either is RUNNING: filters cannot change while
 /// frames come in.
@@ -107,7 +100,5 @@ int brd_bxcan_purge(void *context);
 void brd_bxcan_on_transmit(brd_bxcan_t *self);
 void brd_bxcan_on_receive(brd_bxcan_t *self);
 void brd_bxcan_on_error(brd_bxcan_t *self);
-
-brd_bxcan_errors_t brd_bxcan_errors(const brd_bxcan_t *self);
 
 #endif

@@ -75,11 +75,8 @@ static_assert(offsetof(brd_bxcan_registers_t, filter) == 0x240, "F0R1 is at 0x24
 #define BRD_IER_BOFIE  0x00000400U ///< ... and so does bus-off ...
 #define BRD_IER_ERRIE  0x00008000U ///< ... which makes an interrupt.
 
-#define BRD_ESR_EPVF       0x00000002U               ///< Error passive.
-#define BRD_ESR_BOFF       0x00000004U               ///< Bus-off.
-#define BRD_ESR_LEC(value) (((value) >> 4) & 0x7U)   ///< Last error code.
-#define BRD_ESR_TEC(value) (((value) >> 16) & 0xFFU) ///< Transmit error counter, lower 8 bits.
-#define BRD_ESR_REC(value) (((value) >> 24) & 0xFFU) ///< Receive error counter.
+#define BRD_ESR_EPVF 0x00000002U ///< Error passive.
+#define BRD_ESR_BOFF 0x00000004U ///< Bus-off.
 
 #define BRD_BTR_SILM 0x80000000U ///< Silent: neither frames nor acknowledgements nor error flags leave.
 

@@ -29,7 +29,6 @@
 /// The pattern for what the gateway does; `estop_pressed` is the contact's level.
 uint16_t brd_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed);
 
-/// Whether a pattern's lamp is lit at that time.
 bool brd_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);
 
 #endif

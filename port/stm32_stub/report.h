@@ -11,7 +11,6 @@
 
 #include "iwheel/snapshot.h"
 
-/// There is no crystal yet.
 void brd_report_no_crystal(void);
 
 /// The first line. `restarted`: the run before was sending, so zeros come first.

@@ -386,18 +386,10 @@ class CancelledWithRig(RigCase):
         self.assertIn("KeyboardInterrupt", said)
 
     def test_cancelled_by_the_end_of_its_loop_the_wheels_stop(self):
-        self.run_program(
-            self.DRIVE + "async def main():\n"
-            "    task = asyncio.ensure_future(drive())\n"
-            "    await asyncio.sleep(1.2)\n"
-            "asyncio.run(main())\n"
-        )
+        self.run_program(self.DRIVE + "async def main():\n    task = asyncio.ensure_future(drive())\n    await asyncio.sleep(1.2)\nasyncio.run(main())\n")
 
     def test_cancelled_by_the_end_of_the_interpreter_the_wheels_stop(self):
-        self.run_program(
-            self.DRIVE + "threading.Thread(target=lambda: asyncio.run(drive()), daemon=True).start()\n"
-            "time.sleep(1.2)\n"
-        )
+        self.run_program(self.DRIVE + "threading.Thread(target=lambda: asyncio.run(drive()), daemon=True).start()\ntime.sleep(1.2)\n")
 
     def test_cancelled_from_another_thread_the_wheels_stop(self):
         self.run_program(

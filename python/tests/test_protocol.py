@@ -18,8 +18,9 @@ from client import Closed
 from harness import Rig
 from iwheel import _protocol
 
-sys.path.insert(0, os.path.join(ROOT, "scripts"))
-from northbound import Description, camel
+sys.path.insert(0, os.path.join(ROOT, "test", "northbound"))
+from described import Description
+from northbound import camel
 
 TOPICS = ["state", "bus", "estop", "lease", "stop", "force", "frame"]
 # What this rig cannot bring about, with the reason. Everything else must be seen.

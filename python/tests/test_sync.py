@@ -109,12 +109,7 @@ class Driving(RigCase):
         self.assert_stood_by(now_us(), 0)
 
     def test_ctrl_c_stops(self):
-        script = (
-            "import iwheel, sys\n"
-            "with iwheel.Gateway(sys.argv[1]).arm() as w:\n"
-            "    print('armed', flush=True)\n"
-            "    w.drive_for(60, 300, 300)\n"
-        )
+        script = "import iwheel, sys\nwith iwheel.Gateway(sys.argv[1]).arm() as w:\n    print('armed', flush=True)\n    w.drive_for(60, 300, 300)\n"
         child = self.python(script)
         child.stdout.readline()
         time.sleep(0.5)
@@ -147,12 +142,7 @@ class Driving(RigCase):
             self.assertEqual(gateway.why()["cause"], "client_gone")
 
     def test_a_frozen_program_is_stopped_by_the_lease(self):
-        child = self.python(
-            "import iwheel, sys\n"
-            "with iwheel.Gateway(sys.argv[1]).arm() as w:\n"
-            "    print('armed', flush=True)\n"
-            "    w.drive_for(60, 300, 300)\n"
-        )
+        child = self.python("import iwheel, sys\nwith iwheel.Gateway(sys.argv[1]).arm() as w:\n    print('armed', flush=True)\n    w.drive_for(60, 300, 300)\n")
         child.stdout.readline()
         time.sleep(0.5)
         child.send_signal(signal.SIGSTOP)

@@ -9,6 +9,7 @@ A program that sums up in the words of our runners ("12 passed, 0 failed, 0 skip
 ("Ran 12 tests in 1.5s") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said, unless it says
 that it was not judged (test/support/verdict.py). Last line: "N passed, N failed, N skipped". Exit status 1 if one failed or none passed, 75 if one was not judged.
 """
+
 import collections
 import re
 import subprocess

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Counts the instructions of functions of a bare Cortex-M program, on an emulated CPU."""
+
 import bisect
 import subprocess
 from collections import Counter
@@ -23,8 +24,23 @@ def compile_clang(out, cpu, sources, includes, more):
     objects = []
     for source in map(Path, sources):
         objects.append(out.with_name(f"{out.stem}-{source.stem}.o"))
-        subprocess.run(["clang", "--target=arm-none-eabi", f"-mcpu={cpu}", *FLAGS, *more, f"-isystem{system}/include", "-isystem/usr/include/newlib",
-                        *[f"-I{path}" for path in includes], "-c", str(source), "-o", str(objects[-1])], check=True)
+        subprocess.run(
+            [
+                "clang",
+                "--target=arm-none-eabi",
+                f"-mcpu={cpu}",
+                *FLAGS,
+                *more,
+                f"-isystem{system}/include",
+                "-isystem/usr/include/newlib",
+                *[f"-I{path}" for path in includes],
+                "-c",
+                str(source),
+                "-o",
+                str(objects[-1]),
+            ],
+            check=True,
+        )
     return objects
 
 
@@ -33,8 +49,23 @@ def build(out, cpu, sources, includes, entries, more=FREESTANDING, compiler="gcc
     keep = [f"-Wl,-u,{entry}" for entry in entries]
     if compiler == "clang":
         sources = compile_clang(out, cpu, sources, includes, more)
-    command = ["arm-none-eabi-gcc", f"-mcpu={cpu}", *FLAGS, *more, *[f"-I{path}" for path in includes], *map(str, sources), "-nostartfiles",
-               "--specs=nano.specs", f"-Wl,-Ttext={BASE:#x}", "-Wl,-N", "-Wl,--gc-sections", f"-Wl,-e,{entries[0]}", *keep, "-o", str(out)]
+    command = [
+        "arm-none-eabi-gcc",
+        f"-mcpu={cpu}",
+        *FLAGS,
+        *more,
+        *[f"-I{path}" for path in includes],
+        *map(str, sources),
+        "-nostartfiles",
+        "--specs=nano.specs",
+        f"-Wl,-Ttext={BASE:#x}",
+        "-Wl,-N",
+        "-Wl,--gc-sections",
+        f"-Wl,-e,{entries[0]}",
+        *keep,
+        "-o",
+        str(out),
+    ]
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
     if done.returncode != 0:
         raise SystemExit(done.stderr)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What can be counted rather than timed: instructions and bytes. The same on every machine with the same compiler."""
+
 import collections
 import re
 import subprocess
@@ -22,8 +23,12 @@ def codecs(work):
     """{name: (sources, include folders)}; cantools' C source is made here, from the DBC file."""
     generated = work / "cantools"
     generated.mkdir(parents=True, exist_ok=True)
-    subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--no-floating-point-numbers", "--no-strict",
-                    str(ROOT / "share/iwheel.dbc")], cwd=generated, check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "cantools", "generate_c_source", "--no-floating-point-numbers", "--no-strict", str(ROOT / "share/iwheel.dbc")],
+        cwd=generated,
+        check=True,
+        capture_output=True,
+    )
     return {
         "loop": ([HERE / "codec/loop.c"], INCLUDES),
         "floor": ([HERE / "codec/floor.c"], INCLUDES),
@@ -33,16 +38,29 @@ def codecs(work):
 
 
 def host_instructions(program, what, rounds):
-    run = subprocess.run(["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), what, str(rounds)],
-                         capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), what, str(rounds)], capture_output=True, text=True, check=True
+    )
     return int(re.search(r"Collected : (\d+)", run.stderr)[1])
 
 
 def host_codec(work, name, sources, includes, compiler):
     """Instructions per frame on this machine: (decode, encode). The difference of two runs, so without start and end."""
     program = work / f"codec-{name}-{compiler}"
-    subprocess.run([compiler, "-O2", "-std=c99", *[f"-I{path}" for path in includes], *map(str, sources), str(HERE / "codec/mix.c"),
-                    str(HERE / "codec/main.c"), "-o", str(program)], check=True)
+    subprocess.run(
+        [
+            compiler,
+            "-O2",
+            "-std=c99",
+            *[f"-I{path}" for path in includes],
+            *map(str, sources),
+            str(HERE / "codec/mix.c"),
+            str(HERE / "codec/main.c"),
+            "-o",
+            str(program),
+        ],
+        check=True,
+    )
     per_frame = []
     for what, frames in (("decode", FRAMES), ("encode", 1)):
         few, many = (20, 120) if what == "decode" else (1000, 11000)
@@ -54,8 +72,15 @@ def host_codec(work, name, sources, includes, compiler):
 def arm_codec(work, name, cpu, sources, includes, compiler):
     """cantools' user has a C library, whose memset is not turned into a loop of bytes."""
     more = () if name == "cantools" else count_arm.FREESTANDING
-    elf = count_arm.build(work / f"codec-{name}-{cpu}-{compiler}.elf", cpu, [*sources, HERE / "codec/mix.c"], includes,
-                          ["bench_decode", "bench_encode", "bench_fill"], more, compiler)
+    elf = count_arm.build(
+        work / f"codec-{name}-{cpu}-{compiler}.elf",
+        cpu,
+        [*sources, HERE / "codec/mix.c"],
+        includes,
+        ["bench_decode", "bench_encode", "bench_fill"],
+        more,
+        compiler,
+    )
     program = count_arm.Program(elf, cpu)
     program.call("bench_fill")
     per_frame = []
@@ -68,16 +93,22 @@ def arm_codec(work, name, cpu, sources, includes, compiler):
 
 
 def arm_linked(work, cpu):
-    elf = count_arm.build(work / f"linked-{cpu}.elf", cpu, [HERE / "codec/linked.c", CORE / "src/codec.c"], INCLUDES,
-                          ["bench_linked_decode", "bench_linked_encode"])
+    elf = count_arm.build(
+        work / f"linked-{cpu}.elf", cpu, [HERE / "codec/linked.c", CORE / "src/codec.c"], INCLUDES, ["bench_linked_decode", "bench_linked_encode"]
+    )
     return count_arm.text_size(elf)
 
 
 def driving(work, cpu, more=()):
     """The program of test/bench/step, with its gateway driving."""
-    elf = count_arm.build(work / f"step-{cpu}{''.join(more)}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
-                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair", "bench_faster", "bench_look", "bench_seen"],
-                          (*count_arm.FREESTANDING, *more))
+    elf = count_arm.build(
+        work / f"step-{cpu}{''.join(more)}.elf",
+        cpu,
+        [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))],
+        INCLUDES,
+        ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair", "bench_faster", "bench_look", "bench_seen"],
+        (*count_arm.FREESTANDING, *more),
+    )
     program = count_arm.Program(elf, cpu)
     if program.call("bench_prepare")[0] != 1:
         raise SystemExit("the gateway of test/bench/step does not drive")
@@ -95,17 +126,32 @@ def arm_profile(work, cpu):
 
 # What each source of the core is there for; one that is not named here stands under its own name.
 RULES = {
-    "setpoint": "R1, R4: ramps, periods, the zero hold", "envelope": "R8: the last check", "sender": "R5: both or none", "confirmation": "R6: no queue of old setpoints",
-    "follow": "a wheel that is faster, blocked or turns backwards", "diverge": "P1: the pair diverges", "watch_pair": "P1: the pair diverges",
-    "yaw": "P2: yaw", "current": "P4: current", "permit": "R2, R3: permission, causes and states", "cause": "R2, R3: permission, causes and states",
-    "codec": "frames", "wheel": "frames", "age": "ages of everything", "step": "the step itself", "gateway": "the step itself",
+    "setpoint": "R1, R4: ramps, periods, the zero hold",
+    "envelope": "R8: the last check",
+    "sender": "R5: both or none",
+    "confirmation": "R6: no queue of old setpoints",
+    "follow": "a wheel that is faster, blocked or turns backwards",
+    "diverge": "P1: the pair diverges",
+    "watch_pair": "P1: the pair diverges",
+    "yaw": "P2: yaw",
+    "current": "P4: current",
+    "permit": "R2, R3: permission, causes and states",
+    "cause": "R2, R3: permission, causes and states",
+    "codec": "frames",
+    "wheel": "frames",
+    "age": "ages of everything",
+    "step": "the step itself",
+    "gateway": "the step itself",
 }
 
 
 def sources_of_core():
     """{function: source without its ending}"""
-    return {name: path.stem for path in sorted((ROOT / "core/src").glob("*.c"))
-            for name in re.findall(r"^(?!static const|typedef)[\w \*]*?\b(\w+)\([^;{}]*\) \{$", path.read_text(), re.M)}
+    return {
+        name: path.stem
+        for path in sorted((ROOT / "core/src").glob("*.c"))
+        for name in re.findall(r"^(?!static const|typedef)[\w \*]*?\b(\w+)\([^;{}]*\) \{$", path.read_text(), re.M)
+    }
 
 
 def arm_rules(work, cpu):

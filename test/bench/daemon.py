@@ -3,6 +3,7 @@
 
 Figures of this machine at this moment, so they are shown and not checked; the counts (threads, allocations) do not depend on the load.
 """
+
 import grp
 import json
 import os
@@ -71,9 +72,22 @@ class Pair:
         subprocess.run(["gcc", "-shared", "-fPIC", "-O1", "-o", self.preload, HERE / "daemon/count_allocations.c"], check=True)
         (self.folder / "gateway.conf").write_text(
             f"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ntrack_mm = 540\n{TRACED}[northbound]\nmax_clients = 64\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\n"
-            f"directory = {self.folder}\n")
-        self.simulator = subprocess.Popen([self.build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", "--can",
-                                           f"unix:{self.folder}/bus", "--estop", f"{self.folder}/estop", "--control", f"{self.folder}/control"])
+            f"directory = {self.folder}\n"
+        )
+        self.simulator = subprocess.Popen(
+            [
+                self.build / "app/sim/iwheel-sim",
+                "--quiet",
+                "--uptime",
+                "120",
+                "--can",
+                f"unix:{self.folder}/bus",
+                "--estop",
+                f"{self.folder}/estop",
+                "--control",
+                f"{self.folder}/control",
+            ]
+        )
         for name in ("bus", "estop"):  # A gateway that starts without its e-stop is latched.
             self.await_file(name)
         self.gateway = self.start()
@@ -87,9 +101,24 @@ class Pair:
 
     def start(self):
         environment = dict(os.environ, LD_PRELOAD=str(self.preload), BENCH_ALLOCATIONS=str(self.allocations))
-        return subprocess.Popen([*self.under, self.build / "app/gateway/iwheel-gateway", "-c", self.folder / "gateway.conf", "--can",
-                                 f"unix:{self.folder}/bus", "--estop", f"unix:{self.folder}/estop", "--socket", self.northbound,
-                                 "--log-level", "error"], env=environment, stderr=subprocess.DEVNULL)
+        return subprocess.Popen(
+            [
+                *self.under,
+                self.build / "app/gateway/iwheel-gateway",
+                "-c",
+                self.folder / "gateway.conf",
+                "--can",
+                f"unix:{self.folder}/bus",
+                "--estop",
+                f"unix:{self.folder}/estop",
+                "--socket",
+                self.northbound,
+                "--log-level",
+                "error",
+            ],
+            env=environment,
+            stderr=subprocess.DEVNULL,
+        )
 
     def allocated(self):
         return struct.unpack("=Q", self.allocations.read_bytes())[0]
@@ -130,8 +159,15 @@ def allocations_in_use(pair):
     """Allocations while a client asks, arms, drives and leaves."""
     before = pair.allocated()
     client = Client(pair.northbound)
-    for request in [{"cmd": "status"}, {"cmd": "watch", "topics": ["state", "force", "frame"], "rate_hz": 50}, {"cmd": "arm", "name": "bench"},
-                    *[{"cmd": "drive", "left_mm_s": 50, "right_mm_s": 50}] * 20, {"cmd": "stop"}, {"cmd": "why"}, {"cmd": "nonsense"}]:
+    for request in [
+        {"cmd": "status"},
+        {"cmd": "watch", "topics": ["state", "force", "frame"], "rate_hz": 50},
+        {"cmd": "arm", "name": "bench"},
+        *[{"cmd": "drive", "left_mm_s": 50, "right_mm_s": 50}] * 20,
+        {"cmd": "stop"},
+        {"cmd": "why"},
+        {"cmd": "nonsense"},
+    ]:
         client.ask(**request)
         time.sleep(0.01)
     client.close()

@@ -4,6 +4,7 @@
 Over the local bus at the nominal 617 frames/s, as a process. Frames come when the simulator is woken, so that the figures move by a few per cent:
 they are held against limits. A machine under load makes them smaller, never larger.
 """
+
 import re
 import shutil
 import signal
@@ -151,10 +152,15 @@ def rows(build, pair_type, client_type):
     """(state, system calls and instructions for each frame), the dearest first; None: not measured. What is above its limit is measured once more:
     wakings that fall together differ by chance, and the smaller figure is what the loop costs."""
     found = measured(build, pair_type, client_type)
-    if any(figure is not None and limit is not None and figure > limit for state, *figures in found for figure, limit in zip(figures, LIMITS[state], strict=True)):
+    if any(
+        figure is not None and limit is not None and figure > limit for state, *figures in found for figure, limit in zip(figures, LIMITS[state], strict=True)
+    ):
         print("above a limit; once more", flush=True)
         again = {state: figures for state, *figures in measured(build, pair_type, client_type)}
-        found = [(state, *(figure if figure is None else min(figure, other) for figure, other in zip(figures, again[state], strict=True))) for state, *figures in found]
+        found = [
+            (state, *(figure if figure is None else min(figure, other) for figure, other in zip(figures, again[state], strict=True)))
+            for state, *figures in found
+        ]
     return found
 
 
@@ -164,8 +170,15 @@ def measured(build, pair_type, client_type):
         folder = Path(name)
         called = of_all(build, folder / "calls", pair_type, client_type, [], STATES, calls) if shutil.which("strace") else {}
         under = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/counted/callgrind.out"]
-        counted = of_all(build, folder / "counted", pair_type, client_type, under, [state for state in STATES if LIMITS[state][1]],
-                         lambda pid: instructions(pid, folder / "counted"))
+        counted = of_all(
+            build,
+            folder / "counted",
+            pair_type,
+            client_type,
+            under,
+            [state for state in STATES if LIMITS[state][1]],
+            lambda pid: instructions(pid, folder / "counted"),
+        )
     return [(state, called.get(state), counted.get(state)) for state in STATES]
 
 

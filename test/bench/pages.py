@@ -37,17 +37,29 @@ def put(title, lines):
 
 def put_counted(tables, compilers):
     """From the top of the page to the section of the process."""
-    lines = ["# Speed", "", f"Made by `test/bench/run --update` with {compilers}.", "",
-             "Instructions are counted (callgrind; Unicorn for the Cortex-M), so they are the same on every machine; `./check` counts them again. "
-             "Sizes of the core are in [sizes.md](sizes.md).", ""]
+    lines = [
+        "# Speed",
+        "",
+        f"Made by `test/bench/run --update` with {compilers}.",
+        "",
+        "Instructions are counted (callgrind; Unicorn for the Cortex-M), so they are the same on every machine; `./check` counts them again. "
+        "Sizes of the core are in [sizes.md](sizes.md).",
+        "",
+    ]
     for title, text, head, rows in tables:
         lines += ([title, ""] if title else []) + [*text, "", *table(head, rows), ""]
     PAGE.write_text("\n".join(lines) + "\n" + PROCESS + PAGE.read_text().split(PROCESS, 1)[1])
 
 
 def put_process(measured):
-    put(PROCESS, ["Over the local bus with two simulated wheels (617 frames/s), on the machine that made this page. Not checked: it depends on the machine.",
-                  "", *table(["", "figure", "goal"], [list(row) for row in measured])])
+    put(
+        PROCESS,
+        [
+            "Over the local bus with two simulated wheels (617 frames/s), on the machine that made this page. Not checked: it depends on the machine.",
+            "",
+            *table(["", "figure", "goal"], [list(row) for row in measured]),
+        ],
+    )
 
 
 def machine():
@@ -56,14 +68,19 @@ def machine():
 
 
 def put_timed(rows):
-    put(TIMED, [
-        f"Made by `test/bench/run --timed` on {machine()}. All that is compared runs in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
-        "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
-        "so that whoever calls less is further ahead; absolute times are worth nothing, ratios to the floor more. The floor is the leanest program that "
-        "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that looks at bus and e-stop before it acts, as whoever drives "
-        "somebody must (`floor_looks.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
-        "10 ms late is repeated. System calls are counted in virtual time, where each frame comes alone, however slowly they are traced.",
-        "", *table(["", "floor", "gateway", "peers", "goal"], rows)])
+    put(
+        TIMED,
+        [
+            f"Made by `test/bench/run --timed` on {machine()}. All that is compared runs in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
+            "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
+            "so that whoever calls less is further ahead; absolute times are worth nothing, ratios to the floor more. The floor is the leanest program that "
+            "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that looks at bus and e-stop before it acts, as whoever drives "
+            "somebody must (`floor_looks.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
+            "10 ms late is repeated. System calls are counted in virtual time, where each frame comes alone, however slowly they are traced.",
+            "",
+            *table(["", "floor", "gateway", "peers", "goal"], rows),
+        ],
+    )
     put_readme()
 
 

@@ -121,9 +121,13 @@ def main():
         time.sleep(COST_S)
         cost = (bridge.cpu_seconds() - begin_s) / COST_S
         print(f"drive by the C client to frame: {words(client_us)}")
-        for what, values in zip(("cmd_vel received to frame", "cmd_vel published to frame", "within the bridge"), (all_us[1], all_us[0], all_us[2]), strict=False):
+        for what, values in zip(
+            ("cmd_vel received to frame", "cmd_vel published to frame", "within the bridge"), (all_us[1], all_us[0], all_us[2]), strict=False
+        ):
             print(f"{what + ':':<31} {words(values)}, {percentile(values, 50) / percentile(client_us, 50):.2f} x")
-        print(f"bridge at 50 Hz odometry:       {100 * cost:.1f} % of one processor, {bridge.resident_kB() / 1024:.1f} MiB resident, {len(os.listdir(f'/proc/{bridge.child.pid}/task'))} threads")
+        print(
+            f"bridge at 50 Hz odometry:       {100 * cost:.1f} % of one processor, {bridge.resident_kB() / 1024:.1f} MiB resident, {len(os.listdir(f'/proc/{bridge.child.pid}/task'))} threads"
+        )
     finally:
         rig.close()
 

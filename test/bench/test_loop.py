@@ -4,6 +4,7 @@
 
 usage: test/bench/test_loop.py [unittest's arguments]
 """
+
 import sys
 import types
 import unittest

@@ -3,6 +3,7 @@
 
 usage: test_example.py BUILD [TEST...]
 """
+
 import os
 import shutil
 import signal
@@ -27,8 +28,12 @@ RAMP_MS = 200  # From 200 mm/s at 1500 mm/s2, and as much again for a busy machi
 
 class Example(RigCase):
     def start(self, seconds):
-        child = subprocess.Popen([os.path.join(BUILD, "lib", "client", "drive_20"), str(seconds)], stderr=subprocess.PIPE, text=True,
-                                 env={**os.environ, "IWHEEL_SOCKET": self.socket})
+        child = subprocess.Popen(
+            [os.path.join(BUILD, "lib", "client", "drive_20"), str(seconds)],
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "IWHEEL_SOCKET": self.socket},
+        )
         self.addCleanup(child.stderr.close)
         self.addCleanup(child.wait)
         self.addCleanup(child.kill)
@@ -98,8 +103,20 @@ class Example(RigCase):
     def test_program_in_cpp_drives_and_stops(self):
         program = self.rig.path("client")
         library = os.path.join(BUILD, "lib", "client", "libiwheel-client.a")
-        subprocess.run(["c++", "-std=c++11", "-I", os.path.join(ROOT, "lib", "client", "include"),
-                        os.path.join(ROOT, "test", "package", "client.cpp"), library, *SANITIZED, "-o", program], check=True)
+        subprocess.run(
+            [
+                "c++",
+                "-std=c++11",
+                "-I",
+                os.path.join(ROOT, "lib", "client", "include"),
+                os.path.join(ROOT, "test", "package", "client.cpp"),
+                library,
+                *SANITIZED,
+                "-o",
+                program,
+            ],
+            check=True,
+        )
         done = subprocess.run([program], capture_output=True, text=True, timeout=10, env={**os.environ, "IWHEEL_SOCKET": self.socket}, check=False)
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         with Gateway(self.socket) as gateway:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A person at a terminal: reads what a program writes on a pty, and types when asked."""
+
 import contextlib
 import fcntl
 import os
@@ -28,8 +29,7 @@ class Operator:
     def __init__(self, command, environment, columns=80, rows=24):
         self.parent, child = pty.openpty()
         fcntl.ioctl(child, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-        self.process = subprocess.Popen(command, stdin=child, stdout=child, stderr=child, env=environment,
-                                        start_new_session=True, preexec_fn=sit_down)
+        self.process = subprocess.Popen(command, stdin=child, stdout=child, stderr=child, env=environment, start_new_session=True, preexec_fn=sit_down)
         os.close(child)
         self.text, self.raw = "", b""
         self.seen = 0
@@ -53,12 +53,11 @@ class Operator:
         while True:
             found = words.search(self.text, self.seen)
             if found:
-                before = self.text[self.seen:found.start()]
+                before = self.text[self.seen : found.start()]
                 self.seen = found.end()
                 return before
             if not self.pump(0.05) or time.monotonic() > end:
-                raise AssertionError(f"{text!r} did not come; after the last text came:\n{self.text[self.seen:]}\n"
-                                     f"--- all of it:\n{self.text[-3000:]}")
+                raise AssertionError(f"{text!r} did not come; after the last text came:\n{self.text[self.seen :]}\n--- all of it:\n{self.text[-3000:]}")
 
     def resize(self, columns, rows):
         fcntl.ioctl(self.parent, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Runs the tests of a file several at a time, each in a process of its own: they wait more than they work."""
+
 import os
 import re
 import subprocess

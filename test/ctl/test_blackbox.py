@@ -4,6 +4,7 @@
 
 Usage: test_blackbox.py BUILD [unittest's arguments]
 """
+
 import base64
 import glob
 import json
@@ -46,8 +47,7 @@ class WithRig(unittest.TestCase):
     sim_args = ()
 
     def setUp(self):
-        self.rig = Rig(BUILD, config={**PATIENT, **self.config, "record": {"directory": "/nowhere", **self.config.get("record", {})}},
-                       sim_args=self.sim_args)
+        self.rig = Rig(BUILD, config={**PATIENT, **self.config, "record": {"directory": "/nowhere", **self.config.get("record", {})}}, sim_args=self.sim_args)
         self.addCleanup(self.rig.close)
         self.folder = self.rig.path("records")
         self.rig.settings["record"]["directory"] = self.folder
@@ -56,8 +56,9 @@ class WithRig(unittest.TestCase):
         self.client = self.rig.client("tester")
 
     def ctl(self, *words):
-        done = subprocess.run([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words],
-                              capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(
+            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words], capture_output=True, text=True, timeout=60, check=False
+        )
         return done.returncode, done.stdout, done.stderr
 
     def drive(self, seconds, left=300, right=200):
@@ -76,7 +77,7 @@ class WithRig(unittest.TestCase):
             names = self.recordings("jsonl")
             whole = [name for name in names if '{"type":"end"' in read(name)[-200:]]
             if len(whole) >= count:
-                return whole[-1][:-len(".jsonl")]
+                return whole[-1][: -len(".jsonl")]
             if time.monotonic() > end:
                 self.fail(f"{len(whole)} of {names} are whole; {self.rig.gateway.text()[-800:]}")
             time.sleep(0.05)
@@ -127,8 +128,7 @@ class BlackBox(WithRig):
         self.assertNotIn("DIFFERENT", out)
         entries = [json.loads(line) for line in read(stem + ".jsonl").splitlines() if '"type":"ledger"' in line]
         self.assertEqual("contradicted", entries[0]["state"])
-        self.assertEqual(("mount_sign_left", "confirmed", "operator"),
-                         tuple(entries[-1][name] for name in ("item", "state", "evidence")))
+        self.assertEqual(("mount_sign_left", "confirmed", "operator"), tuple(entries[-1][name] for name in ("item", "state", "evidence")))
 
     def test_why_tells_the_recording_and_the_frames_around_the_stop(self):
         stem = self.stop_by_button()
@@ -241,8 +241,15 @@ class OverTheSocket(WithRig):
     def test_why_and_replay_say_the_same_as_from_the_files(self):
         stem = self.stop_by_button()
         number = str(int(os.path.basename(stem).split("-")[1]))
-        for words in (("why", number), ("why", number, "--frames", "40"), ("why", "--list"), ("why", stem + ".log"),
-                      ("replay", stem + ".log"), ("--json", "replay", stem + ".log"), ("--json", "why", "--list")):
+        for words in (
+            ("why", number),
+            ("why", number, "--frames", "40"),
+            ("why", "--list"),
+            ("why", stem + ".log"),
+            ("replay", stem + ".log"),
+            ("--json", "replay", stem + ".log"),
+            ("--json", "why", "--list"),
+        ):
             here = self.ctl(*words)
             self.assertEqual((0, ""), (here[0], here[2]), words)
             self.assertEqual(here, self.away(*words), words)
@@ -298,8 +305,16 @@ class Pieces(WithRig):
         with open(os.path.join(self.folder, "secret"), "w", encoding="ascii") as file:
             file.write("secret")
         os.symlink("secret", os.path.join(self.folder, "stop-000005-a.log"))
-        for name in ("secret", "../gateway.conf", "/etc/passwd", self.folder + "/stop-000001-estop_line.log", "stop-000001-estop_line",
-                     "./stop-000001-estop_line.log", "stop-000001-estop_line.log/", "."):
+        for name in (
+            "secret",
+            "../gateway.conf",
+            "/etc/passwd",
+            self.folder + "/stop-000001-estop_line.log",
+            "stop-000001-estop_line",
+            "./stop-000001-estop_line.log",
+            "stop-000001-estop_line.log/",
+            ".",
+        ):
             reply = self.client.request("recording", name=name)
             self.assertEqual("bad_value", reply["error"], (name, reply))
             self.assertNotIn(self.folder, reply["message"])
@@ -423,7 +438,7 @@ class Record(WithRig):
     def check(self, path):
         lines = read(path).splitlines(True)
         self.assertGreater(len(lines), 700)
-        times = [float(line[1:line.index(")")]) for line in lines]
+        times = [float(line[1 : line.index(")")]) for line in lines]
         self.assertEqual(times, sorted(times))
         self.assertLess(abs(times[-1] - time.time()), 20)
         return lines
@@ -451,8 +466,9 @@ class Record(WithRig):
 
     def test_interrupted_recording_is_whole(self):
         path = self.rig.path("three.log")
-        child = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path],
-                                 stderr=subprocess.PIPE, text=True)
+        child = subprocess.Popen(
+            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path], stderr=subprocess.PIPE, text=True
+        )
         time.sleep(1.8)
         child.send_signal(signal.SIGINT)
         _, err = child.communicate(timeout=10)
@@ -468,22 +484,20 @@ class Record(WithRig):
 
 
 class Learn(WithRig):
-    config = {"wheels": {"setpoint_type": 9, "current_role": "setpoint", "setpoint_dlc": 8, "rpm_of": "rotor", "gear_ratio": "4"},
-              "left": {"force_unit": "dN"}}
+    config = {"wheels": {"setpoint_type": 9, "current_role": "setpoint", "setpoint_dlc": 8, "rpm_of": "rotor", "gear_ratio": "4"}, "left": {"force_unit": "dN"}}
 
     def test_strange_wheels_are_learnt_from_a_recording(self):
-        for command in ("type 9", "role setpoint", "unit left dN", "gear left 4", "gear right 4", "rpm left rotor",
-                        "rpm right rotor", "pose reversed"):
+        for command in ("type 9", "role setpoint", "unit left dN", "gear left 4", "gear right 4", "rpm left rotor", "rpm right rotor", "pose reversed"):
             self.rig.sim.ask(command)
         path = self.rig.path("other.log")
-        child = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path,
-                                  "--for", "11s"], stderr=subprocess.DEVNULL)
+        child = subprocess.Popen(
+            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "record", path, "--for", "11s"], stderr=subprocess.DEVNULL
+        )
         time.sleep(1.5)
         self.assertTrue(self.client.request("arm")["ok"])
         for speed in (400, -400):
             for _ in range(70):
-                self.client.request("drive", left_mm_s=speed, right_mm_s=speed, left_mA=1000 if speed > 0 else -1000,
-                                    right_mA=1000 if speed > 0 else -1000)
+                self.client.request("drive", left_mm_s=speed, right_mm_s=speed, left_mA=1000 if speed > 0 else -1000, right_mA=1000 if speed > 0 else -1000)
                 time.sleep(0.05)
         self.client.request("stop")
         child.wait(20)
@@ -492,9 +506,17 @@ class Learn(WithRig):
             file.write(text)
         code, out, err = self.ctl("learn", path)
         self.assertEqual((0, ""), (code, err))
-        for part in ("+ setpoint type 9 moves the wheels", "always 8 bytes", "setpoint_type = 9", "setpoint_dlc = 8",
-                     "- left force at rest / offset", "force_unit = dN", "LEAST significant byte first",
-                     "another gear (rpm_of, gear_ratio)", "period     20 ms"):
+        for part in (
+            "+ setpoint type 9 moves the wheels",
+            "always 8 bytes",
+            "setpoint_type = 9",
+            "setpoint_dlc = 8",
+            "- left force at rest / offset",
+            "force_unit = dN",
+            "LEAST significant byte first",
+            "another gear (rpm_of, gear_ratio)",
+            "period     20 ms",
+        ):
             self.assertIn(part, out)
 
 

@@ -6,6 +6,7 @@ Usage: test_bringup.py BUILD [unittest's arguments]
 
 Without further arguments several tests run at a time.
 """
+
 import os
 import shutil
 import signal
@@ -73,10 +74,21 @@ class Bringup(unittest.TestCase):
         raise AssertionError(f"no child {name}")
 
     def start(self, *words):
-        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
-                             f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
-                             self.out + ".from", *words],
-                            environment(self.runtime))
+        operator = Operator(
+            [
+                find_program(BUILD, "iwheelctl"),
+                "bringup",
+                self.out,
+                "--can",
+                f"unix:{self.rig.path('bus')}",
+                "--estop",
+                f"unix:{self.rig.path('button')}",
+                "--from",
+                self.out + ".from",
+                *words,
+            ],
+            environment(self.runtime),
+        )
         self.addCleanup(self.end, operator)
         return operator
 
@@ -181,14 +193,24 @@ class Bringup(unittest.TestCase):
 
     def wait_until_stands(self):
         import json
+
         time.sleep(0.2)
         while any(json.loads(self.rig.sim.ask("status"))[side]["speed_mm_s"] for side in ("left", "right")):
             time.sleep(0.05)
         time.sleep(0.15)
 
     def test_wheels_that_are_mirrored_in_other_units_and_of_another_radius(self):
-        for command in ("type 3", "role limit", "unit left dN", "unit right cN", "radius both 160", "mirror left on",
-                        "gear both 4", "rpm both rotor", "track 620"):
+        for command in (
+            "type 3",
+            "role limit",
+            "unit left dN",
+            "unit right cN",
+            "radius both 160",
+            "mirror left on",
+            "gear both 4",
+            "rpm both rotor",
+            "track 620",
+        ):
             self.rig.sim.ask(command)
         os.mkdir(self.records)
         with open(self.out + ".from", "a", encoding="utf-8") as file:
@@ -209,14 +231,36 @@ class Bringup(unittest.TestCase):
         operator.answer("Take that?", "y")
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
-        found = {(section, key): self.value(section, key) for section, key in (
-            ("wheels", "setpoint_type"), ("wheels", "current_role"), ("left", "invert"), ("right", "invert"),
-            ("left", "force_unit"), ("right", "force_unit"), ("wheels", "gear_ratio"), ("wheels", "rpm_of"),
-            ("drive", "max_speed_mm_s"), ("drive", "lease_ms"))}
-        self.assertEqual({("wheels", "setpoint_type"): "3", ("wheels", "current_role"): "limit",
-                          ("left", "invert"): "yes", ("right", "invert"): "no", ("left", "force_unit"): "dN",
-                          ("right", "force_unit"): "cN", ("wheels", "gear_ratio"): "4", ("wheels", "rpm_of"): "rotor",
-                          ("drive", "max_speed_mm_s"): "1000", ("drive", "lease_ms"): "200"}, found)
+        found = {
+            (section, key): self.value(section, key)
+            for section, key in (
+                ("wheels", "setpoint_type"),
+                ("wheels", "current_role"),
+                ("left", "invert"),
+                ("right", "invert"),
+                ("left", "force_unit"),
+                ("right", "force_unit"),
+                ("wheels", "gear_ratio"),
+                ("wheels", "rpm_of"),
+                ("drive", "max_speed_mm_s"),
+                ("drive", "lease_ms"),
+            )
+        }
+        self.assertEqual(
+            {
+                ("wheels", "setpoint_type"): "3",
+                ("wheels", "current_role"): "limit",
+                ("left", "invert"): "yes",
+                ("right", "invert"): "no",
+                ("left", "force_unit"): "dN",
+                ("right", "force_unit"): "cN",
+                ("wheels", "gear_ratio"): "4",
+                ("wheels", "rpm_of"): "rotor",
+                ("drive", "max_speed_mm_s"): "1000",
+                ("drive", "lease_ms"): "200",
+            },
+            found,
+        )
         self.assertAlmostEqual(160, int(self.value("wheels", "radius_mm")), delta=2)
         with open(self.out, encoding="utf-8") as file:
             text = file.read()
@@ -229,27 +273,42 @@ class Bringup(unittest.TestCase):
 
     def gateway_takes_it(self):
         """The real gateway starts with the file, and its wheels go where they are told."""
-        done = subprocess.run([find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket",
-                               self.rig.path("gateway.sock"), "--check"], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), "--check"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         self.assertEqual(0, done.returncode, done.stdout + done.stderr)
 
     def ledger_knows_it(self):
         """A gateway that starts with the file finds the operator's word."""
-        self.rig.gateway_command = lambda *extra: [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket",
-                                                   self.rig.path("gateway.sock"), *extra]
+        self.rig.gateway_command = lambda *extra: [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket", self.rig.path("gateway.sock"), *extra]
         self.rig.start_gateway()
         client = self.rig.client()
         entries = self.rig.wait_status(client, lambda s: s["memory"]["state"] == "kept")["ledger"]
-        for item in ("setpoint_type", "current_role", "mount_sign_left", "mount_sign_right", "wheel_radius", "gear_ratio",
-                     "force_unit_left", "force_unit_right", "track"):
+        for item in (
+            "setpoint_type",
+            "current_role",
+            "mount_sign_left",
+            "mount_sign_right",
+            "wheel_radius",
+            "gear_ratio",
+            "force_unit_left",
+            "force_unit_right",
+            "track",
+        ):
             self.assertEqual("confirmed", entries[item]["state"], (item, entries[item]))
             self.assertTrue(entries[item]["reason"].startswith("found by bringup: "), entries[item])
-        for item, number in (("track", r"3 full turns by hand: left -?\d+, right -?\d+ ticks"),
-                             ("wheel_radius", r"5\.00 m pushed: left -?\d+, right -?\d+ ticks"),
-                             ("gear_ratio", r"\d+ and \d+ ticks in 3 turns by hand"),
-                             ("setpoint_type", "told 100 mm/s, measured"), ("force_unit_left", r"5\.00 kg changed"),
-                             ("mount_sign_left", "saw it turn backwards with invert = no"),
-                             ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together did")):
+        for item, number in (
+            ("track", r"3 full turns by hand: left -?\d+, right -?\d+ ticks"),
+            ("wheel_radius", r"5\.00 m pushed: left -?\d+, right -?\d+ ticks"),
+            ("gear_ratio", r"\d+ and \d+ ticks in 3 turns by hand"),
+            ("setpoint_type", "told 100 mm/s, measured"),
+            ("force_unit_left", r"5\.00 kg changed"),
+            ("mount_sign_left", "saw it turn backwards with invert = no"),
+            ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together did"),
+        ):
             self.assertRegex(entries[item]["reason"], number)
 
     def test_current_that_is_a_setpoint_is_found_out(self):
@@ -314,8 +373,7 @@ class Bringup(unittest.TestCase):
         recording = os.path.join(self.folder.name, "old.log")
         with open(recording, "w", encoding="utf-8") as file:
             for at in range(50):
-                file.write(f"({at * 0.02:.6f}) can0 10A#0300{at:02X}07D0000000\n({at * 0.02 + 0.001:.6f}) can0 "
-                           f"12A#0300{at:02X}07D0000000\n")
+                file.write(f"({at * 0.02:.6f}) can0 10A#0300{at:02X}07D0000000\n({at * 0.02 + 0.001:.6f}) can0 12A#0300{at:02X}07D0000000\n")
         self.rig.sim.ask("type 3")
         operator = self.begin("--learn", recording)
         operator.expect("98 setpoints have a speed, with type 3")
@@ -407,8 +465,10 @@ class Bringup(unittest.TestCase):
     def test_killed_together_with_its_gateway_and_its_terminal_it_leaves_nothing_behind(self):
         operator = self.begin()
         operator.expect("types to try")
-        self.assertEqual(["gateway.conf", "gateway.log", "gateway.sock"], sorted(
-            name for name in os.listdir(os.path.join(self.runtime, *os.listdir(self.runtime))) if name.startswith("gateway")))
+        self.assertEqual(
+            ["gateway.conf", "gateway.log", "gateway.sock"],
+            sorted(name for name in os.listdir(os.path.join(self.runtime, *os.listdir(self.runtime))) if name.startswith("gateway")),
+        )
         gateway = self.child_of(operator, "iwheel-gateway")
         os.killpg(operator.process.pid, signal.SIGKILL)
         os.kill(gateway, signal.SIGKILL)
@@ -442,8 +502,7 @@ class Bringup(unittest.TestCase):
         with open(self.out + ".old", encoding="utf-8") as file:
             self.assertEqual("; precious\n", file.read())
         self.assertEqual("192", self.value("wheels", "radius_mm"))
-        self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: somebody saw it turn forwards with invert = no'",
-                      operator.text)
+        self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: somebody saw it turn forwards with invert = no'", operator.text)
 
     # --- what was not seen is not concluded -----------------------------------------------------------------------
 
@@ -464,8 +523,7 @@ class Bringup(unittest.TestCase):
     def test_gear_is_not_concluded_from_the_other_wheel_from_back_and_forth_or_from_none(self):
         operator = self.begin(gear=True)
         operator.answer("Turn the wheels by hand?", "y")
-        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "make no gear"),
-                             (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
+        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "make no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
             operator.expect("press Enter ...")
             for push in pushes:
                 self.rig.sim.ask(push)
@@ -645,10 +703,13 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         self.drive_through(operator)
         operator.answer("Distance in m", "")
-        for turns, commands, told in ((3, ("push both 2",), "rolled the same way"), (3, ("turn 0.5",), "Too few ticks"),
-                                      (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
-                                      (3, ("push right 4", "push left -1.5"), "wandered off"),
-                                      (20, ("turn 1",), "no track between 200")):
+        for turns, commands, told in (
+            (3, ("push both 2",), "rolled the same way"),
+            (3, ("turn 0.5",), "Too few ticks"),
+            (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
+            (3, ("push right 4", "push left -1.5"), "wandered off"),
+            (20, ("turn 1",), "no track between 200"),
+        ):
             self.turn_around(operator, *commands, turns=turns)
             operator.expect(told)
         operator.answer("How many full turns", "2.5")
@@ -708,9 +769,20 @@ class Bringup(unittest.TestCase):
             self.ends_soon(operator)
 
     def test_folder_in_tmp_is_removed_when_there_is_no_runtime_directory(self):
-        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
-                             f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
-                             self.out + ".from"], environment())
+        operator = Operator(
+            [
+                find_program(BUILD, "iwheelctl"),
+                "bringup",
+                self.out,
+                "--can",
+                f"unix:{self.rig.path('bus')}",
+                "--estop",
+                f"unix:{self.rig.path('button')}",
+                "--from",
+                self.out + ".from",
+            ],
+            environment(),
+        )
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
@@ -726,8 +798,10 @@ class Bringup(unittest.TestCase):
 
     def test_a_running_gateway_is_not_driven_past(self):
         self.rig.start_gateway()
-        operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "bringup",
-                             self.out, "--can", f"unix:{self.rig.path('bus')}"], environment())
+        operator = Operator(
+            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "bringup", self.out, "--can", f"unix:{self.rig.path('bus')}"],
+            environment(),
+        )
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
         operator.expect("A gateway already runs on this bus")
@@ -735,13 +809,18 @@ class Bringup(unittest.TestCase):
 
     def test_end_of_input_ends_it_and_wrong_words_are_usage(self):
         program = find_program(BUILD, "iwheelctl")
-        done = subprocess.run([program, "bringup", "--can", f"unix:{self.rig.path('bus')}", "--estop", "none"],
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False)
+        done = subprocess.run(
+            [program, "bringup", "--can", f"unix:{self.rig.path('bus')}", "--estop", "none"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            env=environment(),
+            check=False,
+        )
         self.assertEqual(1, done.returncode)
         self.assertIn("Nothing was written", done.stdout)
         for words in (("--current", "5"), ("--learn", "/nonexistent"), ("--can",), ("a", "b"), ("--wheel",), ("--can", "a/b")):
-            done = subprocess.run([program, "bringup", *words], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                                  env=environment(), check=False)
+            done = subprocess.run([program, "bringup", *words], stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False)
             self.assertEqual(64, done.returncode, (words, done.stderr))
 
 

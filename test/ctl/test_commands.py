@@ -4,6 +4,7 @@
 
 Usage: test_commands.py BUILD [unittest's arguments]
 """
+
 import json
 import os
 import re
@@ -28,8 +29,16 @@ def run(*words, program="iwheelctl", path=None, **more):
     environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
     if path:
         environment["PATH"] = path
-    done = subprocess.run([find_program(BUILD, program), *words], capture_output=True, text=True, timeout=30,
-                          stdin=subprocess.DEVNULL, env={**environment, "TERM": "dumb"}, check=False, **more)
+    done = subprocess.run(
+        [find_program(BUILD, program), *words],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        stdin=subprocess.DEVNULL,
+        env={**environment, "TERM": "dumb"},
+        check=False,
+        **more,
+    )
     return done.returncode, done.stdout, done.stderr
 
 
@@ -43,30 +52,38 @@ def listed(verb):
 
 class Grammar(unittest.TestCase):
     # Every option of every verb that takes a time: the words before it, the range.
-    DURATIONS = ((("drive", "1", "2", "--for"), "20ms to 10min"), (("record", "-", "--for"), "1ms to 720h"),
-                 (("doctor", "--listen"), "200ms to 1min"))
+    DURATIONS = ((("drive", "1", "2", "--for"), "20ms to 10min"), (("record", "-", "--for"), "1ms to 720h"), (("doctor", "--listen"), "200ms to 1min"))
 
     def test_every_duration_is_written_alike_and_refused_alike(self):
         for words, bounds in self.DURATIONS:
-            for wrong, cure in (("2", "2s"), ("0.5", "0.5s"), ("1m", "1min"), ("soon", ""), ("-1s", ""), ("1.s", ""),
-                                ("1.2345s", ""), ("999999999", "")):
+            for wrong, cure in (("2", "2s"), ("0.5", "0.5s"), ("1m", "1min"), ("soon", ""), ("-1s", ""), ("1.s", ""), ("1.2345s", ""), ("999999999", "")):
                 code, out, err = run("--socket", "/nonexistent", *words, wrong)
                 told = f"; write: {words[-1]} {cure}" if cure else ""
-                self.assertEqual((64, "", f'iwheelctl: {words[-1]} wants a time with its unit, such as 500ms, 1.5s, 2min '
-                                  f'or 1h, not "{wrong}"{told}\n'), (code, out, err), words)
+                self.assertEqual(
+                    (64, "", f'iwheelctl: {words[-1]} wants a time with its unit, such as 500ms, 1.5s, 2min or 1h, not "{wrong}"{told}\n'),
+                    (code, out, err),
+                    words,
+                )
             code, _, err = run("--socket", "/nonexistent", *words, "")
             self.assertEqual((64, True), (code, "is empty; leave it out" in err), err)
             code, _, err = run("--socket", "/nonexistent", *words, "0s")
             self.assertEqual((64, f"iwheelctl: {words[-1]} 0s is out of range; write {bounds}\n"), (code, err))
             for right in ("300ms", "0.3s", "0.005min") + (("2s", "0.001h") if words[0] == "drive" else ()):
-                self.assertNotEqual(64, run("--socket", "/nonexistent", *words, right, *(
-                    ("unix:/nonexistent",) if words[0] == "doctor" else ("--can", "unix:/nonexistent")
-                    if words[0] == "record" else ()))[0], (words, right))
+                self.assertNotEqual(
+                    64,
+                    run(
+                        "--socket",
+                        "/nonexistent",
+                        *words,
+                        right,
+                        *(("unix:/nonexistent",) if words[0] == "doctor" else ("--can", "unix:/nonexistent") if words[0] == "record" else ()),
+                    )[0],
+                    (words, right),
+                )
 
     def test_no_option_of_a_verb_takes_a_time_otherwise(self):
         """A new one belongs into the table above."""
-        taking = {(verb, option) for verb in verbs()
-                  for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
+        taking = {(verb, option) for verb in verbs() for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
         self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, taking)
 
     def test_verb_nearly_right_is_asked_after_and_a_strange_one_gets_the_list(self):
@@ -86,7 +103,7 @@ class Web(unittest.TestCase):
             self.assertIn("apt-get install ./iwheel-web_*.deb", err)
             fake = os.path.join(folder, "iwheel-web")
             with open(fake, "w", encoding="ascii") as file:
-                file.write("#!/bin/sh\necho \"told $*\"\n")
+                file.write('#!/bin/sh\necho "told $*"\n')
             os.chmod(fake, 0o755)
             self.assertEqual((0, "told --url\n", ""), run("web", path=folder))
         self.assertEqual(64, run("web", "word")[0])
@@ -98,7 +115,7 @@ class Web(unittest.TestCase):
             self.assertIn("apt-get install ./iwheel-mqtt_*.deb", err)
             fake = os.path.join(folder, "iwheel-fleet")
             with open(fake, "w", encoding="ascii") as file:
-                file.write("#!/bin/sh\necho \"told $*\"\n")
+                file.write('#!/bin/sh\necho "told $*"\n')
             os.chmod(fake, 0o755)
             self.assertEqual((0, "told \n", ""), run("fleet", path=folder))
             self.assertEqual((0, "told history w1 --last 12h --json\n", ""), run("fleet", "history", "w1", "--json", "--last", "12h", path=folder))
@@ -152,8 +169,7 @@ class Help(unittest.TestCase):
         self.assertEqual(run("--help"), run("help"))
 
     def test_no_help_is_wider_than_80_columns(self):
-        pages = [("iwheelctl", ("help",)), ("iwheel-gateway", ("--help",)), ("iwheel-sim", ("--help",)),
-                 *(("iwheelctl", ("help", verb)) for verb in verbs())]
+        pages = [("iwheelctl", ("help",)), ("iwheel-gateway", ("--help",)), ("iwheel-sim", ("--help",)), *(("iwheelctl", ("help", verb)) for verb in verbs())]
         for program, words in pages:
             code, out, _ = run(*words, program=program)
             self.assertEqual(0, code, (program, words))
@@ -179,33 +195,39 @@ class Completion(unittest.TestCase):
     """What each shell offers is what the program says of itself; asked as the shell asks."""
 
     def environment(self):
-        folders = [os.path.dirname(os.path.abspath(find_program(BUILD, name)))
-                   for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]
+        folders = [os.path.dirname(os.path.abspath(find_program(BUILD, name))) for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]
         return {**os.environ, "PATH": ":".join([*folders, os.environ["PATH"]])}
 
     def ask(self, *command):
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, env=self.environment(), cwd=ROOT,
-                              stdin=subprocess.DEVNULL)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, env=self.environment(), cwd=ROOT, stdin=subprocess.DEVNULL)
         return set(done.stdout.split("\n")) - {""}
 
     def bash(self, *words, program="_iwheelctl"):
-        return self.ask("bash", "-c", 'source share/completions/iwheel.bash; f=$1; shift; COMP_WORDS=("$@"); '
-                        'COMP_CWORD=$(($# - 1)); "$f" "$1"; printf "%s\\n" "${COMPREPLY[@]}"', "bash", program, *words)
+        return self.ask(
+            "bash",
+            "-c",
+            'source share/completions/iwheel.bash; f=$1; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); "$f" "$1"; printf "%s\\n" "${COMPREPLY[@]}"',
+            "bash",
+            program,
+            *words,
+        )
 
     def fish(self, *words):
-        lines = self.ask("fish", "--no-config", "-c", "source share/completions/iwheelctl.fish; complete -C \"$argv\"",
-                         " ".join(words))
+        lines = self.ask("fish", "--no-config", "-c", 'source share/completions/iwheelctl.fish; complete -C "$argv"', " ".join(words))
         return {line.split("\t")[0] for line in lines}
 
     def zsh(self, *words):
         """Types the words and two tabs on a terminal; what then stands there."""
         sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
         from operator_at_terminal import Operator
+
         operator = Operator(["zsh", "-f", "-i"], {**self.environment(), "TERM": "dumb", "PS1": "", "PROMPT": ""}, 200, 50)
         self.addCleanup(operator.close)
         with tempfile.TemporaryDirectory() as folder:
-            operator.type(f"fpath=({ROOT}/share/completions $fpath); autoload -U compinit; compinit -u -d {folder}/dump; "
-                          "setopt list_ambiguous auto_list no_auto_menu; LISTMAX=0; unset zle_bracketed_paste; print REA''DY\n")
+            operator.type(
+                f"fpath=({ROOT}/share/completions $fpath); autoload -U compinit; compinit -u -d {folder}/dump; "
+                "setopt list_ambiguous auto_list no_auto_menu; LISTMAX=0; unset zle_bracketed_paste; print REA''DY\n"
+            )
             operator.expect("READY")
             operator.type(" ".join(words) + "\t\t")
             operator.expect(words[-1] if words[-1] else words[0])
@@ -218,7 +240,7 @@ class Completion(unittest.TestCase):
             before = len(operator.text)
             operator.pump(0.05)
             quiet = time.monotonic() if len(operator.text) > before else quiet
-            offer = set(re.findall(r"[\w-]+", operator.text[operator.seen:])) - typed
+            offer = set(re.findall(r"[\w-]+", operator.text[operator.seen :])) - typed
         return offer
 
     def shells(self):
@@ -258,8 +280,9 @@ class Completion(unittest.TestCase):
 
     def test_lists_are_those_of_the_program(self):
         self.assertLessEqual(set(ITEMS), set(listed("confirm")))
-        ledger = subprocess.run(["grep", "-c", "IW_ASSUMPTION_", os.path.join(ROOT, "core", "include", "iwheel", "types.h")],
-                                capture_output=True, text=True, check=True)
+        ledger = subprocess.run(
+            ["grep", "-c", "IW_ASSUMPTION_", os.path.join(ROOT, "core", "include", "iwheel", "types.h")], capture_output=True, text=True, check=True
+        )
         self.assertGreater(int(ledger.stdout), len(ITEMS))
         for verb in verbs():
             for word in listed(verb):

@@ -4,6 +4,7 @@
 
 Usage: test_cures.py BUILD [unittest's arguments]
 """
+
 import glob
 import json
 import os
@@ -23,11 +24,22 @@ from harness import Rig, find_program, read_only
 BUILD = ""
 # Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
 PROGRAMS = {
-    "apt-get": ("apt", {"install"}), "candump": ("can-utils", None), "chmod": ("coreutils", {"go-w"}),
-    "chown": ("coreutils", None), "chrt": ("util-linux", {"-f"}), "gpiodetect": ("gpiod", None), "gpioinfo": ("gpiod", None),
-    "groupadd": ("passwd", {"--system"}), "ip": ("iproute2", None), "journalctl": ("systemd", {"-u"}),
-    "mkdir": ("coreutils", {"-p"}), "modprobe": ("kmod", {"can_raw"}), "systemctl": ("systemd", {"start", "stop", "restart", "enable"}),
-    "sysctl": ("procps", None), "timedatectl": ("systemd", {"set-ntp"}), "usermod": ("passwd", {"-aG"}),
+    "apt-get": ("apt", {"install"}),
+    "candump": ("can-utils", None),
+    "chmod": ("coreutils", {"go-w"}),
+    "chown": ("coreutils", None),
+    "chrt": ("util-linux", {"-f"}),
+    "gpiodetect": ("gpiod", None),
+    "gpioinfo": ("gpiod", None),
+    "groupadd": ("passwd", {"--system"}),
+    "ip": ("iproute2", None),
+    "journalctl": ("systemd", {"-u"}),
+    "mkdir": ("coreutils", {"-p"}),
+    "modprobe": ("kmod", {"can_raw"}),
+    "systemctl": ("systemd", {"start", "stop", "restart", "enable"}),
+    "sysctl": ("procps", None),
+    "timedatectl": ("systemd", {"set-ntp"}),
+    "usermod": ("passwd", {"-aG"}),
 }
 OURS = {"iwheelctl", "iwheel-sim", "iwheel-gateway"}
 
@@ -44,7 +56,18 @@ def output(*command):
 def sentences():
     """(file, text) of every string in the sources of the programs, its pieces put together."""
     text_of = r'"(?:[^"\\\n]|\\.)*"'
-    parts = ("lib/begin", "lib/config", "lib/inspect", "lib/northbound", "lib/recording", "lib/sockets", "app/ctl", "app/gateway", "app/sim", "app/bridge/serial")
+    parts = (
+        "lib/begin",
+        "lib/config",
+        "lib/inspect",
+        "lib/northbound",
+        "lib/recording",
+        "lib/sockets",
+        "app/ctl",
+        "app/gateway",
+        "app/sim",
+        "app/bridge/serial",
+    )
     for path in sorted(path for part in parts for path in glob.glob(os.path.join(ROOT, part, "**", "*.c"), recursive=True)):
         with open(path, encoding="utf-8") as file:
             source = re.sub(r"//[^\n]*|^#include.*$", "", file.read(), flags=re.MULTILINE)
@@ -77,7 +100,7 @@ class EveryCommandExists(unittest.TestCase):
                 self.assertIn(option, [*self.words[verb], "--for"], place)
                 self.assertIn(option, self.words[verb], place)
             item = rest.split()[0] if rest.split() else ""
-            if verb == "confirm" and re.search(r": iwheelctl confirm$|: iwheelctl confirm \w", match.string[:match.end()]):
+            if verb == "confirm" and re.search(r": iwheelctl confirm$|: iwheelctl confirm \w", match.string[: match.end()]):
                 self.assertIn(item.rstrip("."), self.words["confirm"], place)
 
     def test_options_and_commands_of_the_simulator_and_the_gateway(self):
@@ -129,8 +152,7 @@ class EveryCommandExists(unittest.TestCase):
 
     def test_keys_of_the_configuration_exist(self):
         keys, section = set(), ""
-        for line in output(program("iwheel-gateway"), "--print-config", "-c",
-                           os.path.join(ROOT, "share", "gateway.conf")).splitlines():
+        for line in output(program("iwheel-gateway"), "--print-config", "-c", os.path.join(ROOT, "share", "gateway.conf")).splitlines():
             section = line[1:-1] if line.startswith("[") else section
             if match := re.match(r";? ?(\w+) *=", line):
                 keys.add((section, match.group(1)))
@@ -146,8 +168,7 @@ class EveryCommandExists(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("ip"), "ip is missing (apt-get install iproute2)")
     def test_ip_knows_every_word_of_its_commands(self):
-        known = set(re.findall(r"[a-z][a-z-]+", output("ip", "link", "help", "can") + output("ip", "link", "help") +
-                               output("ip", "help")))
+        known = set(re.findall(r"[a-z][a-z-]+", output("ip", "link", "help", "can") + output("ip", "link", "help") + output("ip", "help")))
         for place, match in self.find(r"(?:^|[^\w-])ip ((?:-\w+ )?link (?:[^;,()\n|]+))", 8):
             words = [word for word in match.group(1).split() if re.fullmatch(r"-?[a-z][a-z-]+", word)]
             self.assertTrue(words, place)
@@ -160,13 +181,21 @@ class CarriedOut(unittest.TestCase):
 
     # What only hands can do, by the words of the cure, and how it is done to simulated wheels.
     HANDS = {
-        "release the e-stop button": "estop release", "release the button": "estop release",
-        "see that nobody is in the way": None, "switch the wheels on": "normal", "find out why a wheel lost power": None,
-        "check the wheels' power and the cable": "normal", "bring the bus up": "bus up",
-        "switch off the other program or device": "foreign off", "check the wheel: it ran faster": "runaway both off",
-        "free the wheel": "unblock both", "check `invert` and the wheels' wiring": "sign both normal",
-        "see why the left wheel turned against its command": None, "unload both wheels": "load both 0",
-        "check cable, termination and bit rate": "normal", "when it is gone": "padding off",
+        "release the e-stop button": "estop release",
+        "release the button": "estop release",
+        "see that nobody is in the way": None,
+        "switch the wheels on": "normal",
+        "find out why a wheel lost power": None,
+        "check the wheels' power and the cable": "normal",
+        "bring the bus up": "bus up",
+        "switch off the other program or device": "foreign off",
+        "check the wheel: it ran faster": "runaway both off",
+        "free the wheel": "unblock both",
+        "check `invert` and the wheels' wiring": "sign both normal",
+        "see why the left wheel turned against its command": None,
+        "unload both wheels": "load both 0",
+        "check cable, termination and bit rate": "normal",
+        "when it is gone": "padding off",
     }
 
     # Wheels and echoes may be late: this machine does other things too.
@@ -184,8 +213,15 @@ class CarriedOut(unittest.TestCase):
         self.addCleanup(self.rig.close)
 
     def ctl(self, *words):
-        done = subprocess.run([program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words], capture_output=True,
-                              text=True, timeout=60, check=False, stdin=subprocess.DEVNULL, env={**os.environ, "TERM": "dumb"})
+        done = subprocess.run(
+            [program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, "TERM": "dumb"},
+        )
         return done.returncode, done.stdout, done.stderr
 
     def status(self):
@@ -201,7 +237,7 @@ class CarriedOut(unittest.TestCase):
     def next_step(self):
         """What `status` says is to be done."""
         out = self.ctl("status")[1]
-        return " ".join(out[out.index("next"):out.index("last stop")].removeprefix("next").split())
+        return " ".join(out[out.index("next") : out.index("last stop")].removeprefix("next").split())
 
     def use_hands(self, cure):
         known = [phrase for phrase in self.HANDS if phrase in cure]
@@ -213,8 +249,10 @@ class CarriedOut(unittest.TestCase):
     def run_commands(self, cure):
         """Every command of ours in the text, as it stands there; the socket and the control socket are put in."""
         commands = re.findall(r"(?:iwheelctl|iwheel-sim) [^;,():]+?(?= \w+:|[;,()]|$)", cure)
-        where = {"iwheelctl": f"{program('iwheelctl')} --socket {self.rig.path('gateway.sock')}",
-                 "iwheel-sim": f"{program('iwheel-sim')} --control {self.rig.path('control')}"}
+        where = {
+            "iwheelctl": f"{program('iwheelctl')} --socket {self.rig.path('gateway.sock')}",
+            "iwheel-sim": f"{program('iwheel-sim')} --control {self.rig.path('control')}",
+        }
         for command in commands:
             line = re.sub(r"\b(iwheelctl|iwheel-sim)(?= )", lambda match: where[match.group(1)], command)
             done = subprocess.run(line, shell=True, capture_output=True, text=True, timeout=30, check=False)
@@ -232,15 +270,17 @@ class CarriedOut(unittest.TestCase):
 
     def drive_into(self, fault):
         """Drives until the fault has stopped the wheels."""
-        process = subprocess.Popen([program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive", "300", "300",
-                                    "--for", "20s"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            [program("iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         self.wait_for(lambda s: (s["left"]["speed_mm_s"] or 0) > 200 or s["state"] == "latched", "driving")
         self.rig.sim.ask(fault)
 
-    LATCHES = {"wheel_lost": "mute left", "send_stalled": "ack off", "bus_down": "bus down",
-               "second_master": "foreign on", "overspeed": "runaway both on 1000"}
+    LATCHES = {"wheel_lost": "mute left", "send_stalled": "ack off", "bus_down": "bus down", "second_master": "foreign on", "overspeed": "runaway both on 1000"}
 
     def test_what_status_says_next_leads_out_of_every_latch(self):
         for cause, fault in self.LATCHES.items():
@@ -324,8 +364,9 @@ class CarriedOut(unittest.TestCase):
         cure = self.doctor(*button)["interface"]["cure"]
         self.assertRegex(cure, r"^start the simulator: iwheel-sim --can unix:\S+$")
         command = cure.split(": ", 1)[1].split()
-        with subprocess.Popen([program(command[0]), *command[1:], "--estop", self.rig.path("button"), "--control",
-                               self.rig.path("control"), "--quiet"]) as simulator:
+        with subprocess.Popen(
+            [program(command[0]), *command[1:], "--estop", self.rig.path("button"), "--control", self.rig.path("control"), "--quiet"]
+        ) as simulator:
             time.sleep(0.8)
             self.assertNotIn("interface", self.doctor(*button))
             simulator.terminate()
@@ -339,8 +380,15 @@ class CarriedOut(unittest.TestCase):
         time.sleep(0.3)
         if match := re.match(r"correct (\w+)(?: or \w+)? under \[(\w+)\].*then: systemctl restart iwheel-gateway", cure):
             key, section = match.groups()
-            right = {"setpoint_type": 2, "current_role": "setpoint", "force_unit": "dN" if section == "left" else "cN",
-                     "invert": "yes", "radius_mm": 181, "track_mm": 600, "gear_ratio": "3/2"}[key]
+            right = {
+                "setpoint_type": 2,
+                "current_role": "setpoint",
+                "force_unit": "dN" if section == "left" else "cN",
+                "invert": "yes",
+                "radius_mm": 181,
+                "track_mm": 600,
+                "gear_ratio": "3/2",
+            }[key]
             self.rig.settings.setdefault(section, {})[key] = right
             self.rig.write_config()
             self.rig.kill_gateway(signal.SIGTERM)
@@ -354,9 +402,18 @@ class CarriedOut(unittest.TestCase):
         self.assertNotIn("ledger", self.doctor(), (item, cure))
 
     def test_doctors_cure_of_each_contradiction_settles_it(self):
-        wrong = {"setpoint_type": "2", "current_role": "setpoint", "mount_sign_left": "yes", "mount_sign_right": "yes",
-                 "wheel_radius": "181", "track": "600", "gear_ratio": "3/2", "feedback_sign_left": "no", "feedback_sign_right": "no",
-                 "pose_byte_order": "no"}
+        wrong = {
+            "setpoint_type": "2",
+            "current_role": "setpoint",
+            "mount_sign_left": "yes",
+            "mount_sign_right": "yes",
+            "wheel_radius": "181",
+            "track": "600",
+            "gear_ratio": "3/2",
+            "feedback_sign_left": "no",
+            "feedback_sign_right": "no",
+            "pose_byte_order": "no",
+        }
         for item, value in wrong.items():
             with self.subTest(item):
                 self.begin()
@@ -369,8 +426,7 @@ class CarriedOut(unittest.TestCase):
 
     def test_item_nearly_right_is_asked_after(self):
         self.rig.start_gateway()
-        for typed, meant in (("whel_radius", "did you mean wheel_radius?"), ("setpoint", "did you mean setpoint_type?"),
-                             ("xyzzy", "iwheelctl ledger")):
+        for typed, meant in (("whel_radius", "did you mean wheel_radius?"), ("setpoint", "did you mean setpoint_type?"), ("xyzzy", "iwheelctl ledger")):
             code, _, err = self.ctl("confirm", typed)
             self.assertEqual(1, code)
             self.assertIn(meant, err)
@@ -391,8 +447,7 @@ class Check(unittest.TestCase):
         self.addCleanup(self.rig.close)
 
     def check(self, *words, setup=None):
-        done = subprocess.run([*self.rig.gateway_command("--check"), *words], capture_output=True, text=True, timeout=30,
-                              preexec_fn=setup, check=False)
+        done = subprocess.run([*self.rig.gateway_command("--check"), *words], capture_output=True, text=True, timeout=30, preexec_fn=setup, check=False)
         lines = [line.split(" ", 1) for line in done.stdout.splitlines()]
         return done.returncode, {verdict: [text for other, text in lines if other == verdict] for verdict, _ in lines}, done
 
@@ -458,9 +513,17 @@ class Check(unittest.TestCase):
         self.addCleanup(os.close, descriptor)
 
         def look():
-            return subprocess.run([f"/proc/self/fd/{descriptor}", *self.rig.gateway_command("--check")[1:]], text=True,
-                                  capture_output=True, pass_fds=(descriptor,), user=65534, group=65534, extra_groups=[],
-                                  check=False).stdout
+            return subprocess.run(
+                [f"/proc/self/fd/{descriptor}", *self.rig.gateway_command("--check")[1:]],
+                text=True,
+                capture_output=True,
+                pass_fds=(descriptor,),
+                user=65534,
+                group=65534,
+                extra_groups=[],
+                check=False,
+            ).stdout
+
         text = next(line for line in look().splitlines() if "record" in line)
         self.assertIn("Permission denied", text)
         subprocess.run(re.search(r"sudo (chown \d+ \S+)", text).group(1), shell=True, check=True)
@@ -491,8 +554,7 @@ class Check(unittest.TestCase):
             code, text = self.only("fail", "Read-only file system", setup=mount)
             self.assertEqual(1, code)
             self.assertIn("mount it for writing", text)
-            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, preexec_fn=mount,
-                                  check=False)
+            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, preexec_fn=mount, check=False)
             self.assertEqual(69, done.returncode, done.stderr)
             self.assertIn("Read-only file system", done.stderr)
 

@@ -4,6 +4,7 @@
 
 Usage: test_demo.py BUILD [unittest's arguments]
 """
+
 import concurrent.futures
 import contextlib
 import os
@@ -24,9 +25,15 @@ def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",), beg
     """(exit code, what is left in its temporary folder, its processes that still run, its output). The signals come `seconds` after its first
     line, or after its start if not `begun`."""
     with tempfile.TemporaryDirectory(prefix="d") as folder:
-        process = subprocess.Popen([sys.executable, os.path.join(ROOT, "scripts", "demo", "main.py"), "--build", BUILD, *words],
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                   start_new_session=True, env={**os.environ, "TMPDIR": folder})
+        process = subprocess.Popen(
+            [sys.executable, os.path.join(ROOT, "app", "demo", "main.py"), "--build", BUILD, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "TMPDIR": folder},
+        )
         first = process.stdout.readline() if begun else ""
         time.sleep(seconds)
         for number in signals:
@@ -78,9 +85,15 @@ class Interrupted(unittest.TestCase):
                 with open(path, "w", encoding="ascii") as file:
                     file.write("#!/bin/sh\n" + program)
                 os.chmod(path, 0o755)
-            done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts", "demo", "main.py"), "--build",
-                                   os.path.join(folder, "build")], capture_output=True, text=True, timeout=30, check=False,
-                                  stdin=subprocess.DEVNULL, env={**os.environ, "TMPDIR": os.path.join(folder, "tmp")})
+            done = subprocess.run(
+                [sys.executable, os.path.join(ROOT, "app", "demo", "main.py"), "--build", os.path.join(folder, "build")],
+                capture_output=True,
+                text=True,
+                timeout=30,
+                check=False,
+                stdin=subprocess.DEVNULL,
+                env={**os.environ, "TMPDIR": os.path.join(folder, "tmp")},
+            )
             self.assertEqual([], os.listdir(os.path.join(folder, "tmp")), done.stdout + done.stderr)
             return done
 

@@ -4,6 +4,7 @@
 
 Usage: test_doctor.py BUILD [unittest's arguments]
 """
+
 import bisect
 import json
 import os
@@ -34,9 +35,24 @@ class Doctor(unittest.TestCase):
 
     def doctor(self, *words):
         """(exit code, {check: [finding]}, the whole object)"""
-        done = subprocess.run([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "--json",
-                               "doctor", f"unix:{self.rig.path('bus')}", "--listen", "0.6s", *words],
-                              capture_output=True, text=True, timeout=30, env=environment(), check=False)
+        done = subprocess.run(
+            [
+                find_program(BUILD, "iwheelctl"),
+                "--socket",
+                self.rig.path("gateway.sock"),
+                "--json",
+                "doctor",
+                f"unix:{self.rig.path('bus')}",
+                "--listen",
+                "0.6s",
+                *words,
+            ],
+            capture_output=True,
+            text=True,
+            timeout=30,
+            env=environment(),
+            check=False,
+        )
         whole = json.loads(done.stdout)
         checks = {}
         for finding in whole["findings"]:
@@ -53,8 +69,9 @@ class Doctor(unittest.TestCase):
     def rates_on_the_bus(self, can_id, listened_us=600_000):
         """(least, most) in mHz, over any stretch as long as the doctor listened: a simulator that the machine held up sends fewer."""
         times = [frame.t_us for frame in list(self.rig.bus.frames) if frame.id == can_id]
-        rates = [(bisect.bisect_right(times, begin + listened_us) - at) * 10**9 // listened_us
-                 for at, begin in enumerate(times) if begin + listened_us <= times[-1]]
+        rates = [
+            (bisect.bisect_right(times, begin + listened_us) - at) * 10**9 // listened_us for at, begin in enumerate(times) if begin + listened_us <= times[-1]
+        ]
         return min(rates), max(rates)
 
     def setpoints(self):
@@ -70,8 +87,7 @@ class Doctor(unittest.TestCase):
         for can_id in (256, 290):
             least, most = self.rates_on_the_bus(can_id)
             self.assertTrue(0.9 * least - 5000 <= rates[can_id] <= 1.1 * most + 5000, (can_id, least, rates[can_id], most))
-        self.assertEqual({256: 250000, 290: 25000}, {rate["id"]: rate["nominal_mHz"] for rate in whole["rates"]
-                                                     if rate["id"] in (256, 290)})
+        self.assertEqual({256: 250000, 290: 25000}, {rate["id"]: rate["nominal_mHz"] for rate in whole["rates"] if rate["id"] in (256, 290)})
         self.assertIn("released, SIMULATED", checks["estop"][0]["text"])
         self.assertFalse(self.setpoints())
 
@@ -98,8 +114,7 @@ class Doctor(unittest.TestCase):
     def test_bus_without_wheels_and_no_bus(self):
         self.rig.sim.ask("power off")
         code, checks, _ = self.doctor(*self.button())
-        self.assertEqual((1, ["fail"], ["fail"]),
-                         (code, self.verdict(checks, "left_wheel"), self.verdict(checks, "right_wheel")))
+        self.assertEqual((1, ["fail"], ["fail"]), (code, self.verdict(checks, "left_wheel"), self.verdict(checks, "right_wheel")))
         self.rig.sim.end()
         code, checks, _ = self.doctor(*self.button())
         self.assertEqual(1, code)
@@ -163,9 +178,23 @@ class Doctor(unittest.TestCase):
 
     def test_guided_press_on_a_terminal(self):
         parent, child = pty.openpty()
-        process = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"),
-                                    "doctor", f"unix:{self.rig.path('bus')}", "--listen", "0.3s", *self.button()],
-                                   stdin=child, stdout=child, stderr=child, env=environment(), close_fds=True)
+        process = subprocess.Popen(
+            [
+                find_program(BUILD, "iwheelctl"),
+                "--socket",
+                self.rig.path("gateway.sock"),
+                "doctor",
+                f"unix:{self.rig.path('bus')}",
+                "--listen",
+                "0.3s",
+                *self.button(),
+            ],
+            stdin=child,
+            stdout=child,
+            stderr=child,
+            env=environment(),
+            close_fds=True,
+        )
         os.close(child)
         text, pressed, released = "", False, False
         end = time.monotonic() + 20
@@ -196,11 +225,17 @@ class Doctor(unittest.TestCase):
         self.assertEqual(["ok"], self.verdict(checks, "left_wheel"))
 
     def test_wrong_words(self):
-        for words, about in ((("--listen",), "--listen wants"), (("--listen", "0s"), "200ms to 1min"),
-                             (("--estop",), "wants a value"), (("a", "b"), "does not understand"),
-                             (("--frobnicate",), "does not understand"), (("eth0/..",), "IFACE")):
-            done = subprocess.run([find_program(BUILD, "iwheelctl"), "doctor", *words], capture_output=True, text=True,
-                                  timeout=30, env=environment(), check=False)
+        for words, about in (
+            (("--listen",), "--listen wants"),
+            (("--listen", "0s"), "200ms to 1min"),
+            (("--estop",), "wants a value"),
+            (("a", "b"), "does not understand"),
+            (("--frobnicate",), "does not understand"),
+            (("eth0/..",), "IFACE"),
+        ):
+            done = subprocess.run(
+                [find_program(BUILD, "iwheelctl"), "doctor", *words], capture_output=True, text=True, timeout=30, env=environment(), check=False
+            )
             self.assertEqual(64, done.returncode, (words, done.stdout, done.stderr))
             self.assertIn(about, done.stderr)
 

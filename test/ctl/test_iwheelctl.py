@@ -4,6 +4,7 @@
 
 Usage: test_iwheelctl.py PROGRAM [unittest's arguments]
 """
+
 import itertools
 import json
 import os
@@ -33,14 +34,12 @@ def clean_environment(**more):
 def run(*words, **more):
     """(exit code, stdout, stderr, seconds)"""
     begin = time.monotonic()
-    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=30,
-                          env=clean_environment(**more.pop("env", {})), **more, check=False)
+    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=30, env=clean_environment(**more.pop("env", {})), **more, check=False)
     return done.returncode, done.stdout, done.stderr, time.monotonic() - begin
 
 
 def start(*words, **more):
-    return subprocess.Popen([PROGRAM, *words], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE, text=True,
-                            env=clean_environment(), **more)
+    return subprocess.Popen([PROGRAM, *words], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE, text=True, env=clean_environment(), **more)
 
 
 def wait_until(condition, seconds=5.0):
@@ -98,8 +97,16 @@ class Connecting(WithGateway):
         os.chmod(self.gateway.path, 0o660)
         descriptor = os.open(PROGRAM, os.O_RDONLY)
         self.addCleanup(os.close, descriptor)
-        done = subprocess.run([f"/proc/self/fd/{descriptor}", "--socket", self.gateway.path, "status"], capture_output=True,
-                              text=True, pass_fds=(descriptor,), user=65534, group=65534, extra_groups=[], check=False)
+        done = subprocess.run(
+            [f"/proc/self/fd/{descriptor}", "--socket", self.gateway.path, "status"],
+            capture_output=True,
+            text=True,
+            pass_fds=(descriptor,),
+            user=65534,
+            group=65534,
+            extra_groups=[],
+            check=False,
+        )
         self.assertEqual(77, done.returncode, done.stderr)
         self.assertIn("sudo usermod -aG root", done.stderr)
 
@@ -107,6 +114,7 @@ class Connecting(WithGateway):
         class Silent(FakeGateway):
             def greet(self, connection):
                 time.sleep(4)
+
         code, _, err, seconds = self.ctl("status", gateway=self.serve(Silent))
         self.assertEqual(75, code)
         self.assertIn("no answer within 2 s", err)
@@ -138,6 +146,7 @@ class Connecting(WithGateway):
         class Rude(FakeGateway):
             def greet(self, connection):
                 connection.close()
+
         code, _, err, _ = self.ctl("status", gateway=self.serve(Rude))
         self.assertEqual(69, code)
         self.assertIn("ended the connection", err)
@@ -146,15 +155,18 @@ class Connecting(WithGateway):
         class Full(FakeGateway):
             def greet(self, connection):
                 self.say(connection, {"id": None, "ok": False, "error": "too_many_clients", "message": "16 of 16; close one"})
+
         code, _, err, _ = self.ctl("status", gateway=self.serve(Full))
         self.assertEqual(1, code)
         self.assertIn("refused (too_many_clients): 16 of 16; close one", err)
 
     def test_another_service_on_the_socket_is_told(self):
-        for first in (b"ok iwheel-sim\n", b"[1,2]\n", b"{\"event\":\"hi\"}\n", b'{"event":"hello","event":"hello"}\n', b"x" * 70000, b"\0\n"):
+        for first in (b"ok iwheel-sim\n", b"[1,2]\n", b'{"event":"hi"}\n', b'{"event":"hello","event":"hello"}\n', b"x" * 70000, b"\0\n"):
+
             class Other(FakeGateway):
                 def greet(self, connection, first=first):
                     connection.sendall(first)
+
             code, _, err, _ = self.ctl("status", gateway=self.serve(Other))
             self.assertEqual(70, code, first[:20])
             self.assertIn("not the gateway's language", err)
@@ -167,6 +179,7 @@ class Connecting(WithGateway):
                 text = json.dumps({"id": request["id"], "ok": True, "number": 1, "sentence": "it stopped", "latched": True})
                 for byte in text.encode() + b"\n":
                     connection.sendall(bytes([byte]))
+
         code, out, _, _ = self.ctl("why", gateway=self.serve(Slow))
         self.assertEqual(0, code)
         self.assertTrue(out.startswith("it stopped\n"), out)
@@ -175,6 +188,7 @@ class Connecting(WithGateway):
         class Mute(FakeGateway):
             def on_reset(self, connection, request):
                 return None
+
         code, _, err, seconds = self.ctl("reset", gateway=self.serve(Mute))
         self.assertEqual(75, code)
         self.assertTrue(1.9 < seconds < 3.5, (seconds, err))
@@ -188,6 +202,7 @@ class Showing(WithGateway):
 
             def on_why(self, connection, request):
                 return why or super().on_why(connection, request)
+
         code, out, err, _ = self.ctl("status", gateway=self.serve(Fixed), **more)
         self.assertEqual(0, code, err)
         for line in out.splitlines():
@@ -218,25 +233,34 @@ class Showing(WithGateway):
         self.assertRegex(self.show(snapshot(left=none)), r"its zero +-- none IN DOUBT +8\.000 N wheel")
 
     def test_setpoint_that_is_never_acknowledged_though_the_wheels_are_heard_names_the_restart_of_the_link(self):
-        restart = ("ip link set can7 down; ip link set can7 up",
-                   "systemctl enable --now iwheel-can-restart@can7.path")
+        restart = ("ip link set can7 down; ip link set can7 up", "systemctl enable --now iwheel-can-restart@can7.path")
 
         class Stalled(FakeGateway):
             heard, bus = True, "can7"
 
             def on_status(self, _connection, _request):
-                return {"ok": True, **snapshot("latched", cause="send_stalled", present=["send_stalled"], left=wheel(),
-                                               right=wheel(heard=self.heard), bus={"name": self.bus, "state": "active"})}
+                return {
+                    "ok": True,
+                    **snapshot(
+                        "latched",
+                        cause="send_stalled",
+                        present=["send_stalled"],
+                        left=wheel(),
+                        right=wheel(heard=self.heard),
+                        bus={"name": self.bus, "state": "active"},
+                    ),
+                }
 
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+
         gateway = self.serve(Stalled)
         doctor = ("doctor", "--no-press", "--listen", "200ms")
         for heard, bus in ((True, "can7"), (False, "can7"), (True, "unix:/nowhere")):
             gateway.heard, gateway.bus = heard, bus
             told = {words[0]: self.ctl(*words, gateway=gateway)[1] for words in (("status",), ("why",), doctor)}
             findings = json.loads(self.ctl("--json", *doctor, gateway=gateway)[1])["findings"]
-            finding, = (finding for finding in findings if finding["check"] == "send_stalled")
+            (finding,) = (finding for finding in findings if finding["check"] == "send_stalled")
             self.assertEqual("fail", finding["verdict"])
             told["finding"] = finding["cure"]
             for what, text in told.items():
@@ -249,11 +273,18 @@ class Showing(WithGateway):
         class Cured(FakeGateway):
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+
         self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cured))[1])
 
     def test_contradiction_tells_evidence_and_cost_and_what_to_do_next(self):
-        entry = {"state": "contradicted", "evidence": "operator", "figure": None, "value": "no", "reason": "the operator found yes",
-                 "disabled": "arm is refused; correct invert under [left]"}
+        entry = {
+            "state": "contradicted",
+            "evidence": "operator",
+            "figure": None,
+            "value": "no",
+            "reason": "the operator found yes",
+            "disabled": "arm is refused; correct invert under [left]",
+        }
         out = self.show(snapshot(ledger={"mount_sign_left": entry}))
         self.assertIn("next          cannot arm, mount_sign_left is contradicted: correct invert", out)
         self.assertIn("CONTRADICTED  mount_sign_left = no: the operator found yes; disabled: arm is", out)
@@ -271,7 +302,7 @@ class Showing(WithGateway):
     def test_unknown_is_never_a_number(self):
         nothing = dict.fromkeys(wheel())
         out = self.show(snapshot(left={**nothing, "heard": False}, right={**nothing, "heard": False}))
-        below = out[out.index("WHEELS"):out.index("POSE")]
+        below = out[out.index("WHEELS") : out.index("POSE")]
         self.assertNotRegex(below, r"\d")
         self.assertIn("LEFT NOT HEARD", below)
         self.assertGreaterEqual(below.count("--"), 40)
@@ -293,6 +324,7 @@ class Showing(WithGateway):
 
     def hostile(self):
         """A gateway that sends such characters as they are, and others between its values."""
+
         class Hostile(FakeGateway):
             @staticmethod
             def say(connection, value):
@@ -311,6 +343,7 @@ class Showing(WithGateway):
                 reply = {"id": request["id"], **super().on_watch(connection, request)}
                 self.say(connection, reply)
                 self.say(connection, {"event": "lease", "name": Showing.MOVING, "filler": "x" * 5000 + Showing.MOVING})
+
         return self.serve(Hostile)
 
     def assert_plain(self, text):
@@ -337,8 +370,7 @@ class Showing(WithGateway):
         process.communicate(timeout=10)
 
     def test_latched_names_cause_sentence_and_cure(self):
-        out = self.show(snapshot("latched", cause="wheel_lost"),
-                        why={"ok": True, "number": 1, "sentence": "left wheel not heard for 53 ms", "latched": True})
+        out = self.show(snapshot("latched", cause="wheel_lost"), why={"ok": True, "number": 1, "sentence": "left wheel not heard for 53 ms", "latched": True})
         self.assertIn("latched (wheel_lost)", out)
         self.assertRegex(out, r"next +switch the wheels on")
         self.assertIn("iwheelctl reset", out)
@@ -351,7 +383,11 @@ class Showing(WithGateway):
         self.assertNotIn("iwheelctl release", self.show(snapshot("stopping", cause="client_stop")))
 
     def test_listening_names_what_keeps_it_from_arming(self):
-        unset = {"setpoint_type": {"state": "assumed", "evidence": "none"}, "track": {"state": "assumed", "evidence": "none"}, "wheel_radius": {"state": "contradicted"}}
+        unset = {
+            "setpoint_type": {"state": "assumed", "evidence": "none"},
+            "track": {"state": "assumed", "evidence": "none"},
+            "wheel_radius": {"state": "contradicted"},
+        }
         out = self.show(snapshot(ledger=unset, present=["bus_down"]))
         self.assertIn("set setpoint_type", out)
         self.assertIn("set track_mm under [wheels]; iwheelctl bringup measures it", " ".join(out.split()))
@@ -370,11 +406,11 @@ class Showing(WithGateway):
 
     def test_colours_only_on_a_terminal_without_no_color(self):
         import pty
+
         for term, no_color, wanted in (("xterm", None, True), ("dumb", None, False), ("xterm", "1", False)):
             parent, child = pty.openpty()
             more = {"TERM": term, **({"NO_COLOR": no_color} if no_color else {})}
-            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=child,
-                                  env=clean_environment(**more), check=False)
+            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=child, env=clean_environment(**more), check=False)
             os.close(child)
             shown = b""
             try:
@@ -390,6 +426,7 @@ class Showing(WithGateway):
         class Empty(FakeGateway):
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 0, "sentence": ""}
+
         self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
 
     def test_why_of_a_board_without_a_clock_of_the_day_tells_the_age_alone(self):
@@ -406,8 +443,7 @@ class Showing(WithGateway):
 
     def test_output_that_cannot_be_written_is_no_success(self):
         with open("/dev/full", "w", encoding="ascii") as full:
-            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=full, stderr=subprocess.PIPE,
-                                  check=False)
+            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=full, stderr=subprocess.PIPE, check=False)
         self.assertEqual(69, done.returncode)
 
 
@@ -429,16 +465,19 @@ class Asking(WithGateway):
         self.assertGreaterEqual(requests[0]["id"], 1)
 
     def test_simple_verbs_send_one_request(self):
-        for words, wanted in ((["stop"], {"cmd": "stop"}), (["disarm"], {"cmd": "stop"}), (["estop"], {"cmd": "estop"}),
-                              (["estop", "dog", "in", "the way"], {"cmd": "estop", "reason": "dog in the way"}),
-                              (["estop", "x" * 300], {"cmd": "estop", "reason": "x" * 200})):
+        for words, wanted in (
+            (["stop"], {"cmd": "stop"}),
+            (["disarm"], {"cmd": "stop"}),
+            (["estop"], {"cmd": "estop"}),
+            (["estop", "dog", "in", "the way"], {"cmd": "estop", "reason": "dog in the way"}),
+            (["estop", "x" * 300], {"cmd": "estop", "reason": "x" * 200}),
+        ):
             self.gateway.requests.clear()
             self.assertEqual(0, self.ctl(*words)[0])
             self.assert_one_request(wanted)
 
     def test_reason_that_is_no_text_still_stops(self):
-        done = subprocess.run([PROGRAM.encode(), b"--socket", self.gateway.path.encode(), b"estop", b"\xff\xfe"],
-                              capture_output=True, check=False)
+        done = subprocess.run([PROGRAM.encode(), b"--socket", self.gateway.path.encode(), b"estop", b"\xff\xfe"], capture_output=True, check=False)
         self.assertEqual(0, done.returncode)
         self.assert_one_request({"cmd": "estop"})
 
@@ -454,21 +493,31 @@ class Asking(WithGateway):
         self.assertEqual("drive.lease_ms = 300\nstaged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)\n", out)
         self.assertEqual("committed: the board starts anew with it, and closes its clients; they come again\n", self.ctl("config", "commit")[1])
         self.assertEqual("what was staged is forgotten\n", self.ctl("config", "discard")[1])
-        self.assertEqual([{}, {"key": "drive.lease_ms", "value": "300"}, {"commit": True}, {"commit": False}],
-                         [{name: value for name, value in request.items() if name not in ("cmd", "id")} for _, request in self.gateway.requests])
+        self.assertEqual(
+            [{}, {"key": "drive.lease_ms", "value": "300"}, {"commit": True}, {"commit": False}],
+            [{name: value for name, value in request.items() if name not in ("cmd", "id")} for _, request in self.gateway.requests],
+        )
         code, _, err, _ = self.ctl("config", "set", "bus.interface", "can1")
         self.assertEqual((1, True), (code, "no key of this gateway" in err), err)
         for words in (("set",), ("set", "drive.lease_ms"), ("set", "a", "b", "c"), ("show", "me"), ("write",)):
             self.assertEqual(64, self.ctl("config", *words)[0], words)
 
     def test_a_ledger_in_figures_alone_is_told_in_the_same_words(self):
-        figures = {"force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
-                   "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"}, "dlc": {"state": "confirmed", "evidence": "bus"},
-                   "wheel_radius": {"state": "contradicted", "evidence": "operator", "figure": None, "value": "192", "reason": None, "disabled": None}}
+        figures = {
+            "force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
+            "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"},
+            "dlc": {"state": "confirmed", "evidence": "bus"},
+            "wheel_radius": {"state": "contradicted", "evidence": "operator", "figure": None, "value": "192", "reason": None, "disabled": None},
+        }
         self.gateway.on_status = lambda *_: {"ok": True, **snapshot(ledger=figures)}
         out = " ".join(self.ctl("ledger")[1].split())
-        for text in ("dlc: the bus showed it", "force_unit_left = cN: at rest, raw / offset is 10.012", "track = 540: not documented, not verified",
-                     "wheel_radius = 192: the operator found something else", "disabled: no speed in mm/s and no distance; correct radius_mm"):
+        for text in (
+            "dlc: the bus showed it",
+            "force_unit_left = cN: at rest, raw / offset is 10.012",
+            "track = 540: not documented, not verified",
+            "wheel_radius = 192: the operator found something else",
+            "disabled: no speed in mm/s and no distance; correct radius_mm",
+        ):
             self.assertIn(text, out)
         self.assertIn("the operator found something else", " ".join(self.ctl("status")[1].split()))
 
@@ -479,16 +528,16 @@ class Asking(WithGateway):
         self.assertEqual(0, code)
         self.assertTrue(out.startswith("CONTRADICTED  wheel_radius = 192: "), out)
         self.assertIn("disabled: no distance; correct radius_mm", out)
-        self.assertEqual([{"cmd": "confirm", "item": "wheel_radius", "id": 1},
-                          {"cmd": "confirm", "item": "wheel_radius", "value": "181", "id": 1}],
-                         [request for _, request in self.gateway.requests])
+        self.assertEqual(
+            [{"cmd": "confirm", "item": "wheel_radius", "id": 1}, {"cmd": "confirm", "item": "wheel_radius", "value": "181", "id": 1}],
+            [request for _, request in self.gateway.requests],
+        )
 
     def test_confirm_sends_how_it_was_found(self):
         for words in (("track", "545", "--how", "a tape"), ("--how", "a tape", "track", "545")):
             self.gateway.requests.clear()
             self.assertEqual(0, self.ctl("confirm", *words)[0])
-            self.assertEqual([{"cmd": "confirm", "item": "track", "value": "545", "how": "a tape", "id": 1}],
-                             [request for _, request in self.gateway.requests])
+            self.assertEqual([{"cmd": "confirm", "item": "track", "value": "545", "how": "a tape", "id": 1}], [request for _, request in self.gateway.requests])
         self.gateway.requests.clear()
         for words in (("track", "545", "--how"), ("--how", "a tape"), ("track", "545", "600"), ("--how",)):
             self.assertEqual(64, self.ctl("confirm", *words)[0], words)
@@ -506,17 +555,51 @@ class Asking(WithGateway):
         self.assertEqual("iwheelctl: refused (estop_pressed): the e-stop is pressed; release the button\n", err)
 
     def test_wrong_words_are_usage_and_reach_nobody(self):
-        for words in ([], ["fly"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["release", "1"], ["why", "me"],
-                      ["tare", "middle"], ["tare", "left", "right"], ["confirm"], ["confirm", "dlc", "yes", "x"], ["ledger", "x"], ["watch", "speed"], ["watch", "--rate"],
-                      ["watch", "--rate", "0"], ["watch", "--rate", "101"], ["watch", "--rate", "1x"], ["drive"],
-                      ["drive", "1"], ["drive", "1", "2", "3"], ["drive", "1.5", "2"], ["drive", "a", "b"],
-                      ["drive", "40000", "0"], ["drive", "32768", "0"], ["drive", "0", "-32769"], ["drive", "--", "1"],
-                      ["drive", "1", "2", "--for"], ["drive", "1", "2", "--for", "2"], ["drive", "1", "2", "--for", "0s"],
-                      ["drive", "1", "2", "--for", "-1s"], ["drive", "1", "2", "--for", "601s"],
-                      ["drive", "1", "2", "--for", "1.5ms"], ["drive", "1", "2", "--for", "2h"],
-                      ["drive", "1", "2", "--for", "99999999999s"], ["drive", "1", "2", "--current", "1"],
-                      ["drive", "1", "2", "--current", "2001", "0"], ["drive", "1", "2", "--fast"], ["drive", "99999999999", "1"],
-                      ["drive", "", ""], ["drive", "-", "1"], ["drive", "1mm", "2"]):
+        for words in (
+            [],
+            ["fly"],
+            ["-x"],
+            ["status", "x"],
+            ["status", "--all"],
+            ["stop", "now"],
+            ["reset", "1"],
+            ["release", "1"],
+            ["why", "me"],
+            ["tare", "middle"],
+            ["tare", "left", "right"],
+            ["confirm"],
+            ["confirm", "dlc", "yes", "x"],
+            ["ledger", "x"],
+            ["watch", "speed"],
+            ["watch", "--rate"],
+            ["watch", "--rate", "0"],
+            ["watch", "--rate", "101"],
+            ["watch", "--rate", "1x"],
+            ["drive"],
+            ["drive", "1"],
+            ["drive", "1", "2", "3"],
+            ["drive", "1.5", "2"],
+            ["drive", "a", "b"],
+            ["drive", "40000", "0"],
+            ["drive", "32768", "0"],
+            ["drive", "0", "-32769"],
+            ["drive", "--", "1"],
+            ["drive", "1", "2", "--for"],
+            ["drive", "1", "2", "--for", "2"],
+            ["drive", "1", "2", "--for", "0s"],
+            ["drive", "1", "2", "--for", "-1s"],
+            ["drive", "1", "2", "--for", "601s"],
+            ["drive", "1", "2", "--for", "1.5ms"],
+            ["drive", "1", "2", "--for", "2h"],
+            ["drive", "1", "2", "--for", "99999999999s"],
+            ["drive", "1", "2", "--current", "1"],
+            ["drive", "1", "2", "--current", "2001", "0"],
+            ["drive", "1", "2", "--fast"],
+            ["drive", "99999999999", "1"],
+            ["drive", "", ""],
+            ["drive", "-", "1"],
+            ["drive", "1mm", "2"],
+        ):
             code, out, err, _ = self.ctl(*words)
             self.assertEqual((64, ""), (code, out), words)
             self.assertTrue(err.startswith("iwheelctl: "), words)
@@ -524,13 +607,11 @@ class Asking(WithGateway):
 
     def test_unknown_verb_lists_the_known(self):
         err = self.ctl("fly")[2]
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger",
-                     "confirm", "doctor", "bringup", "top"):
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top"):
             self.assertIn(verb, err)
 
     def test_help_of_every_verb_needs_no_gateway(self):
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger",
-                     "confirm", "doctor", "bringup", "top"):
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "release", "tare", "why", "ledger", "confirm", "doctor", "bringup", "top"):
             code, out, _, _ = run(verb, "--help")
             self.assertEqual(0, code)
             self.assertTrue(out.startswith("Usage: iwheelctl "), verb)
@@ -612,11 +693,12 @@ class Driving(WithGateway):
     def test_refused_arm_drives_nothing(self):
         class Busy(FakeGateway):
             def on_arm(self, _connection, _request):
-                return {"ok": False, "error": "busy", "message": "\"joystick\" drives"}
+                return {"ok": False, "error": "busy", "message": '"joystick" drives'}
+
         gateway = self.serve(Busy)
         code, _, err, _ = self.drive("1", "2", gateway=gateway)
         self.assertEqual(1, code)
-        self.assertIn("refused (busy): \"joystick\" drives", err)
+        self.assertIn('refused (busy): "joystick" drives', err)
         self.assertEqual(0, gateway.count("drive"))
 
     def test_arm_refused_because_the_wheels_do_not_stand_yet_is_asked_again(self):
@@ -625,6 +707,7 @@ class Driving(WithGateway):
                 if self.count("arm") < 4:
                     return {"ok": False, "error": "not_at_rest", "message": "the wheels turn: wait until both stand"}
                 return super().on_arm(connection, request)
+
         gateway = self.serve(ComingToRest)
         code, out, err, _ = self.drive("200", "200", "--for", "100ms", gateway=gateway)
         self.assertEqual((0, "iwheelctl: waiting for a second at the most, because the wheels turn: wait until both stand\n"), (code, err))
@@ -636,6 +719,7 @@ class Driving(WithGateway):
         class Pushed(FakeGateway):
             def on_arm(self, _connection, _request):
                 return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
+
         for words in ([], ["--json"]):
             gateway = self.serve(Pushed)
             code, out, err, _ = run("--socket", gateway.path, *words, "drive", "200", "200")
@@ -650,6 +734,7 @@ class Driving(WithGateway):
         class Pushed(FakeGateway):
             def on_arm(self, _connection, _request):
                 return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
+
         gateway = self.serve(Pushed)
         process = start("--socket", gateway.path, "drive", "200", "200")
         wait_until(lambda: gateway.count("arm") > 1)
@@ -677,6 +762,7 @@ class Driving(WithGateway):
         class NoAnswer(FakeGateway):
             def on_drive(self, _connection, _request):
                 return None
+
         gateway = self.serve(NoAnswer)
         process = start("--socket", gateway.path, "drive", "200", "200")
         wait_until(lambda: gateway.count("drive") > 2)
@@ -693,6 +779,7 @@ class Driving(WithGateway):
 
             def on_why(self, _connection, _request):
                 return {"ok": True, "number": 1, "sentence": "e-stop pressed while driving 200/200 mm/s"}
+
         gateway = self.serve(Latching)
         code, _, err, _ = self.drive("200", "200", gateway=gateway)
         self.assertEqual(1, code)
@@ -704,6 +791,7 @@ class Driving(WithGateway):
         class Deaf(FakeGateway):
             def on_drive(self, connection, request):
                 return super().on_drive(connection, request) if self.driving < 5 else None
+
         gateway = self.serve(Deaf)
         code, _, err, _ = self.drive("200", "200", "--for", "10s", gateway=gateway)
         self.assertEqual(75, code)
@@ -717,6 +805,7 @@ class Driving(WithGateway):
                 if self.driving > 5:
                     connection.shutdown(socket.SHUT_RDWR)
                 return super().on_drive(connection, request)
+
         code, _, err, seconds = self.drive("200", "200", "--for", "10s", gateway=self.serve(Dying))
         self.assertEqual(69, code)
         self.assertIn("watchdog", err)
@@ -737,6 +826,7 @@ class Driving(WithGateway):
                 if self.stopped_at is None:
                     return super().on_status(connection, request)
                 return {"ok": True, **snapshot("latched", cause="wheel_rebooted")}
+
         code, out, err, _ = self.drive("1", "2", "--for", "100ms", gateway=self.serve(LatchesAtStop))
         self.assertEqual(1, code)
         self.assertIn("drove 1/2 mm/s", out)
@@ -748,6 +838,7 @@ class Driving(WithGateway):
                 if self.stopped_at is None:
                     return super().on_status(connection, request)
                 return {"ok": True, **snapshot("latched", left=wheel(heard=False, at_rest=None))}
+
         code, out, err, seconds = self.drive("1", "2", "--for", "100ms", gateway=self.serve(Unheard))
         self.assertEqual((1, ""), (code, out))
         self.assertIn("nobody knows whether it turns", err)
@@ -757,14 +848,17 @@ class Driving(WithGateway):
         class Warning(FakeGateway):
             def on_arm(self, connection, request):
                 return {**super().on_arm(connection, request), "warnings": ["no e-stop is configured"]}
+
         err = self.drive("1", "2", "--for", "100ms", gateway=self.serve(Warning))[2]
         self.assertIn("warning: no e-stop is configured", err)
 
     def test_nonsense_lease_counts_as_the_shortest(self):
         for lease in (0, -5, 10**12, None, "200"):
+
             class Odd(FakeGateway):
                 def on_arm(self, connection, request, lease=lease):
                     return {**super().on_arm(connection, request), "lease_ms": lease}
+
             gateway = self.serve(Odd)
             self.assertEqual(0, self.drive("1", "2", "--for", "200ms", gateway=gateway)[0])
             self.assert_spacing(gateway, 0.0067, most=35)
@@ -822,6 +916,7 @@ class Watching(WithGateway):
     def test_reader_that_never_reads_does_not_hold_off_a_signal(self):
         class Fat(self.Talkative):
             size = 60000
+
         process = start("--socket", self.serve(Fat).path, "watch")
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
@@ -839,6 +934,7 @@ class Watching(WithGateway):
                     if number == 10:
                         self.say(connection, {"event": "fault", "cause": "bus_down", "present": True})
                 self.done = True
+
         gateway = self.serve(Flood)
         process = start("--socket", gateway.path, "watch")
         wait_until(lambda: gateway.done)  # Nobody reads, and still the gateway gets rid of all of them.
@@ -860,6 +956,7 @@ class Watching(WithGateway):
             def on_watch(self, connection, request):
                 self.say(connection, {"id": request["id"], **super().on_watch(connection, request)})
                 connection.shutdown(socket.SHUT_RDWR)
+
         process = start("--socket", self.serve(Ending).path, "watch")
         _, err = process.communicate(timeout=10)
         self.assertEqual(69, process.returncode)

@@ -4,6 +4,7 @@
 
 Usage: test_keys.py BUILD [unittest's arguments]
 """
+
 import json
 import os
 import signal
@@ -40,8 +41,17 @@ class Keys(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.control = os.path.join(folder.name, "control")
-        self.command = [find_program(BUILD, "iwheel-sim"), "--control", self.control, "--can", f"unix:{folder.name}/bus",
-                        "--estop", os.path.join(folder.name, "button"), "--uptime", "10"]
+        self.command = [
+            find_program(BUILD, "iwheel-sim"),
+            "--control",
+            self.control,
+            "--can",
+            f"unix:{folder.name}/bus",
+            "--estop",
+            os.path.join(folder.name, "button"),
+            "--uptime",
+            "10",
+        ]
 
     def start(self, *words):
         operator = Operator([*self.command, *words], {**os.environ, "TERM": "xterm"})
@@ -50,8 +60,7 @@ class Keys(unittest.TestCase):
         return operator
 
     def status(self):
-        answer = subprocess.run([find_program(BUILD, "iwheel-sim"), "--control", self.control, "status"], check=True,
-                                capture_output=True, text=True).stdout
+        answer = subprocess.run([find_program(BUILD, "iwheel-sim"), "--control", self.control, "status"], check=True, capture_output=True, text=True).stdout
         return json.loads(answer.removeprefix("ok "))
 
     def wait_for(self, holds, what):

@@ -7,6 +7,7 @@ Usage: test_learn_table.py PROGRAM [unittest's arguments]
 A generator writes recordings that have or lack, one thing at a time, what a sentence claims. Beside them stands what each
 sentence must then say, worked out from what was recorded and not from what learn does.
 """
+
 import itertools
 import json
 import os
@@ -18,40 +19,39 @@ from dataclasses import dataclass, replace
 
 PROGRAM = ""
 SIDES = ("left", "right")
-IDS = {"setpoint": ("10A", "12A"), "speed": ("100", "120"), "status": ("101", "121"), "force": ("200", "220"),
-       "offset": ("201", "221")}
+IDS = {"setpoint": ("10A", "12A"), "speed": ("100", "120"), "status": ("101", "121"), "force": ("200", "220"), "offset": ("201", "221")}
 PHASES = {"rest": 0, "forward": 400, "backward": -400}
-CURRENTS = {"same": lambda speed: 1500, "scaled": lambda speed: 3 * speed, "negative": lambda speed: -1500,
-            "zero": lambda speed: 0}
+CURRENTS = {"same": lambda speed: 1500, "scaled": lambda speed: 3 * speed, "negative": lambda speed: -1500, "zero": lambda speed: 0}
 
 
 @dataclass(frozen=True)
 class Story:
     """A drive. Whatever is paired is (left, right)."""
+
     phases: tuple[str, ...] = ("rest", "forward", "backward")
     phase_ms: int = 4000
     currents: tuple[str, str] = ("same", "same")
     told: tuple[bool, bool] = (True, True)
     types: tuple[int, int] = (3, 3)
-    rest_type: int | None = None          # Another type with speed 0.
-    second_type: int | None = None        # Every other setpoint has it.
-    spare: tuple[int, ...] = (0,)            # Bytes behind the fifth, in turn.
-    sent: str = "none"                       # "all", "some": marked as the recorder's own.
+    rest_type: int | None = None  # Another type with speed 0.
+    second_type: int | None = None  # Every other setpoint has it.
+    spare: tuple[int, ...] = (0,)  # Bytes behind the fifth, in turn.
+    sent: str = "none"  # "all", "some": marked as the recorder's own.
     setpoint_ms: int = 20
     turns: tuple[bool, bool] = (True, True)
     runs_at_zero: tuple[bool, bool] = (False, False)
-    stutters: bool = False                   # At speed for every other fifth of a second.
+    stutters: bool = False  # At speed for every other fifth of a second.
     signs: tuple[int, int] = (1, 1)
-    flips: bool = False                      # Backwards it measures the sign of forwards.
+    flips: bool = False  # Backwards it measures the sign of forwards.
     rpm_per_speed: float = 1 / 20.106
     ticks_per_turn: float = 60.0
-    ticks_gap: bool = False                  # Speed frames are lost for 150 ms in every second.
+    ticks_gap: bool = False  # Speed frames are lost for 150 ms in every second.
     speeds: tuple[bool, bool] = (True, True)
     statuses: tuple[bool, bool] = (True, True)
     raw: tuple[int | None, int | None] = (200, 20)
     sway: int = 0
     offsets: tuple[tuple[int, ...], tuple[int, ...]] = ((20,), (20,))
-    pose_step: int = 10                      # mm per frame; 0: it stands. None is not possible: see poses.
+    pose_step: int = 10  # mm per frame; 0: it stands. None is not possible: see poses.
     poses: int = 10000
     pose_little: bool = False
 
@@ -73,8 +73,12 @@ class Story:
                     rpm = self.rpm(side, at_ms - number * self.phase_ms, phase)
                     ticks[side] += abs(rpm) / 60000 * 4 * self.ticks_per_turn
                     if self.told[side] and at_ms % self.setpoint_ms == 0:
-                        yield at_ms, IDS["setpoint"][side], self.setpoint(side, phase, count[side]), \
-                            self.sent == "all" or (self.sent == "some" and count[side] % 2)
+                        yield (
+                            at_ms,
+                            IDS["setpoint"][side],
+                            self.setpoint(side, phase, count[side]),
+                            self.sent == "all" or (self.sent == "some" and count[side] % 2),
+                        )
                         count[side] += 1
                     if self.speeds[side] and not (self.ticks_gap and at_ms % 1000 < 150):
                         yield at_ms, IDS["speed"][side], struct.pack(">hh", rpm, 0), False
@@ -100,13 +104,11 @@ class Story:
         return struct.pack(">Bhh", kind, speed, CURRENTS[self.currents[side]](speed)) + bytes(self.spare[count % len(self.spare)])
 
     def text(self):
-        return "".join(f"({at / 1000:.6f}) can0 {number}#{data.hex().upper()}{' T' if mark else ''}\n"
-                       for at, number, data, mark in self.frames())
+        return "".join(f"({at / 1000:.6f}) can0 {number}#{data.hex().upper()}{' T' if mark else ''}\n" for at, number, data, mark in self.frames())
 
 
 def learn(story, *words):
-    done = subprocess.run([PROGRAM, *words, "learn", "-"], input=story.text(), capture_output=True, text=True, timeout=60,
-                          check=False)
+    done = subprocess.run([PROGRAM, *words, "learn", "-"], input=story.text(), capture_output=True, text=True, timeout=60, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -144,8 +146,7 @@ class Matrix(unittest.TestCase):
     def test_learn_every_subset_of_motion_current_and_wheels_concludes_only_what_was_seen(self):
         subsets = [kinds for size in range(4) for kinds in itertools.combinations(PHASES, size)]
         count = 0
-        for phases, current, told in itertools.product(subsets, itertools.product(CURRENTS, repeat=2),
-                                                       ((True, True), (True, False), (False, True))):
+        for phases, current, told in itertools.product(subsets, itertools.product(CURRENTS, repeat=2), ((True, True), (True, False), (False, True))):
             if not phases or (current[0] != current[1] and len(phases) < 3):
                 continue
             story = Story(phases=phases, currents=current, told=told)
@@ -176,12 +177,22 @@ class Lacks(unittest.TestCase):
     """A recording that has everything; then, one at a time, what a sentence needs is taken out."""
 
     WHOLE = Story()
-    TOLD = {("setpoint_type", None): (FOR, "3"), ("current_role", None): (FOR, "limit"), ("setpoint_dlc", None): (FOR, "5"),
-            ("feedback_sign", "left"): (FOR, "yes"), ("feedback_sign", "right"): (FOR, "yes"),
-            ("speed_scale", "left"): (FOR, None), ("speed_scale", "right"): (FOR, None),
-            ("ticks_per_turn", "left"): (FOR, None), ("ticks_per_turn", "right"): (FOR, None),
-            ("force_unit", "left"): (FOR, "cN"), ("force_unit", "right"): (FOR, "dN"),
-            ("pose_byte_order", None): (FOR, "yes"), ("mounting", None): OPEN, ("pair", None): (FOR, None)}
+    TOLD = {
+        ("setpoint_type", None): (FOR, "3"),
+        ("current_role", None): (FOR, "limit"),
+        ("setpoint_dlc", None): (FOR, "5"),
+        ("feedback_sign", "left"): (FOR, "yes"),
+        ("feedback_sign", "right"): (FOR, "yes"),
+        ("speed_scale", "left"): (FOR, None),
+        ("speed_scale", "right"): (FOR, None),
+        ("ticks_per_turn", "left"): (FOR, None),
+        ("ticks_per_turn", "right"): (FOR, None),
+        ("force_unit", "left"): (FOR, "cN"),
+        ("force_unit", "right"): (FOR, "dN"),
+        ("pose_byte_order", None): (FOR, "yes"),
+        ("mounting", None): OPEN,
+        ("pair", None): (FOR, None),
+    }
 
     def differs(self, changes, **story):
         """All is told as of the whole recording, but for the changes: keys as "item" or "item side"."""
@@ -202,28 +213,50 @@ class Lacks(unittest.TestCase):
         self.assertEqual([(AGAINST, None)] * 2, [found[("wheel_lag", side)] for side in SIDES], "these wheels follow at once")
 
     def test_learn_telemetry_of_neither_wheel_leaves_what_a_wheel_does_open(self):
-        self.differs({"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN,
-                      **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")}, speeds=(False, False))
+        self.differs(
+            {"setpoint_type": OPEN, "current_role": OPEN, "pair": OPEN, **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")},
+            speeds=(False, False),
+        )
 
     def test_learn_telemetry_of_one_wheel_leaves_what_both_do_open(self):
-        self.differs({"setpoint_type": OPEN, "current_role": OPEN, "feedback_sign right": OPEN, "speed_scale right": OPEN,
-                      "ticks_per_turn right": OPEN, "force_unit right": OPEN, "pair": OPEN}, speeds=(True, False))
+        self.differs(
+            {
+                "setpoint_type": OPEN,
+                "current_role": OPEN,
+                "feedback_sign right": OPEN,
+                "speed_scale right": OPEN,
+                "ticks_per_turn right": OPEN,
+                "force_unit right": OPEN,
+                "pair": OPEN,
+            },
+            speeds=(True, False),
+        )
 
     def test_learn_wheel_that_does_not_turn_speaks_against_the_type(self):
-        self.differs({"setpoint_type": (AGAINST, None), "current_role": OPEN, "feedback_sign left": OPEN,
-                      "speed_scale left": OPEN, "ticks_per_turn left": OPEN, "pair": (AGAINST, None)}, turns=(False, True))
+        self.differs(
+            {
+                "setpoint_type": (AGAINST, None),
+                "current_role": OPEN,
+                "feedback_sign left": OPEN,
+                "speed_scale left": OPEN,
+                "ticks_per_turn left": OPEN,
+                "pair": (AGAINST, None),
+            },
+            turns=(False, True),
+        )
 
     def test_learn_wheel_that_stutters_shows_nothing_of_type_and_scale(self):
         self.differs({"setpoint_type": OPEN, "current_role": OPEN, **self.both("speed_scale", "ticks_per_turn")}, stutters=True)
 
     def test_learn_wheel_that_runs_at_zero_speaks_against_a_limit(self):
         for which in ((True, False), (False, True)):
-            self.differs({"current_role": (AGAINST, None),
-                          **({"force_unit left": OPEN} if which[0] else {"force_unit right": OPEN})}, runs_at_zero=which)
+            self.differs({"current_role": (AGAINST, None), **({"force_unit left": OPEN} if which[0] else {"force_unit right": OPEN})}, runs_at_zero=which)
 
     def test_learn_too_short_phases_tell_nothing_of_wheels(self):
-        self.differs({"setpoint_type": OPEN, "current_role": OPEN, "pose_byte_order": OPEN,
-                      **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")}, phase_ms=300)
+        self.differs(
+            {"setpoint_type": OPEN, "current_role": OPEN, "pose_byte_order": OPEN, **self.both("feedback_sign", "speed_scale", "ticks_per_turn", "force_unit")},
+            phase_ms=300,
+        )
 
     def test_learn_too_few_setpoints_tell_nothing(self):
         found = findings(Story(setpoint_ms=4000))
@@ -302,8 +335,7 @@ class AsJson(unittest.TestCase):
     """The JSON object says what the text says."""
 
     def test_learn_json_has_every_sentence_and_every_suggestion_of_the_text(self):
-        for story in (Story(), Story(phases=("forward",)), Story(types=(3, 4), spare=(3,)), Story(raw=(20, 200), sent="all"),
-                      Story(told=(False, False))):
+        for story in (Story(), Story(phases=("forward",)), Story(types=(3, 4), spare=(3,)), Story(raw=(20, 200), sent="all"), Story(told=(False, False))):
             code, out, _ = learn(story, "--json")
             code_of_text, text, _ = learn(story)
             self.assertEqual(code_of_text, code)
@@ -312,16 +344,16 @@ class AsJson(unittest.TestCase):
             marks = {"for": "+", "against": "-", "unknown": "?"}
             sentences = [f"  {marks[each['verdict']]} {each['text']}" for each in told["findings"]]
             self.assertEqual([line for line in text.splitlines() if line[:4] in ("  + ", "  - ", "  ? ")], sentences)
-            lines = [line for section, keys in told["suggested"].items()
-                     for line in (f"[{section}]", *(f"{key} = {value}" for key, value in keys.items()))]
+            lines = [line for section, keys in told["suggested"].items() for line in (f"[{section}]", *(f"{key} = {value}" for key, value in keys.items()))]
             self.assertEqual(lines, text.split("then: iwheelctl bringup)\n\n")[-1].splitlines() if lines else [])
 
     def test_learn_json_counts_the_evidence(self):
         told = json.loads(learn(Story(), "--json")[1])
         left = told["setpoints"]["left"]
-        self.assertEqual((266, 600, {"3": 600}, [1500, 1500], [-400, 400], [5, 5], 20),
-                         (left["id"], left["frames"], left["types"], left["current_mA"], left["speed_mm_s"], left["length"],
-                          left["period_ms"]))
+        self.assertEqual(
+            (266, 600, {"3": 600}, [1500, 1500], [-400, 400], [5, 5], 20),
+            (left["id"], left["frames"], left["types"], left["current_mA"], left["speed_mm_s"], left["length"], left["period_ms"]),
+        )
         self.assertEqual((200, 200, 200), (left["at_rest"], left["forward"], left["backward"]))
         wheel = told["wheels"]["left"]
         self.assertAlmostEqual(3000, wheel["told_forward"]["with_ms"], delta=50)
@@ -333,8 +365,7 @@ class AsJson(unittest.TestCase):
         self.assertEqual(None, json.loads(learn(Story(told=(False, True)), "--json")[1])["setpoints"]["left"]["current_mA"])
 
     def test_learn_json_of_an_empty_recording_is_an_object_and_the_answer_no(self):
-        done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True,
-                              capture_output=True, check=False)
+        done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True, capture_output=True, check=False)
         self.assertEqual((1, 1), (done.returncode, json.loads(done.stdout)["frames"]))
 
 

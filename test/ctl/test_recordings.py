@@ -4,6 +4,7 @@
 
 Usage: test_recordings.py PROGRAM [unittest's arguments]
 """
+
 import csv
 import io
 import json
@@ -22,8 +23,7 @@ SECOND = "(1760000000.{:06d}) can0 {}\n"
 
 def run(*words, text="", **more):
     """(exit code, stdout, stderr)"""
-    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, timeout=60,
-                          env=dict(os.environ, TZ="UTC"), **more, check=False)
+    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, timeout=60, env=dict(os.environ, TZ="UTC"), **more, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -91,7 +91,7 @@ class Clock(unittest.TestCase):
         for name, stamp in self.STAMPS.items():
             with self.subTest(name):
                 rows = drive_log().splitlines(keepends=True)
-                rows[2800] = stamp + rows[2800][rows[2800].index(")") + 1:]
+                rows[2800] = stamp + rows[2800][rows[2800].index(")") + 1 :]
                 self.judge("".join(rows), "1 single times are wrong, first in line 2801")
 
     def test_pause_of_ten_minutes_stays_a_pause(self):
@@ -175,26 +175,34 @@ class Forms(unittest.TestCase):
         import bz2
         import gzip
         import lzma
+
         for name, data, words in (
-                ("gz", gzip.compress(self.LOG.encode()), ("gzip", "gunzip -c")),
-                ("bz2", bz2.compress(self.LOG.encode()), ("bzip2", "bzcat")),
-                ("xz", lzma.compress(self.LOG.encode()), ("xz", "xzcat")),
-                ("utf-16", self.LOG.encode("utf-16"), ("UTF-16", "iconv")),
-                ("utf-16-be with mark", b"\xfe\xff" + self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
-                ("utf-16-le", self.LOG.encode("utf-16-le"), ("UTF-16", "iconv")),
-                ("utf-16-be", self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
-                ("screen", self.SCREEN * 20, ("screen form", "candump -L")),
-                ("screen -ta", "".join(f" (17000000{n:02}.000000){self.SCREEN}" for n in range(20)), ("screen form", "candump -L")),
-                ("screen -x", "  can0  RX - -  10A   [5]  01 00 00 07 D0\n" * 20, ("screen form", "candump -L")),
-                ("savvycan", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,0000010A,false,Rx,0,1,01,\n" * 9, ("CSV",)),
-                ("jsonl", '{"event":"head"}\n', ("JSON", ".log")),
-                ("trc", ";$FILEVERSION=1.1\n;   x\n" * 9, ("TRC", "can_logconvert"))):
+            ("gz", gzip.compress(self.LOG.encode()), ("gzip", "gunzip -c")),
+            ("bz2", bz2.compress(self.LOG.encode()), ("bzip2", "bzcat")),
+            ("xz", lzma.compress(self.LOG.encode()), ("xz", "xzcat")),
+            ("utf-16", self.LOG.encode("utf-16"), ("UTF-16", "iconv")),
+            ("utf-16-be with mark", b"\xfe\xff" + self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
+            ("utf-16-le", self.LOG.encode("utf-16-le"), ("UTF-16", "iconv")),
+            ("utf-16-be", self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
+            ("screen", self.SCREEN * 20, ("screen form", "candump -L")),
+            ("screen -ta", "".join(f" (17000000{n:02}.000000){self.SCREEN}" for n in range(20)), ("screen form", "candump -L")),
+            ("screen -x", "  can0  RX - -  10A   [5]  01 00 00 07 D0\n" * 20, ("screen form", "candump -L")),
+            ("savvycan", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,0000010A,false,Rx,0,1,01,\n" * 9, ("CSV",)),
+            ("jsonl", '{"event":"head"}\n', ("JSON", ".log")),
+            ("trc", ";$FILEVERSION=1.1\n;   x\n" * 9, ("TRC", "can_logconvert")),
+        ):
             with self.subTest(name):
                 self.refused(self.file("a", data), *words)
 
     def test_forms_that_are_read(self):
-        for name, data in (("mark", b"\xef\xbb\xbf" + self.LOG.encode()), ("CR LF", self.LOG.replace("\n", "\r\n")), ("R", self.LOG.replace("\n", " R\n")),
-                           ("T", self.LOG.replace("\n", " T\n")), ("spaces", self.LOG.replace(" can0 ", "  can0  ")), ("comment", "# a, b [1]\n" + self.LOG)):
+        for name, data in (
+            ("mark", b"\xef\xbb\xbf" + self.LOG.encode()),
+            ("CR LF", self.LOG.replace("\n", "\r\n")),
+            ("R", self.LOG.replace("\n", " R\n")),
+            ("T", self.LOG.replace("\n", " T\n")),
+            ("spaces", self.LOG.replace(" can0 ", "  can0  ")),
+            ("comment", "# a, b [1]\n" + self.LOG),
+        ):
             with self.subTest(name):
                 code, out, err = run("decode", self.file("a.log", data))
                 self.assertEqual((code, err), (0, ""))
@@ -215,8 +223,15 @@ class Forms(unittest.TestCase):
             import can
         except ImportError:
             self.skipTest("python-can is missing")
-        for ending, words in ((".log", None), (".asc", ("ASC",)), (".blf", ("BLF", "can_logconvert")), (".csv", ("CSV", "can_logconvert")),
-                              (".trc", ("TRC", "can_logconvert")), (".db", ("database", "can_logconvert")), (".txt", ("screen form",))):
+        for ending, words in (
+            (".log", None),
+            (".asc", ("ASC",)),
+            (".blf", ("BLF", "can_logconvert")),
+            (".csv", ("CSV", "can_logconvert")),
+            (".trc", ("TRC", "can_logconvert")),
+            (".db", ("database", "can_logconvert")),
+            (".txt", ("screen form",)),
+        ):
             with self.subTest(ending):
                 path = os.path.join(self.folder, "a" + ending)
                 with can.Logger(path) as logger:
@@ -245,32 +260,44 @@ class Decode(unittest.TestCase):
         return list(csv.DictReader(io.StringIO(out)))
 
     def test_every_message_is_shown_with_units(self):
-        code, out, err = self.decode(lines(
-            "10A#01012C07D0 T", "12A#01FED407D0 T", "100#000F0001", "120#FFF10001", "101#F81CFFFFFFFF1E",
-            "122#0097FFF80000FF92", "200#04D90007", "220#FF9D003E", "201#007C", "221#FF9C"))
+        code, out, err = self.decode(
+            lines(
+                "10A#01012C07D0 T",
+                "12A#01FED407D0 T",
+                "100#000F0001",
+                "120#FFF10001",
+                "101#F81CFFFFFFFF1E",
+                "122#0097FFF80000FF92",
+                "200#04D90007",
+                "220#FF9D003E",
+                "201#007C",
+                "221#FF9C",
+            )
+        )
         self.assertEqual((0, ""), (code, err))
         for part in (
-                "from 2025-10-09 08:53:20.000000 local time",
-                "0.000000   266 (0x10A) T left  setpoint  type 1, speed 300 mm/s, current 2000 mA",
-                "0.001000   298 (0x12A) T right setpoint  type 1, speed -300 mm/s, current 2000 mA",
-                "256 (0x100)   left  speed     15 rpm, acceleration 1 (unit unknown)",
-                "288 (0x120)   right speed     -15 rpm",
-                "left  status    battery 24.8 V, temperature 28 degC, odometry -1 ticks, CPU 30 %",
-                "right pose      x 151 mm, y -8 mm, z 0 mm, psi -110 mrad",
-                "left  force     raw 1241, force with offset 12.410 N, debug 7",
-                "right force     raw -99, force with offset -9.900 N, debug 62",
-                "left  offset    force offset 12.4 N",
-                "right offset    force offset -10.0 N"):
+            "from 2025-10-09 08:53:20.000000 local time",
+            "0.000000   266 (0x10A) T left  setpoint  type 1, speed 300 mm/s, current 2000 mA",
+            "0.001000   298 (0x12A) T right setpoint  type 1, speed -300 mm/s, current 2000 mA",
+            "256 (0x100)   left  speed     15 rpm, acceleration 1 (unit unknown)",
+            "288 (0x120)   right speed     -15 rpm",
+            "left  status    battery 24.8 V, temperature 28 degC, odometry -1 ticks, CPU 30 %",
+            "right pose      x 151 mm, y -8 mm, z 0 mm, psi -110 mrad",
+            "left  force     raw 1241, force with offset 12.410 N, debug 7",
+            "right force     raw -99, force with offset -9.900 N, debug 62",
+            "left  offset    force offset 12.4 N",
+            "right offset    force offset -10.0 N",
+        ):
             self.assertIn(part, out)
 
     def test_csv_has_units_in_its_header_and_empty_cells_for_what_is_not_there(self):
         row, other = self.rows(lines("10A#01012C07D0", "101#FFFF000000641E"))
-        self.assertEqual(("1760000000.000000", "266", "0x10A", "5", "left", "setpoint"), tuple(
-            row[name] for name in ("time_s", "id", "id_hex", "dlc_bytes", "wheel", "message")))
-        self.assertEqual(("1", "300", "2000", ""), tuple(row[name] for name in (
-            "setpoint_type", "setpoint_speed_mm_s", "setpoint_current_mA", "speed_rpm")))
-        self.assertEqual(("255", "", "100", "30"), tuple(other[name] for name in (
-            "battery_dV", "temperature_degC", "odometry_ticks", "cpu_percent")))
+        self.assertEqual(
+            ("1760000000.000000", "266", "0x10A", "5", "left", "setpoint"),
+            tuple(row[name] for name in ("time_s", "id", "id_hex", "dlc_bytes", "wheel", "message")),
+        )
+        self.assertEqual(("1", "300", "2000", ""), tuple(row[name] for name in ("setpoint_type", "setpoint_speed_mm_s", "setpoint_current_mA", "speed_rpm")))
+        self.assertEqual(("255", "", "100", "30"), tuple(other[name] for name in ("battery_dV", "temperature_degC", "odometry_ticks", "cpu_percent")))
         self.assertIn("impossible", other["note"])
 
     def test_unknown_bad_and_strange_frames_are_shown_as_bytes_with_the_reason(self):
@@ -282,8 +309,7 @@ class Decode(unittest.TestCase):
         self.assertIn("11-bit", rows[2]["note"])
 
     def test_bad_lines_are_told_with_number_and_cure_and_lose_nothing_else(self):
-        code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n")
-                                     + "(1760000001.0) can0 100#0000")
+        code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n") + "(1760000001.0) can0 100#0000")
         self.assertEqual(65, code)
         self.assertEqual(2, out.count("left  speed"))
         self.assertIn("standard input:2: does not begin with a time in parentheses; record with candump -L", err)
@@ -312,11 +338,11 @@ class Decode(unittest.TestCase):
         with tempfile.NamedTemporaryFile("w", suffix=".conf") as file:
             file.write("[left]\nforce_unit = dN\n")
             file.flush()
-            row, = self.rows(lines("200#04D90000"), "--config", file.name)
+            (row,) = self.rows(lines("200#04D90000"), "--config", file.name)
         self.assertEqual("124100", row["force_with_offset_mN"])
 
     def test_interface_with_a_comma_stays_one_column(self):
-        row, = self.rows("(1.0) a,\"b 100#00000000\n")
+        (row,) = self.rows('(1.0) a,"b 100#00000000\n')
         self.assertEqual("a__b", row["interface"])
 
     def test_time_that_goes_back_is_shown_as_it_is(self):
@@ -325,9 +351,14 @@ class Decode(unittest.TestCase):
         self.assertIn("-1.250000", out)
 
     def test_wrong_words_and_files_are_told(self):
-        for words, code, part in ((("--nonsense",), 64, "does not understand"), (("a", "b"), 64, '"b"'),
-                                  (("--config",), 64, "--config wants"), (("/nonexistent",), 65, "no such file"),
-                                  (("--config", "/nonexistent"), 78, "cannot be opened"), (("/",), 65, "directory")):
+        for words, code, part in (
+            (("--nonsense",), 64, "does not understand"),
+            (("a", "b"), 64, '"b"'),
+            (("--config",), 64, "--config wants"),
+            (("/nonexistent",), 65, "no such file"),
+            (("--config", "/nonexistent"), 78, "cannot be opened"),
+            (("/",), 65, "directory"),
+        ):
             got, out, err = run("decode", *words)
             self.assertEqual((code, ""), (got, out), words)
             self.assertIn(part, err)
@@ -354,8 +385,18 @@ class Decode(unittest.TestCase):
         self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # Of 11 MB.
 
     def test_json_carries_what_the_csv_carries(self):
-        text = lines("10A#01012C07D0 T", "100#000F0001", "101#F81CFFFFFFFF1E", "122#0097FFF80000FF92", "220#FF9D003E", "221#FF9C",
-                     "00000123#11", "100#R4", "100#00", "7FF#")
+        text = lines(
+            "10A#01012C07D0 T",
+            "100#000F0001",
+            "101#F81CFFFFFFFF1E",
+            "122#0097FFF80000FF92",
+            "220#FF9D003E",
+            "221#FF9C",
+            "00000123#11",
+            "100#R4",
+            "100#00",
+            "7FF#",
+        )
         code, out, err = run("--json", "decode", text=text)
         self.assertEqual((0, ""), (code, err))
         objects = [json.loads(line) for line in out.splitlines()]
@@ -363,11 +404,11 @@ class Decode(unittest.TestCase):
         self.assertEqual(len(rows), len(objects))
         for row, got in zip(rows, objects, strict=True):
             self.assertEqual(row["time_s"], f"{got['t_us'] // 1000000}.{got['t_us'] % 1000000:06d}")
-            self.assertEqual((row["interface"], row["direction"], row["id"], row["dlc_bytes"], row["data_hex"], row["wheel"], row["message"],
-                              row["note"]),
-                             (got["interface"], got["direction"] or "", str(got["id"]), str(got["dlc"]), got["data"], got["wheel"] or "",
-                              got["message"], got["note"] or ""))
-            columns = list(row)[list(row).index("message") + 1:-1]
+            self.assertEqual(
+                (row["interface"], row["direction"], row["id"], row["dlc_bytes"], row["data_hex"], row["wheel"], row["message"], row["note"]),
+                (got["interface"], got["direction"] or "", str(got["id"]), str(got["dlc"]), got["data"], got["wheel"] or "", got["message"], got["note"] or ""),
+            )
+            columns = list(row)[list(row).index("message") + 1 : -1]
             self.assertEqual({name: int(row[name]) for name in columns if row[name]}, got["values"])
         self.assertEqual([True, False], [objects[6]["extended"], objects[0]["extended"]])
         self.assertTrue(objects[7]["remote"])
@@ -423,15 +464,18 @@ class Replay(unittest.TestCase):
         self.assertLess(same, of)
 
     def test_another_decision_than_recorded_is_told(self):
-        self.change("jsonl", lambda text: text.replace('"type":"stopped"', '"type":"stopped"').replace(
-            '"cause":"estop_line","side":null,"detail":1}', '"cause":"wheel_lost","side":null,"detail":51}'))
+        self.change(
+            "jsonl",
+            lambda text: text.replace('"type":"stopped"', '"type":"stopped"').replace(
+                '"cause":"estop_line","side":null,"detail":1}', '"cause":"wheel_lost","side":null,"detail":51}'
+            ),
+        )
         _, out, _ = self.replay()
         self.assertIn("DIFFERENT  last stop estop_line (1), when it was recorded wheel_lost (51)", out)
         self.assertIn("stops: 0 of 1 as recorded", out)
 
     def test_a_press_that_is_left_out_changes_what_is_decided(self):
-        self.change("jsonl", lambda text: "".join(
-            line for line in text.splitlines(True) if '"type":"estop_line"' not in line or '"answer":0' in line))
+        self.change("jsonl", lambda text: "".join(line for line in text.splitlines(True) if '"type":"estop_line"' not in line or '"answer":0' in line))
         _, out, _ = self.replay()
         self.assertNotIn("estop_line: e-stop", out)
         self.assertIn("DIFFERENT  state armed, when it was recorded latched", out)
@@ -456,8 +500,8 @@ class Replay(unittest.TestCase):
         self.assertIn("fault      second_master", out)
 
     def test_cut_files_are_replayed_as_far_as_they_go_and_told(self):
-        self.change("jsonl", lambda text: text[:len(text) // 2])
-        self.change("log", lambda text: text[:len(text) * 2 // 3])
+        self.change("jsonl", lambda text: text[: len(text) // 2])
+        self.change("log", lambda text: text[: len(text) * 2 // 3])
         code, out, err = self.replay()
         self.assertEqual(65, code)
         self.assertIn("not whole", out)
@@ -469,9 +513,15 @@ class Replay(unittest.TestCase):
         for number in numbers:
             with self.subTest(number):
                 self.setUp()
-                self.change("jsonl", lambda text, number=number: "".join(
-                    line.replace('"answer":0', f'"answer":{number}').replace('"left_mm_s":300', f'"left_mm_s":{number}')
-                    .replace('"age_us":', f'"age_us":{number},"was":') for line in text.splitlines(True)))
+                self.change(
+                    "jsonl",
+                    lambda text, number=number: "".join(
+                        line.replace('"answer":0', f'"answer":{number}')
+                        .replace('"left_mm_s":300', f'"left_mm_s":{number}')
+                        .replace('"age_us":', f'"age_us":{number},"was":')
+                        for line in text.splitlines(True)
+                    ),
+                )
                 code, out, _ = self.replay()
                 self.assertIn(code, (0, 65))
                 self.assertIn("# end:", out)
@@ -485,8 +535,12 @@ class Replay(unittest.TestCase):
         self.assertIn("time goes back 1 times", out)
 
     def test_wrong_words_are_told(self):
-        for words, code, part in (((), 64, "wants a recording"), (("--x",), 64, "does not understand"),
-                                  (("/nonexistent.log",), 65, "no such file"), (("a", "b"), 64, '"b"')):
+        for words, code, part in (
+            ((), 64, "wants a recording"),
+            (("--x",), 64, "does not understand"),
+            (("/nonexistent.log",), 65, "no such file"),
+            (("a", "b"), 64, '"b"'),
+        ):
             got, out, err = run("replay", *words)
             self.assertEqual((code, ""), (got, out))
             self.assertIn(part, err)
@@ -508,8 +562,7 @@ class Why(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             for number, cause in ((2, "estop_line"), (11, "wheel_lost")):
                 for ending in ("log", "jsonl", "conf"):
-                    shutil.copy(os.path.join(GOLDEN, f"estop.{ending}"),
-                                os.path.join(folder, f"stop-{number:06d}-{cause}.{ending}"))
+                    shutil.copy(os.path.join(GOLDEN, f"estop.{ending}"), os.path.join(folder, f"stop-{number:06d}-{cause}.{ending}"))
             with open(os.path.join(folder, "stop-000012-x.jsonl"), "w", encoding="utf-8") as file:
                 file.write('{"type":"blackbox"}\n')
             with open(os.path.join(folder, "stop-000013-x.jsonl"), "w", encoding="utf-8") as file:
@@ -535,8 +588,7 @@ class Why(unittest.TestCase):
 class Learn(unittest.TestCase):
     """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as told."""
 
-    def story(self, types=(3, 3), current=lambda speed: 1500, sign=(1, 1), raw=(200, 20), offset=(20, 20), gear=1.0,
-              extra=b"", mark=""):
+    def story(self, types=(3, 3), current=lambda speed: 1500, sign=(1, 1), raw=(200, 20), offset=(20, 20), gear=1.0, extra=b"", mark=""):
         text = []
         ticks = [0.0, 0.0]
 
@@ -546,8 +598,7 @@ class Learn(unittest.TestCase):
         for at_ms in range(0, 12000, 20):
             speed = 0 if at_ms < 2000 else 400 if at_ms < 7000 else -400
             rpm = 0 if at_ms < 2200 else round(speed / 20.106 * gear)
-            for side, (setpoint, measured, status, force, zero) in enumerate((
-                    ("10A", "100", "101", "200", "201"), ("12A", "120", "121", "220", "221"))):
+            for side, (setpoint, measured, status, force, zero) in enumerate((("10A", "100", "101", "200", "201"), ("12A", "120", "121", "220", "221"))):
                 put(at_ms, f"{setpoint}#{struct.pack('>Bhh', types[side], speed, current(speed)).hex()}{extra.hex()}")
                 put(at_ms + 1, f"{measured}#{struct.pack('>hh', rpm * sign[side], 0).hex()}")
                 ticks[side] += abs(rpm) / 60000 * 20 * 60
@@ -565,10 +616,19 @@ class Learn(unittest.TestCase):
 
     def test_type_ranges_length_and_period_are_told_and_suggested(self):
         out = self.learn(types=(7, 7), extra=b"\0\0\0")
-        for part in ("type       7 (100 %)", "speed      -400 to 400 mm/s", "current    always 1500 mA",
-                     "length     always 8 bytes", "period     20 ms", "+ setpoint type 7 moves the wheels",
-                     "+ current_role = limit", "+ left: a positive setpoint is measured as a positive speed",
-                     "setpoint_type = 7", "current_role = limit", "setpoint_dlc = 8"):
+        for part in (
+            "type       7 (100 %)",
+            "speed      -400 to 400 mm/s",
+            "current    always 1500 mA",
+            "length     always 8 bytes",
+            "period     20 ms",
+            "+ setpoint type 7 moves the wheels",
+            "+ current_role = limit",
+            "+ left: a positive setpoint is measured as a positive speed",
+            "setpoint_type = 7",
+            "current_role = limit",
+            "setpoint_dlc = 8",
+        ):
             self.assertIn(part, out)
 
     def test_current_with_the_sign_of_the_speed_is_a_setpoint(self):
@@ -620,8 +680,15 @@ class Learn(unittest.TestCase):
         text = lines("10A#0101F4FFFF07", "10A#0101F40BB8", "10A#R5", "0000010A#00", "10A#01", "20000004#00", "333#00")
         code, out, _ = run("learn", "-", text=text + lines("100#00000000"))
         self.assertEqual(0, code)
-        for part in ("2 remote, extended or FD frames", "1 frames are shorter", "1 reports of errors", "time goes back 1 times",
-                     "1 setpoints with a current beyond", "1 setpoints have something behind", "819 (0x333)"):
+        for part in (
+            "2 remote, extended or FD frames",
+            "1 frames are shorter",
+            "1 reports of errors",
+            "time goes back 1 times",
+            "1 setpoints with a current beyond",
+            "1 setpoints have something behind",
+            "819 (0x333)",
+        ):
             self.assertIn(part, out)
 
     def test_without_setpoints_the_answer_is_no(self):

@@ -5,6 +5,7 @@
 Usage: test_top.py BUILD [unittest's arguments]
 Exit code 77: pyte is not there.
 """
+
 import glob
 import os
 import signal
@@ -19,7 +20,7 @@ sys.path += [os.path.join(ROOT, "test", "system"), *glob.glob(os.path.join(ROOT,
 try:
     import pyte
 except ImportError:
-    print("skip: pyte is missing (pip install -r scripts/requirements.txt into .venv; ./check does it)")
+    print("skip: pyte is missing (./check installs requirements/check.txt into .venv)")
     sys.exit(77)
 import several
 from fake_gateway import FakeGateway, snapshot
@@ -38,8 +39,7 @@ class Top:
     """The program on an emulated terminal."""
 
     def __init__(self, path, columns=80, rows=24, **more):
-        self.operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", path, "top"], environment(**more),
-                                 columns, rows)
+        self.operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", path, "top"], environment(**more), columns, rows)
         self.screen = pyte.Screen(columns, rows)
         self.stream = pyte.ByteStream(self.screen)
         self.fed = 0
@@ -49,7 +49,7 @@ class Top:
         end = time.monotonic() + seconds
         while True:
             self.operator.pump(0.05)
-            self.stream.feed(self.operator.raw[self.fed:])
+            self.stream.feed(self.operator.raw[self.fed :])
             self.fed = len(self.operator.raw)
             if time.monotonic() >= end:
                 return list(self.screen.display)
@@ -96,9 +96,11 @@ class WithWheels(unittest.TestCase):
         return top
 
     def drive(self, left, right):
-        process = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive",
-                                    str(left), str(right), "--for", "20s"], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive", str(left), str(right), "--for", "20s"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
         self.drives.append(process)
@@ -118,8 +120,19 @@ class WithWheels(unittest.TestCase):
         top = self.top()
         rows = top.wait_for("LEDGER")
         self.assertEqual(24, len(rows))
-        for text in ("e-stop released (SIMULATED)", "LEFT   told", "RIGHT  told", "force", "24.8 V", "BUS     active",
-                     "GAPS", "worst --", "STOP    at most", "SPACE stop   E e-stop   R reset   Q quit", "1 warning"):
+        for text in (
+            "e-stop released (SIMULATED)",
+            "LEFT   told",
+            "RIGHT  told",
+            "force",
+            "24.8 V",
+            "BUS     active",
+            "GAPS",
+            "worst --",
+            "STOP    at most",
+            "SPACE stop   E e-stop   R reset   Q quit",
+            "1 warning",
+        ):
             self.assertTrue(any(text in row for row in rows), (text, rows))
         self.assertEqual(" #      ###   #### #####", top.blocks(1)[:24])  # L I S T
         self.assertEqual(" #####  ###  ####    #", top.blocks(5)[:22].rstrip())
@@ -167,8 +180,7 @@ class WithWheels(unittest.TestCase):
             screen = top.look(0.5)
             self.assertEqual((rows, columns), (len(screen), len(screen[0])))
             big = rows >= 20 and columns >= 55
-            self.assertTrue((big and "#" in top.blocks(1)) or any("LISTENING" in row for row in screen),
-                            (columns, rows, screen))
+            self.assertTrue((big and "#" in top.blocks(1)) or any("LISTENING" in row for row in screen), (columns, rows, screen))
             if columns >= 40 and rows >= 10:
                 self.assertTrue(any("mm/s" in row for row in screen), (columns, rows, screen))
             if columns >= 20 and rows >= 4:
@@ -181,8 +193,12 @@ class WithWheels(unittest.TestCase):
         for text in ("e-stop released (SIMULATED)", " LISTENING ", "SPACE stop  E e-stop  R reset  Q quit", "worst --"):
             self.assertTrue(any(text in row for row in rows), (text, rows))
         together = " ".join(" ".join(rows).split())
-        for text in ("ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels", "no stop since the gateway started",
-                     "STOP at most", "no button of this machine stops the wheels"):
+        for text in (
+            "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels",
+            "no stop since the gateway started",
+            "STOP at most",
+            "no button of this machine stops the wheels",
+        ):
             self.assertIn(text, together)
         for row in rows:  # Up to the margin only where a sentence goes on.
             self.assertFalse(len(row.rstrip()) == 40 and not row.startswith((" iWheel", " LEFT", " RIGHT")), row)
@@ -194,8 +210,8 @@ class WithWheels(unittest.TestCase):
     @staticmethod
     def dots(top, rows, columns):
         """How many cells of a part of the screen have dots of a plot."""
-        lines = top.look()[rows[0]:rows[1]]
-        return sum(0x2800 < ord(c) < 0x2900 or c == "*" for line in lines for c in line[columns[0]:columns[1]])
+        lines = top.look()[rows[0] : rows[1]]
+        return sum(0x2800 < ord(c) < 0x2900 or c == "*" for line in lines for c in line[columns[0] : columns[1]])
 
     def test_large_terminals_show_speed_and_force_of_the_last_minute(self):
         for size, more in (((200, 60), {}), ((80, 60), {}), ((80, 60), {"LANG": "C", "TERM": "vt220"})):  # pyte knows no REP, xterm has it.
@@ -314,12 +330,22 @@ class WithoutWheels(unittest.TestCase):
                 def stream():
                     try:
                         for _ in range(20):
-                            self.say(connection, {"event": "state", **snapshot(
-                                "armed", lease={"holder": 7, "name": evil, "pid": 1, "remaining_ms": 5, "lease_ms": 200},
-                                warnings=[evil], ledger={evil: {"state": "contradicted"}})})
+                            self.say(
+                                connection,
+                                {
+                                    "event": "state",
+                                    **snapshot(
+                                        "armed",
+                                        lease={"holder": 7, "name": evil, "pid": 1, "remaining_ms": 5, "lease_ms": 200},
+                                        warnings=[evil],
+                                        ledger={evil: {"state": "contradicted"}},
+                                    ),
+                                },
+                            )
                             time.sleep(0.1)
                     except OSError:
                         pass
+
                 threading.Timer(0.2, stream).start()
                 return super().on_watch(connection, request)
 
@@ -334,8 +360,9 @@ class WithoutWheels(unittest.TestCase):
         self.assertEqual(0, top.end())
 
     def test_not_a_terminal_and_an_unknown_one_are_usage(self):
-        done = subprocess.run([find_program(BUILD, "iwheelctl"), "top"], stdin=subprocess.DEVNULL, capture_output=True,
-                              text=True, env=environment(), check=False)
+        done = subprocess.run(
+            [find_program(BUILD, "iwheelctl"), "top"], stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False
+        )
         self.assertEqual(64, done.returncode)
         self.assertIn("iwheelctl status", done.stderr)
         operator = Operator([find_program(BUILD, "iwheelctl"), "top"], environment(TERM="no-such-thing"))
@@ -354,8 +381,9 @@ class WithoutWheels(unittest.TestCase):
         for more, columns in (({"TERM": "dumb"}, 80), ({}, 40)):
             gateway = FakeGateway()
             self.addCleanup(gateway.close)
-            operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", gateway.path, "drive", "200", "200", "--for",
-                                 "300ms"], environment(**more), columns)
+            operator = Operator(
+                [find_program(BUILD, "iwheelctl"), "--socket", gateway.path, "drive", "200", "200", "--for", "300ms"], environment(**more), columns
+            )
             self.addCleanup(operator.close)
             self.assertEqual(0, operator.wait(), operator.text)
             if more:

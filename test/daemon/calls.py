@@ -6,6 +6,7 @@ usage: test/daemon/calls.py NM TEST_DAEMON
 
 A new one belongs into `calls` of CMakeLists.txt and, with what it means, into kernel*.c; or below, with the reason why not.
 """
+
 import subprocess
 import sys
 

@@ -5,6 +5,7 @@
 golden_table.py --check    exit 1 if the document's table is not that of the header
 golden_table.py --update   rewrite the document's table
 """
+
 import pathlib
 import re
 import sys
@@ -16,12 +17,15 @@ DOCUMENT = ROOT / "docs/protocol.md"
 BEGIN = "<!-- golden vectors: begin (test/dbc/golden_table.py --update) -->\n"
 END = "<!-- golden vectors: end -->\n"
 
-ROW = re.compile(r'\{"([^"]+)",\s*\{\.id = (\d+)U, \.dlc = (\d+)U, \.data = \{([^}]*)\}\},\s*'
-                 r"\{IW_CODEC_(\w+), IW_(\w+), \{\.\w+ = \{([^}]*)\}\}\}\}")
+ROW = re.compile(
+    r'\{"([^"]+)",\s*\{\.id = (\d+)U, \.dlc = (\d+)U, \.data = \{([^}]*)\}\},\s*'
+    r"\{IW_CODEC_(\w+), IW_(\w+), \{\.\w+ = \{([^}]*)\}\}\}\}"
+)
 
 
 class Vector(NamedTuple):
     """One row: `values` are (name of the field in the C struct, value), in the order of the frame's bytes."""
+
     name: str
     can_id: int
     data: bytes
@@ -39,7 +43,7 @@ def read_vectors():
         values = []
         for field in fields.split(", "):
             key, value = field.split(" = ")
-            values.append((key[1:], -2**31 if value == "INT32_MIN" else int(value)))
+            values.append((key[1:], -(2**31) if value == "INT32_MIN" else int(value)))
         vectors.append(Vector(name, int(can_id), octets, values))
     rows = text.count("{IW_CODEC_")
     if len(vectors) != rows:
@@ -74,8 +78,7 @@ def main():
         DOCUMENT.write_text(head + BEGIN + table() + END + tail, encoding="utf-8")
     elif sys.argv[1:] == ["--check"]:
         if not is_current():
-            sys.exit("docs/protocol.md: the golden table is not that of golden_vectors.h; "
-                     "run test/dbc/golden_table.py --update")
+            sys.exit("docs/protocol.md: the golden table is not that of golden_vectors.h; run test/dbc/golden_table.py --update")
     else:
         sys.exit(__doc__)
 

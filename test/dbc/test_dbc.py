@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The DBC against the C codec, the golden vectors and the document's table. Usage: test_dbc.py CODEC_LINE"""
+
 import random
 import re
 import subprocess
@@ -16,16 +17,42 @@ FRAMES_PER_MESSAGE = 2000
 IDS = [256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545]
 # Length, period in ms (of a setpoint: the gateway's default) and sender, from the document.
 MESSAGES = {
-    256: (4, 4, "LeftWheel"), 257: (7, 40, "LeftWheel"), 266: (5, 20, "Gateway"),
-    288: (4, 4, "RightWheel"), 289: (7, 40, "RightWheel"), 290: (8, 40, "RightWheel"), 298: (5, 20, "Gateway"),
-    512: (4, 50, "LeftWheel"), 513: (2, 1000, "LeftWheel"), 544: (4, 50, "RightWheel"), 545: (2, 1000, "RightWheel"),
+    256: (4, 4, "LeftWheel"),
+    257: (7, 40, "LeftWheel"),
+    266: (5, 20, "Gateway"),
+    288: (4, 4, "RightWheel"),
+    289: (7, 40, "RightWheel"),
+    290: (8, 40, "RightWheel"),
+    298: (5, 20, "Gateway"),
+    512: (4, 50, "LeftWheel"),
+    513: (2, 1000, "LeftWheel"),
+    544: (4, 50, "RightWheel"),
+    545: (2, 1000, "RightWheel"),
 }
-UNIT_OF_SUFFIX = {"_rpm": "rpm", "_dV": "dV", "_degC": "degC", "_ticks": "ticks", "_percent": "%", "_mm_s": "mm/s",
-                  "_mA": "mA", "_mm": "mm", "_mrad": "mrad", "_cN": "cN", "_dN": "dN", "_raw": None, "_type": None}
+UNIT_OF_SUFFIX = {
+    "_rpm": "rpm",
+    "_dV": "dV",
+    "_degC": "degC",
+    "_ticks": "ticks",
+    "_percent": "%",
+    "_mm_s": "mm/s",
+    "_mA": "mA",
+    "_mm": "mm",
+    "_mrad": "mrad",
+    "_cN": "cN",
+    "_dN": "dN",
+    "_raw": None,
+    "_type": None,
+}
 # Where the DBC says more than the C codec, which does not know the unit of a force.
-DBC_NAME = {(266, "type"): "setpoint_type", (298, "type"): "setpoint_type",
-            (512, "force_raw"): "normal_force_cN", (544, "force_raw"): "normal_force_dN",
-            (513, "offset_dN"): "force_offset_dN", (545, "offset_dN"): "force_offset_dN"}
+DBC_NAME = {
+    (266, "type"): "setpoint_type",
+    (298, "type"): "setpoint_type",
+    (512, "force_raw"): "normal_force_cN",
+    (544, "force_raw"): "normal_force_dN",
+    (513, "offset_dN"): "force_offset_dN",
+    (545, "offset_dN"): "force_offset_dN",
+}
 
 
 def load(text):
@@ -39,6 +66,7 @@ def in_byte_order(message):
 
 class Codec:
     """The C codec behind its pipe."""
+
     program = None
 
     def ask(self, lines):
@@ -51,8 +79,7 @@ class Codec:
     def decode(self, frames):
         """frames: (id, bytes); returns a list of values, or the text of the error, for each."""
         answers = self.ask([f"decode {can_id} {data.hex()}" for can_id, data in frames])
-        return [answer if answer.startswith("error") else [int(word) for word in answer.split()[1:]]
-                for answer in answers]
+        return [answer if answer.startswith("error") else [int(word) for word in answer.split()[1:]] for answer in answers]
 
     def encode(self, commands):
         """commands: (id, values); returns (id, bytes) for each."""
@@ -108,8 +135,7 @@ class TestDatabase(unittest.TestCase):
     def test_lengths_periods_and_senders_are_those_of_the_document(self):
         for message in DATABASE.messages:
             with self.subTest(message=message.name):
-                self.assertEqual(MESSAGES[message.frame_id],
-                                 (message.length, message.cycle_time, message.senders[0]))
+                self.assertEqual(MESSAGES[message.frame_id], (message.length, message.cycle_time, message.senders[0]))
                 self.assertFalse(message.is_extended_frame)
 
     def test_messages_are_the_rows_of_the_core(self):
@@ -171,7 +197,7 @@ class TestAgainstTheCodec(unittest.TestCase):
             self.assertEqual(ours, theirs, command)
 
     def test_longer_frames_decode_alike(self):
-        frames = [(can_id, data + b"\xA5" * (8 - len(data))) for can_id, data in random_frames(3, 50)]
+        frames = [(can_id, data + b"\xa5" * (8 - len(data))) for can_id, data in random_frames(3, 50)]
         for frame, ours, theirs in zip(frames, CODEC.decode(frames), decoded_by_dbc(DATABASE, frames), strict=True):
             self.assertEqual(ours, theirs, frame)
 
@@ -211,9 +237,13 @@ class TestThatFaultsAreSeen(unittest.TestCase):
         self.assertEqual(28, len(lines))
         for number, line in enumerate(lines):
             place = re.search(r": (\d+)\|", line).group(1)
-            faults = [line.replace("@0", "@1"), line.replace(f": {place}|", f": {int(place) - 1}|"),
-                      line.replace("@0+", "@0-") if "@0+" in line else line.replace("@0-", "@0+"),
-                      line.replace("(1,0)", "(10,0)"), line.replace("(1,0)", "(1,1)")]
+            faults = [
+                line.replace("@0", "@1"),
+                line.replace(f": {place}|", f": {int(place) - 1}|"),
+                line.replace("@0+", "@0-") if "@0+" in line else line.replace("@0-", "@0+"),
+                line.replace("(1,0)", "(10,0)"),
+                line.replace("(1,0)", "(1,1)"),
+            ]
             for fault in faults:
                 with self.subTest(line=line, fault=fault):
                     self.assertNotEqual(line, fault)

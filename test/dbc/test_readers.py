@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Other people's programs read a recording of the black box as it is, and cantools with share/iwheel.dbc sees in it what
 `iwheelctl decode` sees. Usage: test_readers.py IWHEELCTL"""
+
 import csv
 import io
 import shutil
@@ -20,9 +21,17 @@ RECORDING = ROOT / "test/recordings/estop.log"
 LINES = RECORDING.read_text(encoding="ascii").splitlines()
 PROGRAM = []
 # The decoder's columns beside the DBC's names.
-COLUMN = {"speed_mm_s": "setpoint_speed_mm_s", "current_mA": "setpoint_current_mA", "x_mm": "pose_x_mm", "y_mm": "pose_y_mm",
-          "z_mm": "pose_z_mm", "psi_mrad": "pose_psi_mrad", "normal_force_cN": "force_raw", "normal_force_dN": "force_raw",
-          "debug_raw": "force_debug_raw"}
+COLUMN = {
+    "speed_mm_s": "setpoint_speed_mm_s",
+    "current_mA": "setpoint_current_mA",
+    "x_mm": "pose_x_mm",
+    "y_mm": "pose_y_mm",
+    "z_mm": "pose_z_mm",
+    "psi_mrad": "pose_psi_mrad",
+    "normal_force_cN": "force_raw",
+    "normal_force_dN": "force_raw",
+    "debug_raw": "force_debug_raw",
+}
 
 
 def rows():
@@ -37,7 +46,7 @@ class Readers(unittest.TestCase):
         self.assertEqual(len(LINES), len(messages))
         for line, message in zip(LINES, messages, strict=True):
             self.assertEqual(line.endswith("R"), message.is_rx)
-            self.assertAlmostEqual(float(line[1:line.index(")")]), message.timestamp, places=5)
+            self.assertAlmostEqual(float(line[1 : line.index(")")]), message.timestamp, places=5)
             self.assertEqual(line.split()[2], f"{message.arbitration_id:03X}#{message.data.hex().upper()}")
 
     def test_cantools_reads_every_line_and_decodes_the_same_values(self):
@@ -59,16 +68,14 @@ class Readers(unittest.TestCase):
         folder = Path(subprocess.run(["mktemp", "-d"], capture_output=True, text=True, check=True).stdout.strip())
         self.addCleanup(shutil.rmtree, folder)
         with can.CanutilsLogWriter(str(folder / path), channel="vcan0") as writer:
-            for i, more in enumerate(({}, {"is_extended_id": True}, {"is_remote_frame": True, "dlc": 5},
-                                      {"is_fd": True, "data": bytes(12)}, {"is_rx": False})):
+            for i, more in enumerate(({}, {"is_extended_id": True}, {"is_remote_frame": True, "dlc": 5}, {"is_fd": True, "data": bytes(12)}, {"is_rx": False})):
                 message = {"arbitration_id": 266, "data": b"\1\1\x2c\7\xd0", "is_extended_id": False, "timestamp": 1e9 + i, **more}
                 if message.get("is_remote_frame"):
                     message["data"] = b""
                 writer(can.Message(**message))
         done = subprocess.run([*PROGRAM, "decode", "--csv", str(folder / path)], capture_output=True, text=True, check=False)
         self.assertEqual((0, ""), (done.returncode, done.stderr))
-        self.assertEqual(["setpoint", "ignored", "ignored", "ignored", "setpoint"],
-                         [row["message"] for row in csv.DictReader(io.StringIO(done.stdout))])
+        self.assertEqual(["setpoint", "ignored", "ignored", "ignored", "setpoint"], [row["message"] for row in csv.DictReader(io.StringIO(done.stdout))])
 
     @unittest.skipUnless(shutil.which("log2long"), "can-utils is not installed (apt-get install can-utils)")
     def test_can_utils_read_every_frame(self):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Tests of the Python client with a copy of it that has a fault."""
+
 import os
 import re
 import shutil
@@ -20,8 +21,15 @@ def judge(applied, tests, folder):
     if applied:
         (folder / applied.file).write_text(applied.text)
     try:
-        done = subprocess.run([sys.executable, "-m", "unittest", "-f", tests], cwd=folder / "python/tests", capture_output=True, text=True,
-                              timeout=TIMEOUT_S, env={**os.environ, "PYTHONPATH": str(folder / "python/src"), "PYTHONDONTWRITEBYTECODE": "1"}, check=False)
+        done = subprocess.run(
+            [sys.executable, "-m", "unittest", "-f", tests],
+            cwd=folder / "python/tests",
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
+            env={**os.environ, "PYTHONPATH": str(folder / "python/src"), "PYTHONDONTWRITEBYTECODE": "1"},
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return f"does not end within {TIMEOUT_S} s"
     if done.returncode == 0:

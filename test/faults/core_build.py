@@ -4,6 +4,7 @@
 The core is a shared library here, so that a change costs the compilation of one file: the judges are linked once and find
 the changed library through LD_LIBRARY_PATH. The tree itself is never touched.
 """
+
 import os
 import re
 import resource
@@ -27,7 +28,7 @@ WHICH = "which.c"
 # A judge is stopped when it has used so many times the processor time it needs with the core as it is, and so many seconds more:
 # far beyond what a busy machine can add, so that only what does not end is taken for an endless loop.
 TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
-WAIT_S = 3600 # By the clock: who waits for ever uses no processor.
+WAIT_S = 3600  # By the clock: who waits for ever uses no processor.
 OUTPUT_MAX = 64 << 20
 GCC = ["ccache", "gcc"] if shutil.which("ccache") else ["gcc"]
 # A change that reads or writes beyond an array must not pass unseen: it ends the program.
@@ -44,6 +45,7 @@ SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envel
 
 class Run(NamedTuple):
     """How a judge ended."""
+
     status: int
     output: str
     cpu_s: float
@@ -62,22 +64,31 @@ class Run(NamedTuple):
 
 class Core(NamedTuple):
     """A changed core: where its library is, and which of the changes that are in it is in force (test/mutation/schemata.py)."""
+
     folder: Path
     number: int = 0
-    has_judges: bool = False # Its headers are changed, so that who includes them must be built for it, into its folder.
+    has_judges: bool = False  # Its headers are changed, so that who includes them must be built for it, into its folder.
 
 
 def play(command, core, limit_s):
     """Runs a program with that core. Raises if it was ended from outside."""
+
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_MAX, OUTPUT_MAX))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        signal.alarm(WAIT_S) # Kept through exec.
+        signal.alarm(WAIT_S)  # Kept through exec.
 
     with tempfile.TemporaryFile() as said:
-        child = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.DEVNULL, cwd=core.folder,
-                                 env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number)}, preexec_fn=limit)
+        child = subprocess.Popen(
+            [str(word) for word in command],
+            stdin=subprocess.DEVNULL,
+            stdout=said,
+            stderr=subprocess.DEVNULL,
+            cwd=core.folder,
+            env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number)},
+            preexec_fn=limit,
+        )
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)

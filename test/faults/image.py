@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The image of an STM32F103 with one file changed, and one scenario of the emulated board."""
+
 import re
 import shutil
 import subprocess
@@ -10,10 +11,39 @@ from table import ROOT, Broken
 
 TARGET, PORT, APPLICATION, SERVER = (ROOT / name for name in ("test/target", "port/stm32_stub", "app/board", "lib/northbound/server/src"))
 DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
-IMAGE_FILES = (*DRIVER_FILES, "board_clock.c", "board_clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "small.c", "startup.c", "watchdog.c")
+IMAGE_FILES = (
+    *DRIVER_FILES,
+    "board_clock.c",
+    "board_clock_f1.c",
+    "cortex_m.c",
+    "estop.c",
+    "lamp.c",
+    "main.c",
+    "marker.c",
+    "pins_f1.c",
+    "small.c",
+    "startup.c",
+    "watchdog.c",
+)
 ALONE_FILES = ("commander.c", "console.c", "report.c")
-GATEWAY_FILES = (*(path.name for path in sorted(SERVER.glob("*.c"))), "board_answers.c", "boot.c", "configure.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c",
-                 "board_records.c", "board_assumptions.c", "pending.c", "serial.c", "serial_dma_f1.c", "board_settings.c", "store.c", "board_events.c")
+GATEWAY_FILES = (
+    *(path.name for path in sorted(SERVER.glob("*.c"))),
+    "board_answers.c",
+    "boot.c",
+    "configure.c",
+    "confirm.c",
+    "flash_f1.c",
+    "host.c",
+    "host_send.c",
+    "board_records.c",
+    "board_assumptions.c",
+    "pending.c",
+    "serial.c",
+    "serial_dma_f1.c",
+    "board_settings.c",
+    "store.c",
+    "board_events.c",
+)
 
 
 def run(command):
@@ -34,19 +64,48 @@ def judge(work, applied, folder, image, scenario):
         shutil.copytree(place, folder, dirs_exist_ok=True)
     home = next(place for place in (PORT, APPLICATION, SERVER) if (ROOT / applied.file).is_relative_to(place))
     (folder / (ROOT / applied.file).relative_to(home)).write_text(applied.text)
-    flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections", "-DNDEBUG",
-             "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
-             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'lib/northbound/protocol/include'}", f"-I{ROOT / 'lib/northbound/server/include'}",
-             f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}", "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
-             '-DIWHEEL_VERSION="0.0.0"', "-DIWHEEL_TRACK_MM_VALUE=540",
-             f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}"]
+    flags = [
+        "arm-none-eabi-gcc",
+        "-mcpu=cortex-m3",
+        "-mthumb",
+        "-mfloat-abi=soft",
+        "-Os",
+        "-std=gnu11",
+        "-w",
+        "-ffunction-sections",
+        "-DNDEBUG",
+        "-fdata-sections",
+        "-fno-tree-loop-distribute-patterns",
+        f"-I{folder}",
+        f"-I{folder / 'access'}",
+        f"-I{folder / 'boards/stm32f103'}",
+        f"-I{ROOT / 'core/include'}",
+        f"-I{ROOT / 'lib/northbound/protocol/include'}",
+        f"-I{ROOT / 'lib/northbound/server/include'}",
+        f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}",
+        "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
+        '-DIWHEEL_VERSION="0.0.0"',
+        "-DIWHEEL_TRACK_MM_VALUE=540",
+        f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}",
+    ]
     source = {"listen": "none"}.get(image, image)
     (folder / "images").mkdir()
     talk = GATEWAY_FILES if image == "gateway" else ALONE_FILES
     libraries = [work / "stm32f103" / name for name in ("lib/northbound/protocol/libiwheel_northbound.a", "core/libiwheel_core.a")]
-    must([*flags, *(folder / name for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")), *libraries,
-          "--specs=nano.specs", "-nostartfiles", f"-L{folder}", f"-T{folder / 'boards/stm32f103/memory.ld'}", "-Wl,--gc-sections",
-          "-o", folder / f"images/stm32f103-{image}.elf"])
+    must(
+        [
+            *flags,
+            *(folder / name for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")),
+            *libraries,
+            "--specs=nano.specs",
+            "-nostartfiles",
+            f"-L{folder}",
+            f"-T{folder / 'boards/stm32f103/memory.ld'}",
+            "-Wl,--gc-sections",
+            "-o",
+            folder / f"images/stm32f103-{image}.elf",
+        ]
+    )
     done = run([sys.executable, TARGET / "emulate.py", work / "libmodel.so", folder / "images", f"stm32f103.{scenario}"])
     found = re.search(r"FAIL: (.*)", done.stdout)
     if "1 passed, 0 failed" not in done.stdout and not found:

@@ -5,6 +5,7 @@ The default build tells how each file is compiled and each program linked. A cha
 compiled for the program that judges, and one link: the changed object stands before the libraries, or in the place of the program's
 own. The tree and the build are never touched.
 """
+
 import json
 import os
 import re

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which noticer noticed each seeded fault, and in how many seconds: build/report/faults.json and faults.md. Each run adds to what earlier
 runs found; faults that left the table go."""
+
 import fcntl
 import json
 
@@ -23,7 +24,9 @@ def write():
         stored = json.loads(STORED.read_text()) if STORED.exists() else {}
         rows, lines = {}, ["# Seeded faults", "", "| fault | rule | noticed by | seconds |", "|---|---|---|---:|"]
         for fault in table.load():
-            rows[fault.name] = {noticer: result for noticer, result in {**stored.get(fault.name, {}), **found.get(fault.name, {})}.items() if noticer in fault.by}
+            rows[fault.name] = {
+                noticer: result for noticer, result in {**stored.get(fault.name, {}), **found.get(fault.name, {})}.items() if noticer in fault.by
+            }
             for noticer, (finding, seconds) in rows[fault.name].items():
                 lines.append(f"| {fault.name} | {fault.rule} | {noticer}: {(finding or 'not noticed').replace('|', '/')} | {seconds:.1f} |")
         STORED.write_text(json.dumps(rows, indent=0) + "\n")

@@ -20,6 +20,7 @@ NOTICERS, each of which must notice the fault:
     python:FILE              the tests of python/tests/FILE fail with a copy of the Python client
     anything else            a name of CTest, or a regular expression for one
 """
+
 import ast
 import collections
 import functools
@@ -31,8 +32,11 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PLACES = ("core", "lib", "app", "port", "python/src")
 CORE_MEANS = ("unit", "sim", "orders")
-SYMBOLS = re.compile(r"^(?:__attribute__\(\(\w+\)\) )?[\w \*]*?\b(?P<function>\w+)\([^;{}]*\) \{$.*?^\}$|^#define (?P<macro>\w+)(?:[^\n]*\\\n)*[^\n]*$"
-                     r"|^static const struct \{[^{}]*\} (?P<table>\w+)\[.*?^\};$|^(?!typedef|return)[\w \*]+?\b(?P<object>\w+)(?:\[[^\]]*\])*(?: =[^;]*?)?;", re.M | re.S)
+SYMBOLS = re.compile(
+    r"^(?:__attribute__\(\(\w+\)\) )?[\w \*]*?\b(?P<function>\w+)\([^;{}]*\) \{$.*?^\}$|^#define (?P<macro>\w+)(?:[^\n]*\\\n)*[^\n]*$"
+    r"|^static const struct \{[^{}]*\} (?P<table>\w+)\[.*?^\};$|^(?!typedef|return)[\w \*]+?\b(?P<object>\w+)(?:\[[^\]]*\])*(?: =[^;]*?)?;",
+    re.M | re.S,
+)
 
 
 class Broken(Exception):
@@ -40,7 +44,7 @@ class Broken(Exception):
 
 
 class Hunk(NamedTuple):
-    function: str # And, after a slash, a word of its file.
+    function: str  # And, after a slash, a word of its file.
     was: str
     now: str
 
@@ -48,14 +52,14 @@ class Hunk(NamedTuple):
 class Fault(NamedTuple):
     name: str
     rule: str
-    by: tuple     # Noticers.
+    by: tuple  # Noticers.
     hunks: list
 
 
 class Applied(NamedTuple):
-    file: str     # Relative to the tree.
-    text: str     # Of the whole file, with the fault.
-    moved: str    # Empty, or which function is gone and where its code is now.
+    file: str  # Relative to the tree.
+    text: str  # Of the whole file, with the fault.
+    moved: str  # Empty, or which function is gone and where its code is now.
 
 
 def code_pattern(code):

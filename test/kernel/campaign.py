@@ -55,8 +55,7 @@ class Campaign:
         names = [
             entry.name
             for entry in ENTRIES.values()
-            if group.runs(entry.name, entry.groups, options.full)
-            and (not options.only or any(part in entry.name for part in options.only))
+            if group.runs(entry.name, entry.groups, options.full) and (not options.only or any(part in entry.name for part in options.only))
         ]
         if not names or (options.real_time and group.virtual) or (group.full_only and not options.full):
             return None

@@ -37,14 +37,29 @@ class Machine(NamedTuple):
     built: tuple = ()
 
 
-PARTS = ("linux-image-arm64", "libgpiod2", "libinih1", "libmnl0", "libncursesw6", "python3", "bash", "busybox-static", "coreutils", "iproute2", "mount", "util-linux")
+PARTS = (
+    "linux-image-arm64",
+    "libgpiod2",
+    "libinih1",
+    "libmnl0",
+    "libncursesw6",
+    "python3",
+    "bash",
+    "busybox-static",
+    "coreutils",
+    "iproute2",
+    "mount",
+    "util-linux",
+)
 KVASER = ("-device", "kvaser_pci,canbus=bus") * 2
 AMD64 = Machine("amd64", ("qemu-system-x86_64", "-vga", "none"), "ttyS0", "qemu-system-x86", KVASER)
 CTUCAN = ("drivers/net/can/ctucanfd", "CONFIG_CAN_CTUCANFD=m", "CONFIG_CAN_CTUCANFD_PCI=m")
 MACHINES = {
     "amd64": AMD64,
     "ctucan": AMD64._replace(cards=("-device", "ctucan_pci,canbus0=bus,canbus1=bus"), built=CTUCAN),
-    "arm64": Machine("arm64", ("qemu-system-aarch64", "-M", "virt", "-cpu", "cortex-a57"), "ttyAMA0", "qemu-system-arm", KVASER, PARTS, "aarch64-linux-gnu-gcc"),
+    "arm64": Machine(
+        "arm64", ("qemu-system-aarch64", "-M", "virt", "-cpu", "cortex-a57"), "ttyAMA0", "qemu-system-arm", KVASER, PARTS, "aarch64-linux-gnu-gcc"
+    ),
 }
 HERE_IS = {"x86_64": "amd64"}  # os.uname() and Debian
 CONTROLLERS = ("can0", "can1")
@@ -125,7 +140,7 @@ def find_foreign(machine):
     folder = os.path.join(cache(), f"distribution-{machine.architecture}")
     root = os.path.join(folder, "root")
     fresh = not os.path.exists(os.path.join(root, "wanted"))
-    output(os.path.join(ROOT, "scripts/cross_root"), machine.architecture, root, *machine.parts)
+    output(os.path.join(ROOT, "scripts/from_debian"), "root", machine.architecture, root, *machine.parts)
     if fresh or not os.path.exists(os.path.join(folder, "vmlinuz")):
         keep(root, folder)
     return folder
@@ -134,7 +149,12 @@ def find_foreign(machine):
 def packages_of(architecture):
     """The packages of this project for that architecture. RuntimeError: where they come from."""
     folder = os.path.join(ROOT, "build", "cross", architecture)
-    names = [name for part in ("gateway", "tools") for name in (os.listdir(folder) if os.path.isdir(folder) else ()) if re.match(f"iwheel-{part}_.*_{architecture}.deb$", name)]
+    names = [
+        name
+        for part in ("gateway", "tools")
+        for name in (os.listdir(folder) if os.path.isdir(folder) else ())
+        if re.match(f"iwheel-{part}_.*_{architecture}.deb$", name)
+    ]
     if len(names) != 2:
         raise RuntimeError(f"no packages for {architecture}: ./check cross builds them")
     return [os.path.join(folder, name) for name in names]
@@ -219,7 +239,9 @@ class Image:
         """With the libraries it is linked with."""
         self.add(path)
         self.add(os.path.realpath(path))
-        for library in re.findall(r"(/\S+) \(0x", subprocess.run(["ldd", path], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout):
+        for library in re.findall(
+            r"(/\S+) \(0x", subprocess.run(["ldd", path], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout
+        ):
             self.add(library)
             self.add(os.path.realpath(library))
 

@@ -21,9 +21,7 @@ def generation(build):
 
 def last_line(command, **variables):
     """Runs it; its last line of output. Raises RuntimeError with what it said if it fails."""
-    done = subprocess.run(
-        command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     lines = done.stdout.strip().splitlines() or [""]
     if done.returncode != 0:
         raise RuntimeError(f"{' '.join(command)}: {lines[-1]}")
@@ -35,7 +33,7 @@ def find_build(build, download=True):
     if generation(build) == 2:
         return build
     beside = os.path.join(os.path.dirname(os.path.abspath(build)), "gpiod2")
-    library = [os.path.join(ROOT, "scripts", "build_libgpiod2")] + ([] if download else ["--no-download"])
+    library = [os.path.join(ROOT, "test", "kernel", "build_libgpiod2")] + ([] if download else ["--no-download"])
     configure = ["cmake", "-S", ROOT, "-B", beside, "-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_C_FLAGS_RELWITHDEBINFO=-O2 -DNDEBUG"]
     last_line(configure, PKG_CONFIG_PATH=last_line(library))
     last_line(["cmake", "--build", beside, "--target", "iwheel-gateway", "iwheel-sim", "-j", str(os.cpu_count())])

@@ -19,7 +19,9 @@ class Group(NamedTuple):
     same_as: str = ""
     few: tuple = ()
     gpiod: int = 0  # the generation of libgpiod; 0: that of --build
-    distribution: str = ""  # a machine of distribution.py, on the distribution's kernel, whose clock no load makes late, though its processor is not infinitely fast
+    distribution: str = (
+        ""  # a machine of distribution.py, on the distribution's kernel, whose clock no load makes late, though its processor is not infinitely fast
+    )
 
     def runs(self, name, groups, full):
         """Whether a test of that name and those groups is one of this group's."""
@@ -27,7 +29,16 @@ class Group(NamedTuple):
 
 
 # What differs between the generations of libgpiod is how a line is opened, read, lost and found again.
-READS_THE_LINE = ("row11_presses_low", "row11_two_lines", "row13_line_shorted", "row29_line_twice", "row12_pulses_low", "row12_glitch", "row13_pressed", "row14_")
+READS_THE_LINE = (
+    "row11_presses_low",
+    "row11_two_lines",
+    "row13_line_shorted",
+    "row29_line_twice",
+    "row12_pulses_low",
+    "row12_glitch",
+    "row13_pressed",
+    "row14_",
+)
 # On the distribution's kernel: a drive, an interface that goes, a gateway that is killed.
 SHORT = ("controller_nominal", "controller_row15", "controller_row25_killed")
 # The longest come first, so that no processor waits for one of them at the end.

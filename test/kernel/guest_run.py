@@ -16,9 +16,8 @@ import traceback
 import kernel_rig
 from catalogue import ENTRIES
 from harness import SERVICE_NICE, as_a_service, die_with_parent
-from runner import Run, attempt_of
 from scenario import Skip
-from verdict import CRASH, Failure, Session, explains, kind_of
+from verdict import CRASH, Attempt, Failure, Session, explains, kind_of
 
 KINDS = ("latencies", "from_level")  # of the e-stop: since the edge, since the level
 SWITCH_S = 0.0005  # between threads of a test: a press does not wait for the recorder
@@ -88,17 +87,21 @@ def hasten_received_frames():
             pass  # it has just ended
 
 
-class GuestRun(Run):
-    """The runner of the system tests, with forked workers; in virtual time no machine is late, so every verdict is conclusive.
+def attempt_of(result):
+    """From what a worker told."""
+    known = {key: result[key] for key in ("skip", "stalls", "claims", "begin_us", "end_us") if key in result}
+    return Attempt([Failure(*failure) for failure in result["failures"]], data=result, **known)
+
+
+class GuestRun(Session):
+    """The runner of the scenarios, with forked workers; in virtual time no machine is late, so every verdict is conclusive.
 
     In real time a witness runs beside, with the gateway's priority. Setting up a test always delays it a little (a fork is slow in
     such a kernel), so what counts is a delay that is long enough, and near enough, to have caused what is wrong.
     """
 
-    command = "test/kernel/run"
-
     def __init__(self, plan):
-        Session.__init__(self, self.work_off)
+        super().__init__(self.work_off)
         self.plan = plan
         self.limit_s = SOAK_LIMIT_S if plan["group"] == "soak" else FULL_LIMIT_S if plan["full"] else LIMIT_S
         self.folder = None

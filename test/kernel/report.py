@@ -93,10 +93,7 @@ def row_line(row, results, real_time):
     passed = [r for r in here if r["verdict"] == "passed"]
     ours = f"{len(passed)} of {len(here)}" if here else "--"
     local = len([name for name in REGISTRY if name.startswith(f"row{row:02d}_")]) or "--"
-    values = {
-        key: [r["measures"][key] for r in here if key in r["measures"] and r["group"] not in real_time]
-        for key in ("gap_ms", "stop_ms", "stale_frames")
-    }
+    values = {key: [r["measures"][key] for r in here if key in r["measures"] and r["group"] not in real_time] for key in ("gap_ms", "stop_ms", "stale_frames")}
     gap, stop = number(values["gap_ms"], "ms"), number(values["stop_ms"], "ms")
     return f"| {row} | {ROWS[row]} | {ours} | {local} | {gap} | {stop} | {number(values['stale_frames'], '')} |".replace("  |", " |")
 

@@ -14,8 +14,7 @@ from unittest import mock
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
 import kernel_rig
-from guest_run import GuestRun
-from runner import attempt_of
+from guest_run import GuestRun, attempt_of
 from verdict import RETRIES
 
 BEGIN_US, FAULT_US, END_US = 1_000_000, 3_000_000, 5_000_000

@@ -4,6 +4,7 @@
 
 Usage: test_pages.py BUILD [unittest's arguments]
 """
+
 import os
 import subprocess
 import sys
@@ -13,8 +14,16 @@ import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = ""
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "bridge/ros2", "iwheel-serial": "bridge/serial", "iwheel-web": "bridge/web",
-           "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt"}
+FOLDERS = {
+    "iwheel-gateway": "gateway",
+    "iwheelctl": "ctl",
+    "iwheel-sim": "sim",
+    "iwheel-ros2": "bridge/ros2",
+    "iwheel-serial": "bridge/serial",
+    "iwheel-web": "bridge/web",
+    "iwheel-mqtt": "bridge/mqtt",
+    "iwheel-fleet": "bridge/mqtt",
+}
 
 
 def program(name):
@@ -77,7 +86,7 @@ class Pages(unittest.TestCase):
         self.expect_printed("iwheel-gateway.conf.5", output("iwheel-gateway", "--print-config", "-c", os.path.join(ROOT, "share", "gateway.conf")))
 
     def test_every_page_is_made_without_a_warning_and_installed(self):
-        expected = {name[:-len(".scd")] for name in os.listdir(os.path.join(ROOT, "man"))}
+        expected = {name[: -len(".scd")] for name in os.listdir(os.path.join(ROOT, "man"))}
         expected -= {f"{name}.1" for name in set(FOLDERS) - set(built(FOLDERS))}
         with tempfile.TemporaryDirectory() as prefix:
             for component in ("gateway", "tools", "ros2", "serial", "web", "mqtt", "client-dev"):

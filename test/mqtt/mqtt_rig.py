@@ -21,13 +21,12 @@ except ImportError:
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "system"))
 
 from bus import now_us
-from harness import Process, Rig
+from harness import WORDS, Process, Rig
 from trials import Skip, until
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 ID = "w1"
-FIGURES = []  # Rows of the table in docs/mqtt.md: (fault, how often, events sent, arrived, doubled, seconds until the last arrived).
 
 
 def free_port():
@@ -83,8 +82,11 @@ class Far:
         numbers = list(dict.fromkeys(int(event["id"].rsplit("-", 1)[1]) for event, _ in told))
         assert numbers == list(range(numbers[0], numbers[-1] + 1)), f"a gap, or out of order: {numbers}"
         latest_s = max(at_us - event["t_us"] for event, at_us in told) / 1e6
-        FIGURES.append((fault, often, numbers[-1] - numbers[0] + 1, len(numbers), len(told) - len(numbers), latest_s))
-        print("figures:", " | ".join(str(one) for one in FIGURES[-1][:-1]), f"| {latest_s:.1f} s", flush=True)
+        row = f"{fault} | {often} | {numbers[-1] - numbers[0] + 1} | {len(numbers)} | {len(told) - len(numbers)} | {latest_s:.1f} s"
+        print("figures:", row, flush=True)
+        if "IWHEEL_FIGURES" in os.environ:  # See figures.py.
+            with open(os.environ["IWHEEL_FIGURES"], "a", encoding="utf-8") as file:
+                file.write(f"figures: {row}\n")
 
     def events(self, name=None, machine=ID):
         """(topic's name, event) in the order in which they came, doubles by id left out."""
@@ -186,7 +188,7 @@ class Line(threading.Thread):
         time.sleep(self.delay)
         if self.left is None:
             return data, True
-        data = data[:max(0, self.left)]
+        data = data[: max(0, self.left)]
         self.left -= len(data)
         return data, self.left > 0
 
@@ -201,15 +203,22 @@ class MqttRig(Rig):
 
     def __init__(self, build, driving=False, settings=None, config=None):
         if not paho:
-            raise Skip("paho-mqtt is missing in .venv (pip install -r scripts/requirements.txt)")
+            raise Skip("paho-mqtt is missing in .venv (scripts/python_packages .venv requirements/check.txt)")
         if not shutil.which("mosquitto"):
             raise Skip("mosquitto is missing (scripts/install_tools check brings it)")
         self.bridge = self.broker = None
         self.fars, self.port = [], free_port()
         self.broker_lines = ["allow_anonymous true", "persistence false", f"user {pwd.getpwuid(os.getuid()).pw_name}"]
         super().__init__(str(build), {section: {**CONFIG.get(section, {}), **(config or {}).get(section, {})} for section in {*CONFIG, *(config or {})}})
-        self.mqtt_settings = {"gateway": {"socket": self.path("gateway.sock" if driving else "watch.sock")}, "machine": {"id": ID}, "broker": {"port": self.port},
-                              "state": {"every_ms": 1000}, "spool": {"directory": self.path("spool")}, "home_assistant": {}, "drive": {}}
+        self.mqtt_settings = {
+            "gateway": {"socket": self.path("gateway.sock" if driving else "watch.sock")},
+            "machine": {"id": ID},
+            "broker": {"port": self.port},
+            "state": {"every_ms": 1000},
+            "spool": {"directory": self.path("spool")},
+            "home_assistant": {},
+            "drive": {},
+        }
         if driving:
             self.mqtt_settings["drive"] = {"enabled": "yes", "allow_reset": "yes"}
         for section, keys in (settings or {}).items():
@@ -218,6 +227,9 @@ class MqttRig(Rig):
 
     def words(self):
         return self.bridge.text() if self.bridge else ""
+
+    def said(self):
+        return self.words()[-WORDS:] + super().said()
 
     def gateway_command(self, *extra):
         return super().gateway_command("--watch-socket", self.path("watch.sock"), *extra)
@@ -237,6 +249,7 @@ class MqttRig(Rig):
             assert self.broker.child.poll() is None, self.broker.text()
             with socket.socket() as one:
                 return one.connect_ex(("127.0.0.1", self.port)) == 0
+
         until(listens, what="the broker listens")
 
     def bring_broker_back(self, line, far):

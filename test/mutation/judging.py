@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The judgement of one mutant: who sees it, or which compiler proves that there is nothing to see."""
+
 import collections
 import hashlib
 import re
@@ -13,16 +14,15 @@ from mutants import files, functions
 KILLED, ENDLESS, SAME, LIVES, INVALID = "killed", "does not end", "same code", "lives", "does not compile"
 # If one of them makes the same object of it as of the core as it is, it is the same program.
 COMPILERS = (("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
-SMALL = "-Os" # Leaves out parts of functions in headers (__OPTIMIZE_SIZE__): it proves nothing there.
+SMALL = "-Os"  # Leaves out parts of functions in headers (__OPTIMIZE_SIZE__): it proves nothing there.
 PROBE = "probe.c"
-WHOLE_CORE = (("orders", "test_orders", lambda judges, core: judges.orders(core)),
-              ("simulation", "test_sim", lambda judges, core: judges.sim(core, 1)))
+WHOLE_CORE = (("orders", "test_orders", lambda judges, core: judges.orders(core)), ("simulation", "test_sim", lambda judges, core: judges.sim(core, 1)))
 
 
 class Verdict(NamedTuple):
     kind: str
-    program: str = "" # Who sees it.
-    test: str = ""    # Which of its tests, if it is a unit test that fails and not one that crashes.
+    program: str = ""  # Who sees it.
+    test: str = ""  # Which of its tests, if it is a unit test that fails and not one that crashes.
 
 
 def digest(text):
@@ -73,7 +73,9 @@ class Judge:
     def order(self, mutant):
         """Unit tests that sweep every value come after the others; those that killed most of the function's mutants come first."""
         kills, stem = self.kills[mutant.file, mutant.function], mutant.file.rpartition(".")[0]
-        found = sorted((name for name in self.judges.tests if mutant.file in self.reach[f"unit_{name}"]), key=lambda name: (-kills[name], stem not in name, name))
+        found = sorted(
+            (name for name in self.judges.tests if mutant.file in self.reach[f"unit_{name}"]), key=lambda name: (-kills[name], stem not in name, name)
+        )
         return [name for name in found if name not in SLOW], [name for name in found if name in SLOW]
 
     def objects_of(self, folder, file):
@@ -125,5 +127,6 @@ class Judge:
         verdict = verdict or self.killed(core, mutant, slow)
         if verdict:
             return verdict
-        return next((Verdict(KILLED, means) for means, program, hears in WHOLE_CORE
-                     if mutant.file in self.reach[program] and hears(self.judges, core)), Verdict(LIVES))
+        return next(
+            (Verdict(KILLED, means) for means, program, hears in WHOLE_CORE if mutant.file in self.reach[program] and hears(self.judges, core)), Verdict(LIVES)
+        )

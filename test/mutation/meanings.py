@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Bugs as people make them around the core: in daemon, Linux port and STM32 driver. One change each, by meaning rather than by operator."""
+
 import itertools
 import re
 
@@ -29,7 +30,9 @@ class Meanings(Finder):
 
     def visit(self, node, parent):
         if parent is None:
-            self.times = [(child["name"], child["type"]["qualType"]) for child in self.declaration.get("inner", ()) if child["kind"] == "ParmVarDecl" and "name" in child]
+            self.times = [
+                (child["name"], child["type"]["qualType"]) for child in self.declaration.get("inner", ()) if child["kind"] == "ParmVarDecl" and "name" in child
+            ]
         handler = getattr(self, f"mean_{node.get('kind')}", None)
         if handler:
             handler(node)
@@ -37,7 +40,7 @@ class Meanings(Finder):
         for child in children[1:] if node.get("kind") == "CaseStmt" else children:
             if "kind" in child:
                 self.visit(child, node)
-        if node.get("kind") == "VarDecl": # From here on: compilers tell of one that is used in its own beginning.
+        if node.get("kind") == "VarDecl":  # From here on: compilers tell of one that is used in its own beginning.
             self.times.append((node["name"], node["type"]["qualType"]))
 
     def mean_IfStmt(self, node):
@@ -60,7 +63,7 @@ class Meanings(Finder):
                 if is_void and number > 0:
                     self.add("returns early", span, "return")
                 if before and ";" not in self.source[slice(*before)] and not self.is_order_free(former, child):
-                    between = self.source[before[1]:span[0]]
+                    between = self.source[before[1] : span[0]]
                     self.add("order of two effects", (before[0], span[1]), self.source[slice(*span)] + between + self.source[slice(*before)])
             before, former = span, child
             if child["kind"] == "ContinueStmt":
@@ -84,7 +87,11 @@ class Meanings(Finder):
         if declared["kind"] == "EnumConstantDecl" and text in SIDES:
             self.add("sides swapped", span, SIDES[text])
         if declared["kind"] in ("VarDecl", "ParmVarDecl") and TIME.search(text):
-            others = [name for name, kind in self.times if name != text and TIME.search(name) and kind.removeprefix("const ") == declared["type"]["qualType"].removeprefix("const ")]
+            others = [
+                name
+                for name, kind in self.times
+                if name != text and TIME.search(name) and kind.removeprefix("const ") == declared["type"]["qualType"].removeprefix("const ")
+            ]
             if others:
                 self.add("wrong clock", span, others[0])
 
@@ -112,7 +119,7 @@ class Meanings(Finder):
             self.add("off by a period", span, f"({text} / 2)")
         elif re.fullmatch(r"[A-Z]\w+", text) and text != "NULL":
             self.add("constant off by one", span, f"({text} + 1)")
-        elif re.fullmatch(r"\d+[uU]?[lL]*", text) and not self.source[:span[0]].endswith("-"):
+        elif re.fullmatch(r"\d+[uU]?[lL]*", text) and not self.source[: span[0]].endswith("-"):
             self.add("constant off by one", span, f"{int(node['value']) + 1}{'U' if 'U' in text.upper() else ''}")
 
     def mean_BinaryOperator(self, node):
@@ -128,7 +135,7 @@ class Meanings(Finder):
         for one, other in itertools.pairwise(arguments):
             a, b = self.span(one), self.span(other)
             if a and b and one["type"]["qualType"] == other["type"]["qualType"]:
-                self.add("arguments swapped", (a[0], b[1]), self.source[slice(*b)] + self.source[a[1]:b[0]] + self.source[slice(*a)])
+                self.add("arguments swapped", (a[0], b[1]), self.source[slice(*b)] + self.source[a[1] : b[0]] + self.source[slice(*a)])
 
     def mean_ReturnStmt(self, node):
         value = node["inner"][0] if node.get("inner") else None

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """All mutants of a file of the core: from clang's syntax tree, one small change each."""
+
 import json
 import re
 import subprocess
@@ -11,10 +12,33 @@ CORE, PUBLIC = ROOT / "core/src", ROOT / "core/include/iwheel"
 # Macros that only hint: what they are given is looked at as if they were not there.
 HINTS = ("IW_CODEC_LIKELY",)
 OPERATORS = {
-    "<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",), "&&": ("||",),
-    "||": ("&&",), "+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "%": ("/",), "&": ("|",), "|": ("&",), "^": ("|",),
-    "<<": (">>",), ">>": ("<<",), "+=": ("-=",), "-=": ("+=",), "|=": ("&=",), "&=": ("|=",), "<<=": (">>=",), ">>=": ("<<=",),
-    "*=": ("/=",), "/=": ("*=",), "%=": ("/=",),
+    "<": ("<=", ">="),
+    "<=": ("<", ">"),
+    ">": (">=", "<="),
+    ">=": (">", "<"),
+    "==": ("!=",),
+    "!=": ("==",),
+    "&&": ("||",),
+    "||": ("&&",),
+    "+": ("-",),
+    "-": ("+",),
+    "*": ("/",),
+    "/": ("*",),
+    "%": ("/",),
+    "&": ("|",),
+    "|": ("&",),
+    "^": ("|",),
+    "<<": (">>",),
+    ">>": ("<<",),
+    "+=": ("-=",),
+    "-=": ("+=",),
+    "|=": ("&=",),
+    "&=": ("|=",),
+    "<<=": (">>=",),
+    ">>=": ("<<=",),
+    "*=": ("/=",),
+    "/=": ("*=",),
+    "%=": ("/=",),
 }
 SIDES = {"IW_LEFT": "IW_RIGHT", "IW_RIGHT": "IW_LEFT"}
 
@@ -25,16 +49,16 @@ class Mutant(NamedTuple):
     kind: str
     begin: int
     end: int
-    text: str # Instead of what stands there.
+    text: str  # Instead of what stands there.
 
     def apply(self, source):
-        return source[:self.begin] + self.text + source[self.end:]
+        return source[: self.begin] + self.text + source[self.end :]
 
     def key(self, source):
         """Names it without line numbers: the line before and after."""
         from_line, to_line = source.rfind("\n", 0, self.begin) + 1, source.find("\n", self.end)
         before = " ".join(source[from_line:to_line].split())
-        after = " ".join((source[from_line:self.begin] + self.text + source[self.end:to_line]).split())
+        after = " ".join((source[from_line : self.begin] + self.text + source[self.end : to_line]).split())
         return f"{self.file} | {self.function} | {before} | {after}"
 
 
@@ -52,8 +76,9 @@ class Finder:
         self.path, self.source, self.found = Path(path), Path(path).read_text(), []
         self.name = name or self.path.name
         plain = re.sub(rf"(?<!#define )\b({'|'.join(HINTS)})(?=\()", lambda match: " " * len(match[1]), self.source)
-        tree = subprocess.run(["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-w", *flags, "-xc", "-"],
-                              input=plain, capture_output=True, text=True, check=True).stdout
+        tree = subprocess.run(
+            ["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-w", *flags, "-xc", "-"], input=plain, capture_output=True, text=True, check=True
+        ).stdout
         names = set(re.findall(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$", self.source, re.M))
         self.function = None
         for node in json.loads(tree)["inner"]:
@@ -64,9 +89,9 @@ class Finder:
                     self.visit(body[0], None)
 
     def add(self, kind, span, text):
-        if span and re.search(rf"\b({'|'.join(HINTS)})$", self.source[:span[0]]):
+        if span and re.search(rf"\b({'|'.join(HINTS)})$", self.source[: span[0]]):
             text = f"({text})"
-        if span and self.source[span[0]:span[1]] != text:
+        if span and self.source[span[0] : span[1]] != text:
             self.found.append(Mutant(self.name, self.function, kind, *span, text))
 
     def span(self, node):

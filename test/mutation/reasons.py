@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The lists of mutants that no test can see, and the names of mutants in them."""
+
 import collections
 
 from mutants import mutants

@@ -5,6 +5,7 @@ Of each function there is one copy per mutant beside the one as it is; under the
 mutant is in force is told by the environment when the library is loaded. Mutants of functions that stand in headers are in
 force in whoever includes them, judges too.
 """
+
 import re
 
 from core_build import NUMBER
@@ -19,20 +20,20 @@ TOLD = "extern int iw_mutant;\n"
 
 
 def argument_names(signature):
-    names = [re.search(r"(\w+)\s*(?:\[[^\]]*\]\s*)*$", part)[1] for part in signature[signature.index("(") + 1:signature.rindex(")")].split(",")]
+    names = [re.search(r"(\w+)\s*(?:\[[^\]]*\]\s*)*$", part)[1] for part in signature[signature.index("(") + 1 : signature.rindex(")")].split(",")]
     return [name for name in names if name != "void"]
 
 
 def copies(source, name, span, numbered):
     """The function's text `numbered` times: [(number, text)], and the switch."""
     at = source.index("{\n", span[0])
-    signature = " ".join(source[span[0]:at].split())
+    signature = " ".join(source[span[0] : at].split())
     own = signature if signature.startswith("static ") else f"static {signature}"
     call = f"({', '.join(argument_names(signature))});"
     back = "" if re.match(r"(static )?(inline )?void \w", signature) else "return "
-    found = [(0, f"{own.replace(f'{name}(', f'{name}__0(', 1)} {source[at:span[1]]}\n")]
+    found = [(0, f"{own.replace(f'{name}(', f'{name}__0(', 1)} {source[at : span[1]]}\n")]
     for number, mutant in numbered:
-        body = source[at:mutant.begin] + mutant.text + source[mutant.end:span[1]]
+        body = source[at : mutant.begin] + mutant.text + source[mutant.end : span[1]]
         found.append((number, f"{own.replace(f'{name}(', f'{name}__{number}(', 1)} {body}\n"))
     cases = "".join(f" case {number}: {back}{name}__{number}{call} break;" for number, _ in numbered)
     return found, f"{signature} {{ switch (iw_mutant) {{{cases} default: {back}{name}__0{call} }} }}"
@@ -46,7 +47,7 @@ def compose(source, numbered, head):
         if not mine:
             continue
         found, switch = copies(source, name, span, mine)
-        text += source[last:span[0]]
+        text += source[last : span[0]]
         for number, copy in found:
             begin = text.count("\n") + 1
             text += copy

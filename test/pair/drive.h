@@ -7,7 +7,7 @@
 #define PAIR_TEST_DRIVE_H
 
 #include "iwheel/gateway.h"
-#include "iwheel_sim/ranges.h"
+#include "sim_ranges.h"
 
 #define MS 1000U
 #define S  1000000U

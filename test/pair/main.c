@@ -148,7 +148,7 @@ static int drive_ranges(const options_t *options) {
 
 static void usage(FILE *out) {
     fputs("usage: test_pair [--hours H] [--first SEED] [--pair-mm N] | --faults [--pair-mm N]\n"
-          "Drives machines of any kind within the ranges of what is ordinary (iwheel_sim/ranges.h) for that many "
+          "Drives machines of any kind within the ranges of what is ordinary (test/support/sim_ranges.h) for that many "
           "simulated hours (1); none of\n"
           "them may be stopped. Tells the largest deviation. --faults: the angle of each fault of one wheel, as a "
           "table, and whether it is\n"

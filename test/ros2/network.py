@@ -137,7 +137,10 @@ def one_way(data):
 
 def timeless(packets):
     """The same without time stamps."""
-    return [(at, port, (bytes.fromhex(data)[:20] + b"".join(part for kind, part in submessages(bytes.fromhex(data)) if kind != INFO_TS)).hex()) for at, port, data in packets]
+    return [
+        (at, port, (bytes.fromhex(data)[:20] + b"".join(part for kind, part in submessages(bytes.fromhex(data)) if kind != INFO_TS)).hex())
+        for at, port, data in packets
+    ]
 
 
 def fresh(data, now):

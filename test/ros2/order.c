@@ -285,7 +285,7 @@ static void test_ros_reset_means_a_stop_that_was_shown_for_a_second(void) {
     pass(3000);
     request_comes(ROS_STOP); // No new stop.
     pass(100);
-    bridge.shown_us = bridge_clock_us(CLOCK_MONOTONIC) - 900000;
+    bridge.shown_us = bridge_monotonic_us() - 900000;
     request_comes(ROS_RESET);
     pass(20);
     TEST_ASSERT_TRUE(answered && !success);

@@ -10,6 +10,7 @@ the image did what the chip forbids.
 
 A machine that is too busy for it makes the board's time pass more slowly, and nothing is late in that time: so it is the one to judge by.
 """
+
 import contextlib
 import os
 import socket
@@ -84,8 +85,8 @@ class Board:
         self.unread = (self.unread + bytes(machine.uart.sent))[-65536:]
         machine.uart.sent.clear()
         with contextlib.suppress(BlockingIOError, ConnectionError):
-            self.unread = self.unread[self.line.send(self.unread):] if self.unread else b""
-        for _ in machine.resets[self.resets:]:
+            self.unread = self.unread[self.line.send(self.unread) :] if self.unread else b""
+        for _ in machine.resets[self.resets :]:
             self.happened("start")
             if self.was_sending:
                 self.happened("restart_hold", RESTART_US)
@@ -94,7 +95,7 @@ class Board:
         self.sent_ns = next((frame.time_ns for frame in reversed(machine.bus.log) if frame.sender == "chip"), self.sent_ns)
         machine.bus.log.clear()
         machine.bus.attempts = 0
-        self.news += [f"X {text}" for text in machine.violations[self.told:]]
+        self.news += [f"X {text}" for text in machine.violations[self.told :]]
         self.told = len(machine.violations)
         self.link.setblocking(True)
         self.link.sendall("".join(f"{line}\n" for line in self.news).encode())

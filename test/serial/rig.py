@@ -66,7 +66,7 @@ class Cable(threading.Thread):
         end = time.monotonic() + 0.2
         while data and self.master is not None and time.monotonic() < end:
             try:
-                data = data[os.write(self.master, data):]
+                data = data[os.write(self.master, data) :]
             except BlockingIOError:
                 time.sleep(0.001)
 
@@ -139,8 +139,18 @@ class SerialRig(Rig):
         self.cable = Cable(self.path("port"), ours)
 
     def relay_command(self, *extra):
-        return [self.program("iwheel-serial"), "-c", self.path("serial.conf"), "--port", self.path("port"),
-                "--socket", self.path("gateway.sock"), "--watch-socket", self.path("watch.sock"), *extra]
+        return [
+            self.program("iwheel-serial"),
+            "-c",
+            self.path("serial.conf"),
+            "--port",
+            self.path("port"),
+            "--socket",
+            self.path("gateway.sock"),
+            "--watch-socket",
+            self.path("watch.sock"),
+            *extra,
+        ]
 
     def start_relay(self, *extra):
         with open(self.path("serial.conf"), "w", encoding="utf-8") as file:
@@ -154,7 +164,7 @@ class SerialRig(Rig):
     def await_relay(self, text, seconds=4.0):
         """Until this relay, not one before it, has said this; False after that time."""
         end = time.monotonic() + seconds
-        while text not in self.gateway.text()[self.said_before:]:
+        while text not in self.gateway.text()[self.said_before :]:
             if time.monotonic() > end:
                 return False
             time.sleep(0.01)
@@ -171,6 +181,7 @@ class SerialRig(Rig):
 
     def watcher(self):
         from client import Client
+
         client = Client(self.path("watch.sock"), self.timeline, "watcher")
         self.clients.append(client)
         return client

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Which unit tests can run on another machine: those that need nothing but the core, Unity and test/support."""
+
 import re
 from pathlib import Path
 
@@ -13,8 +14,7 @@ def listed_tests():
     text = re.sub(r"foreach\(.*?endforeach\(\)", "", (UNIT / "CMakeLists.txt").read_text(), flags=re.DOTALL)
     for name, value in re.findall(r"set\((\w+) ([^)]*)\)", text):
         text = text.replace("${" + name + "}", value)
-    return {name: [(UNIT / source).resolve() for source in sources.split()]
-            for name, sources in re.findall(r"iwheel_unit_test\((\w+) ([^)$]*)\)", text)}
+    return {name: [(UNIT / source).resolve() for source in sources.split()] for name, sources in re.findall(r"iwheel_unit_test\((\w+) ([^)$]*)\)", text)}
 
 
 def needs_only_core(sources):

@@ -54,7 +54,7 @@ FAULTS = (
     ("a sanitizer's report is a matter of time", "(Address|Leak|", "(Leak|"),
     ("a broken rule in a traceback is a matter of time", "return RULE if re", "return CHECK if re"),
     ("what failed is skipped", "return SKIPPED if attempt.skip else PASSED", "return PASSED"),
-    ("the runner's own exception is inconclusive", "the runner failed: {error!r}\", CRASH", "the runner failed: {error!r}\", CHECK"),
+    ("the runner's own exception is inconclusive", 'the runner failed: {error!r}", CRASH', 'the runner failed: {error!r}", CHECK'),
     ("a sleeper that never writes", "if late_us > LATE_US:", "if False:"),
     ("a sleeper that always writes", "if late_us > LATE_US:", "if True:"),
 )
@@ -63,7 +63,12 @@ FAULTS = (
 # The same for what reads the runners' sums: (what, file, old, new).
 START, COUNT = "test/all/start", "test/all/count_tests.py"
 READER_FAULTS = (
-    ("check believes a second run", START, "status = 77 if missing else run(command, file)", "status = 77 if missing else run(command, file) and run(command, file)"),
+    (
+        "check believes a second run",
+        START,
+        "status = 77 if missing else run(command, file)",
+        "status = 77 if missing else run(command, file) and run(command, file)",
+    ),
     ("check takes 75 for success", COUNT, "return 1 if sums[1] else 75 if unjudged else int(not sums[0])", "return 1 if sums[1] else int(not sums[0])"),
     ("check lets 75 outweigh a failure", COUNT, "return 1 if sums[1] else 75 if unjudged", "return 75 if unjudged else 1 if sums[1]"),
     ("check takes any status for 75", COUNT, "status not in (0, 77) and not (status == 75 and", "status == 1 and not (status == 75 and"),
@@ -72,7 +77,12 @@ READER_FAULTS = (
     ("check takes what was killed for skipped", COUNT, '("none", 77 if status == 77 else 1, 0, 0)', '("none", 77, 0, 0)'),
     ("check shows nothing of what was killed", COUNT, 'if layer == "none":', "if False:"),
     ("CTest's reader takes 75 for a failure", COUNT, "failed = 75 if NOT_JUDGED.search(output) else 1", "failed = 1"),
-    ("CTest's reader takes 75 for success", COUNT, 'return 1 if sums[1] else 75 if any(line.startswith("real time") for line in lines) else ended', "return 1 if sums[1] else 0"),
+    (
+        "CTest's reader takes 75 for success",
+        COUNT,
+        'return 1 if sums[1] else 75 if any(line.startswith("real time") for line in lines) else ended',
+        "return 1 if sums[1] else 0",
+    ),
     ("CTest's reader believes the sum of what died", COUNT, "return passed, failed or int(judged), skipped", "return passed, failed, skipped"),
 )
 
@@ -309,7 +319,7 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check itself, with the step `system`, whose runner is a script of this test, and `unit`, whose tests are a file of CTest's output.
+    """./check itself, with the step `system`, whose pytest is a script of this test, and `unit`, whose tests are a file of CTest's output.
     Both wait for the build, which does nothing here and counts as one."""
 
     FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
@@ -330,16 +340,24 @@ class Check(unittest.TestCase):
             for name, (old, new) in self.faulty.items():
                 assert files[name].count(old) == 1, f"{name}: {old}"
                 files[name] = files[name].replace(old, new)
-            files |= {"bin/cmake": f'#!/bin/sh\n[ "$1" != -S ] || exec {shutil.which("cmake")} "$@"\n',
-                      "bin/ctest": textwrap.dedent(self.CTEST.format(ctest=shutil.which("ctest"), junit=junit)),
-                      "test/system/run": f"#!/bin/bash\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
+            files |= {
+                "bin/cmake": f'#!/bin/sh\n[ "$1" != -S ] || exec {shutil.which("cmake")} "$@"\n',
+                "bin/ctest": textwrap.dedent(self.CTEST.format(ctest=shutil.which("ctest"), junit=junit)),
+                ".venv/bin/python": f"#!/bin/bash\n[ $1 != -c ] || exit 0\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}",
+            }
             for name, text in files.items():
                 path = Path(folder, name)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(text, encoding="utf-8")
                 path.chmod(0o755)
-            done = subprocess.run(["./check", "--no-install", *steps], cwd=folder, capture_output=True, text=True, check=False,
-                                  env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
+            done = subprocess.run(
+                ["./check", "--no-install", *steps],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                check=False,
+                env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"},
+            )
             ran = Path(folder, "ran")
             return done.returncode, done.stdout.splitlines(), ran.stat().st_size // 2 if ran.exists() else 0
 
@@ -437,7 +455,10 @@ def main():
     passed = result.testsRun - failed
     seeded = [(what, seed(old, new)) for what, old, new in FAULTS] + [(what, seed_reader(*fault)) for what, *fault in READER_FAULTS] if not failed else []
     for what, noticed in seeded:
-        print(f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: " + ("its text is not in verdict.py once" if noticed is None else ", ".join(noticed) or "no test notices it"))
+        print(
+            f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: "
+            + ("its text is not in verdict.py once" if noticed is None else ", ".join(noticed) or "no test notices it")
+        )
         passed, failed = passed + bool(noticed), failed + (not noticed)
     print(f"{passed} passed, {failed} failed, 0 skipped")
     return 1 if failed else 0

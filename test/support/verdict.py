@@ -14,9 +14,11 @@ name, with the stall. The module depends on no runner: a runner passes a functio
 """
 
 import contextlib
+import ctypes
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -33,9 +35,12 @@ CHECK_US = 20_000  # a shorter stall changes no decision of the gateway (IW_GATE
 BEFORE_US, AFTER_US = 400_000, 50_000  # a stall this near to a failure may have caused it
 QUIET_US, PATIENCE_S, POLL_S = 1_000_000, 10, 0.1  # before a test runs again
 PROCESSORS_MAX = 4
+PR_SET_PDEATHSIG = 1
 
-DIED = re.compile(r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
-                  r"\bended with -(4|6|7|8|11)\b")
+DIED = re.compile(
+    r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
+    r"\bended with -(4|6|7|8|11)\b"
+)
 GATEWAY_LATE = re.compile(r"gateway\s+itself\s+was\s+held\s+up\s+for\s+(\d+)\s+ms")
 
 
@@ -47,6 +52,14 @@ def hold(condition, text):
     """A safety rule, for tests that fail by exceptions."""
     if not condition:
         raise RuleBroken(text)
+
+
+class Found(AssertionError):
+    """A test raises this, or pytest_verdict.py for it, with failures of which it knows more than their words."""
+
+    def __init__(self, failures):
+        super().__init__("\n".join(f"{failure.kind}: {failure.text}" for failure in failures))
+        self.failures = failures
 
 
 class Failure(NamedTuple):
@@ -72,6 +85,13 @@ class Attempt(NamedTuple):
     data: Any = None  # the runner's own
 
 
+class Evidence:
+    """What a test collects while it runs, for an Attempt. `data`: what else its folder wants to know."""
+
+    def __init__(self):
+        self.failures, self.figures, self.stalls, self.claims, self.data = [], [], [], [], {}
+
+
 def now_us():
     return time.monotonic_ns() // 1000
 
@@ -84,6 +104,11 @@ def kind_of(text):
 def of_text(text, **fields):
     """The attempt of a test that failed with these words."""
     return Attempt([Failure(text, kind_of(text))], claims=[(now_us(), int(ms) * 1000) for ms in GATEWAY_LATE.findall(text)], **fields)
+
+
+def die_with_parent():
+    """Called in a child."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def within(stalls, begin_us, end_us):

@@ -20,10 +20,11 @@ from bus import Bus, now_us
 from client import Client
 from judge import Judge
 from judge_log import PAIR_REAL_US, Config, Event
+from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-PR_SET_PDEATHSIG = 1
 SERVICE_NICE = -10
+WORDS = 800  # of a program's, beside a failure
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
     "wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540},
@@ -80,10 +81,6 @@ def read_only(folder):
             raise OSError(ctypes.get_errno(), "mount")
 
     return mount
-
-
-def die_with_parent():
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def as_a_service():
@@ -197,9 +194,7 @@ def wait_connect(path, process, seconds=5.0):
         except OSError as error:
             sock.close()
             if process.child.poll() is not None:
-                raise RuntimeError(
-                    f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}"
-                ) from error
+                raise RuntimeError(f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}") from error
             if time.monotonic() > deadline:
                 raise
             time.sleep(0.005)
@@ -319,10 +314,7 @@ class Rig:
         if wheels:
             self.wait_status(
                 client,
-                lambda s: s["left"]["at_rest"]
-                and s["right"]["at_rest"]
-                and s["bus"]["state"] == "active"
-                and s["estop"]["state"] in ("released", "none"),
+                lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active" and s["estop"]["state"] in ("released", "none"),
             )
         client.close()
         return answered_ms
@@ -411,6 +403,10 @@ class Rig:
         judge.judge()
         return judge
 
+    def said(self):
+        """What is told beside a failure."""
+        return self.gateway.text()[-WORDS:] if self.gateway else ""
+
     def close(self, keep=False):
         for client in self.clients:
             client.close()
@@ -441,11 +437,17 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "app/bridge/web", "iwheel-mqtt": "app/bridge/mqtt", "iwheel-fleet": "app/bridge/mqtt",
-              "iwheel-serial": "app/bridge/serial", "iwheel-ros2": "app/bridge/ros2"}[name]
+    folder = {
+        "iwheel-gateway": "app/gateway",
+        "iwheelctl": "app/ctl",
+        "iwheel-sim": "app/sim",
+        "iwheel-web": "app/bridge/web",
+        "iwheel-mqtt": "app/bridge/mqtt",
+        "iwheel-fleet": "app/bridge/mqtt",
+        "iwheel-serial": "app/bridge/serial",
+        "iwheel-ros2": "app/bridge/ros2",
+    }[name]
     for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path
     raise FileNotFoundError(f"{name} is not in {build}; build it first: cmake --build {build} --target {name}")
-
-

@@ -103,11 +103,7 @@ class Judge(Reading):
 
     def _within_command(self, setpoint, previous, drives):
         """Between what it was, zero and what was commanded lately; never beyond."""
-        recent = [
-            drive
-            for number, drive in enumerate(drives)
-            if number + 1 == len(drives) or drives[number + 1].done_us >= setpoint.t_us - GAP_US
-        ]
+        recent = [drive for number, drive in enumerate(drives) if number + 1 == len(drives) or drives[number + 1].done_us >= setpoint.t_us - GAP_US]
         wanted = [(drive.left, drive.right)[setpoint.side] for drive in recent]
         hull = [*wanted, 0, previous.speed if previous else 0]
         if not min(hull) - 1 <= setpoint.speed <= max(hull) + 1:
@@ -120,12 +116,7 @@ class Judge(Reading):
 
     def _lease_rule(self, setpoint, name, drives):
         config, last = self.config, drives[-1]
-        limit_us = (
-            last.done_us
-            + (config.lease_ms + config.period_ms) * 1000
-            + self._ramp_us(config.max_speed_mm_s)
-            + JITTER_US
-        )
+        limit_us = last.done_us + (config.lease_ms + config.period_ms) * 1000 + self._ramp_us(config.max_speed_mm_s) + JITTER_US
         if setpoint.t_us > limit_us:
             excess_us = setpoint.t_us - limit_us
             self._say(
@@ -200,9 +191,7 @@ class Judge(Reading):
 
     def _cut_near(self, t_us):
         kinds = ("press", "estop", "cut", "restart_hold")
-        return any(
-            event.kind in kinds and event.t_us <= t_us <= event.t_us + event.within_us + GAP_US for event in self.events
-        ) or self._is_dead(t_us, t_us)
+        return any(event.kind in kinds and event.t_us <= t_us <= event.t_us + event.within_us + GAP_US for event in self.events) or self._is_dead(t_us, t_us)
 
     def _pairs(self):
         """Invariant 5: left and right leave together, left first.
@@ -247,9 +236,7 @@ class Judge(Reading):
             until_us = self._must_send_until(session, side)
             if next_us < self.finished_us or not self._told_silent(session, next_us):
                 until_us = min(until_us, next_us)
-            self._no_gap(
-                [max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us]
-            )
+            self._no_gap([max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us])
             self._silence(session, times, next_us)
 
     def _told_silent(self, session, next_us):
@@ -294,9 +281,7 @@ class Judge(Reading):
             until_us = session.end_us() or self.finished_us
         else:
             until_us = zero_us + (self.config.zero_hold_ms - self.config.period_ms) * 1000 - JITTER_US
-        resets = [
-            event.t_us for event in self.events if event.kind == "reset" and event.ok and event.t_us > session.begin_us
-        ]
+        resets = [event.t_us for event in self.events if event.kind == "reset" and event.ok and event.t_us > session.begin_us]
         return min([until_us] + ([killed_us] if killed_us else []) + resets[:1])
 
     def _rest_since_us(self, from_us):
@@ -324,9 +309,7 @@ class Judge(Reading):
         end_us = session.end_us()
         if end_us is None:
             return
-        zero_us = max(
-            (t for t in (self._first_zero_us(session, side) for side in (0, 1)) if t is not None), default=None
-        )
+        zero_us = max((t for t in (self._first_zero_us(session, side) for side in (0, 1)) if t is not None), default=None)
         if zero_us is None:
             if (
                 end_us + self._ramp_us(self.config.max_speed_mm_s) + GAP_US * 2 < min(next_us, self.finished_us)

@@ -137,11 +137,7 @@ class Reading:
     def _first_out_us(self, alive_us):
         """The bus takes frames again when one comes out: a wheel that has power first starts, then acknowledges."""
         return next(
-            (
-                frame.t_us
-                for frame in self.frames
-                if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US
-            ),
+            (frame.t_us for frame in self.frames if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US),
             alive_us,
         )
 

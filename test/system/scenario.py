@@ -2,17 +2,18 @@
 """What a scenario is given: a rig, checks, figures. Scenarios register themselves with @scenario."""
 
 import time
+import unittest
 
 from harness import Rig
 from judge_log import percentile
-from verdict import CHECK, RULE, TIMING, Failure
+from verdict import CHECK, RULE, TIMING, Evidence, Failure
 
 REGISTRY = {}
 # Refusals of arm that pass by themselves: the wheels roll out, or the last zero is still on its way.
 AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled")
 
 
-class Skip(Exception):
+class Skip(unittest.SkipTest):
     """Cannot be tested here; the text says what is missing."""
 
 
@@ -20,21 +21,26 @@ def scenario(title, seconds=5):
     """`seconds`: roughly how long it takes; the longest start first."""
 
     def register(function):
+        function.scenario = title, seconds
         REGISTRY[function.__name__] = (title, seconds, function)
         return function
 
     return register
 
 
-class Test:
+class Test(Evidence):
     """Collects failures as verdict.Failure. Figures, and stalls that the test itself has seen, go with them."""
 
+    __test__ = False  # pytest does not look for tests in it.
     rig_type = Rig
 
-    def __init__(self, build):
-        self.build = build
-        self.failures, self.figures, self.latencies, self.stalls, self.claims = [], [], [], [], []
-        self.rigs = []
+    def __init__(self, build, rig_type=None):
+        super().__init__()
+        self.build, self.rig_type = build, rig_type or self.rig_type
+        self.latencies, self.rigs = self.data.setdefault("latencies", []), []
+
+    def said(self):
+        return "".join(rig.said() for rig in self.rigs)
 
     def rig(self, *arguments, **options):
         rig = self.rig_type(self.build, *arguments, **options)
@@ -84,9 +90,7 @@ class Test:
     def stopped_by(self, client, cause, state="latched"):
         """`why` names that cause, and the state is as told."""
         why, status = client.request("why"), client.request("status")
-        self.check(
-            why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}"
-        )
+        self.check(why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}")
         self.check(status["state"] == state, f"state {state} expected, it is {status['state']}")
         self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
         return why

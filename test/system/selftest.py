@@ -161,12 +161,8 @@ def faults():
     yield "silence in the hold", between(f, 7_500, 7_700, drop), e, "gap"
     yield "hold 300 ms too short", between(f, 8_050, 8_400, drop), e, "gap"
     yield "no hold after an e-stop", between(f, 3_560, 5_100, drop), e, "gap"
-    yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "silent")], "gap", {
-        "finished_us": 10_700 * MS
-    }
-    yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "exit")], "gap", {
-        "finished_us": 10_700 * MS
-    }
+    yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "silent")], "gap", {"finished_us": 10_700 * MS}
+    yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), [*e, Event(10600 * MS, "exit")], "gap", {"finished_us": 10_700 * MS}
     yield "hold that never ends", add(f, *stream), e, "no_silence"
     yield "left without right", between(f, 2_000, 2_020, only(1, drop)), e, "pair"
     yield "right without left", between(f, 2_000, 2_020, only(0, drop)), e, "pair"
@@ -189,13 +185,14 @@ def faults():
     yield "backwards when forwards was commanded", between(f, 1_760, 1_780, with_data(1, -5)), e, "beyond_command"
     yield "a hard stop although the client only left", between(f, 9_622, 9_900, with_data(1, 0)), e, "hard_stop"
     yield "e-stop answered after 9 ms", between(f, 3_521, 5_100, late(9)), e, "estop_latency"
-    yield "e-stop answered by a ramp", add(
-        between(f, 3_515, 3_570, drop), *pair(3_521, 270, 270), *pair(3_541, 240, 240), *pair(3_561, 210, 210)
-    ), e, "nonzero_after_estop"
+    yield (
+        "e-stop answered by a ramp",
+        add(between(f, 3_515, 3_570, drop), *pair(3_521, 270, 270), *pair(3_541, 240, 240), *pair(3_561, 210, 210)),
+        e,
+        "nonzero_after_estop",
+    )
     yield "e-stop ignored until the end", between(f, 3_515, 5_100, with_data(1, 300)), e, "nonzero_after_estop"
-    yield "an old pair after the e-stop's zeros", add(
-        f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)
-    ), e, "nonzero_after_estop"
+    yield "an old pair after the e-stop's zeros", add(f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)), e, "nonzero_after_estop"
     yield "no zero at all after the e-stop", between(f, 3_520, 99_999, drop), e, "estop_no_zero"
     yield "motion after release and reset", add(f, *pair(5_450, 100, 100)), e, "sent_after_reset"
     yield "zeros after reset", add(f, *pair(5_550, 0, 0)), e, "sent_after_reset"
@@ -217,24 +214,26 @@ def faults():
         Event(12_000 * MS, "alive", 12_000 * MS),
     ]
     dark = between(f, 9_500, 99_999, drop)
-    yield "two old frames after the bus lives again", add(
-        dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)
-    ), e + off, "old_frame"
+    yield "two old frames after the bus lives again", add(dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)), e + off, "old_frame"
     yield "an old frame without its zero", add(dark, *pair(12_001, -200, 200)), e + off, "old_frame"
-    yield "an old frame, its zero 20 ms later", add(
-        dark, *pair(12_001, -200, 200), *pair(12_021, 0, 0)
-    ), e + off, "old_frame"
-    yield "old frames again and again", add(
-        dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)
-    ), e + off, "nonzero_after_cut"
+    yield "an old frame, its zero 20 ms later", add(dark, *pair(12_001, -200, 200), *pair(12_021, 0, 0)), e + off, "old_frame"
+    yield "old frames again and again", add(dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)), e + off, "nonzero_after_cut"
     yield "motion after a restart", add(f, *pair(12_120, 50, 50)), [*e, Event(12100 * MS, "restart_hold")], "motion_without_drive"
     yield "no zeros after a crash while armed", f, [*e, Event(12100 * MS, "restart_hold")], "never_sent"
-    yield "nonzero current in a zero", between(
-        good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)
-    ), e, "nonzero_after_ramp", {"config": CONFIG._replace(role="setpoint")}
-    yield "dirty padding", between(
-        good(CONFIG._replace(dlc=8)), 2_000, 2_020, lambda x: x._replace(data=x.data[:7] + b"\1")
-    ), e, "padding", {"config": CONFIG._replace(dlc=8)}
+    yield (
+        "nonzero current in a zero",
+        between(good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)),
+        e,
+        "nonzero_after_ramp",
+        {"config": CONFIG._replace(role="setpoint")},
+    )
+    yield (
+        "dirty padding",
+        between(good(CONFIG._replace(dlc=8)), 2_000, 2_020, lambda x: x._replace(data=x.data[:7] + b"\1")),
+        e,
+        "padding",
+        {"config": CONFIG._replace(dlc=8)},
+    )
     yield "not inverted", good(), e, "beyond_command", {"config": CONFIG._replace(invert=(True, False))}
 
 
@@ -254,9 +253,12 @@ def goods():
         Event(9_500 * MS, "cut", within_us=50 * MS),
         Event(12_000 * MS, "alive", 12_000 * MS),
     ]
-    yield "one old frame per wheel and its zero", add(
-        between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)
-    ), [x for x in e if x.t_us < 9_500 * MS] + off, {}
+    yield (
+        "one old frame per wheel and its zero",
+        add(between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)),
+        [x for x in e if x.t_us < 9_500 * MS] + off,
+        {},
+    )
     muted = [x for x in f if x.id != 256 or not 6_900 * MS <= x.t_us < 8_300 * MS]
     more = [frame for ms in range(8_370, 8_800, 20) for frame in pair(ms, 0, 0)]
     yield "a hold that waits for a wheel that was not heard in it", add(muted, *more), e, {}
@@ -280,9 +282,7 @@ def run():
         options = dict(options[0]) if options else {}
         found = {v.rule for v in verdict(frames, events, options.pop("config", CONFIG), **options)}
         if rule not in found:
-            failures.append(
-                f"planted fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})"
-            )
+            failures.append(f"planted fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})")
     return count, failures
 
 

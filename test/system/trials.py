@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Runs the trials of a bridge: functions test_..., each with a rig of its own, in real time. The last line sums up: "N passed, N failed, N skipped"."""
+"""What tests of a bridge share: waiting, a client that drives, what the bus shows of both."""
 
-import argparse
-import os
-import sys
 import threading
 import time
-import traceback
+import unittest
 from pathlib import Path
 
 from bus import now_us
@@ -14,26 +11,8 @@ from client import Closed
 from judge_log import LEFT, RIGHT
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path.append(str(ROOT / "test/support"))
-import verdict
 
-
-class Skip(Exception):
-    """This cannot be tested here."""
-
-
-def needs(**rig):
-    """Marks a test with what its rig is made with."""
-    def mark(function):
-        function.rig = rig
-        return function
-    return mark
-
-
-def full(function):
-    """Marks a test that only --full runs."""
-    function.full = True
-    return function
+Skip = unittest.SkipTest  # This cannot be tested here.
 
 
 def until(condition, seconds=10.0, what="it"):
@@ -89,6 +68,7 @@ def longest_gap_ms(rig, since_us):
 
 def braking_ms(rig, since_us, seconds=2):
     """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
+
     def found():
         last = {}
         for t_us, wheel, speed in rig.bus.setpoints():
@@ -98,43 +78,3 @@ def braking_ms(rig, since_us, seconds=2):
         return None
 
     return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000
-
-
-def attempt(function, make_rig):
-    """One attempt, as test/support/verdict.py judges it."""
-    rig = None
-    try:
-        rig = make_rig(**getattr(function, "rig", {}))
-        function(rig)
-        return verdict.Attempt()
-    except Skip as reason:
-        return verdict.Attempt(skip=str(reason))
-    except Exception as error:  # noqa: BLE001
-        logs = [rig.words()[-800:], rig.gateway.text()[-800:] if rig.gateway else ""] if rig else []
-        return verdict.of_text("\n".join([f"{type(error).__name__}: {error}", traceback.format_exc(limit=-4), *logs]))
-    finally:
-        if rig:
-            rig.close()
-
-
-def parser(usage):
-    """The arguments that all have; a runner may add its own."""
-    one = argparse.ArgumentParser(usage=usage)
-    one.add_argument("--build", default=ROOT / "build/default")
-    one.add_argument("--only", action="append")
-    one.add_argument("--list", action="store_true")
-    one.add_argument("--jobs", type=int, default=2)
-    return one
-
-
-def main(options, modules, rig):
-    """`rig(build, **what needs() says)` has words(), the log to show with a failure, and close()."""
-    tests = [one for module in modules for one in vars(module).items() if one[0].startswith("test_")]
-    if options.list:
-        print(*(name for name, _ in tests), sep="\n")
-        return 0
-    chosen = [one for one in tests if (not options.only or any(only in one[0] for only in options.only)) and
-              (not getattr(one[1], "full", False) or os.environ.get("IWHEEL_FULL") == "1")]
-    functions = dict(chosen)
-    assert len(functions) == len(chosen), "two tests have one name"
-    return verdict.run_all(list(functions), lambda name: attempt(functions[name], lambda **what: rig(options.build, **what)), options.jobs).end()

@@ -3,6 +3,7 @@
 process of its own, a copy of the one that ran it, emulated CPU and all. Nothing of that differs from a run from power-on, whose every
 cycle is the same each time.
 """
+
 import functools
 import os
 import pickle
@@ -21,6 +22,7 @@ class Nothing:
 
 def shared(function):
     """Marks a function of the rig with which a scenario may begin. In a copy it returns what it returned before the copy was made."""
+
     @functools.wraps(function)
     def begin(rig, *arguments):
         if isinstance(rig, Nothing):
@@ -30,6 +32,7 @@ def shared(function):
         (was, result), rig.begun = rig.begun, None
         assert was == (begin, arguments), "the scenario does not begin as it was found to"
         return result
+
     return begin
 
 

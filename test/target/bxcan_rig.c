@@ -138,6 +138,10 @@ bool rig_send_next(int device, model_frame_t *out_frame) {
     return true;
 }
 
+uint32_t rig_read_esr(int device) {
+    return brd_register_read(&rig[device].driver.config.registers->ESR);
+}
+
 bool rig_hear(int device, uint32_t id, uint8_t dlc) {
     const model_frame_t frame = {.id = id, .dlc = dlc, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
     const bool acknowledged = bxcan_model_hear(&rig[device].model, &frame);

@@ -11,6 +11,11 @@
 
 #define RIG_DEVICES 2
 
+/// Of ESR.
+#define RIG_ESR_LEC(value) (((value) >> 4) & 0x7U)   ///< Last error code.
+#define RIG_ESR_TEC(value) (((value) >> 16) & 0xFFU) ///< Transmit error counter, lower 8 bits.
+#define RIG_ESR_REC(value) (((value) >> 24) & 0xFFU) ///< Receive error counter.
+
 typedef struct {
     bxcan_model_t model;
     brd_bxcan_registers_t window; ///< Only its address means something.
@@ -41,6 +46,9 @@ bool rig_hear(int device, uint32_t id, uint8_t dlc);
 
 /// A setpoint-like frame: `mark` is its first byte.
 iw_can_frame_t rig_frame(uint32_t id, uint8_t mark);
+
+/// Reads the error counters and the last error code.
+uint32_t rig_read_esr(int device);
 
 /// Fails the test if a model saw something that the manual forbids.
 void rig_assert_no_violation(void);

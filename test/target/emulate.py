@@ -7,6 +7,7 @@ usage: emulate.py MODEL_LIBRARY BUILDS [BOARD[.SCENARIO]]...
 BUILDS holds BOARD-IMAGE.elf for the boards and images that scenarios.py names; test/target/run makes them. Without names, what is long and the same on both families runs on the first board only, unless IWHEEL_FULL is 1.
 Needs the Python package unicorn. The last line is "N passed, N failed, N skipped".
 """
+
 import gc
 import os
 import re
@@ -33,7 +34,7 @@ class Rig:
     """An image running on a board, and what a scenario may ask of it."""
 
     def __init__(self, board_name, elf, oscillator=None):
-        with tempfile.TemporaryDirectory() as folder: # Not /dev/stdout: objcopy run by root can put a file in its place.
+        with tempfile.TemporaryDirectory() as folder:  # Not /dev/stdout: objcopy run by root can put a file in its place.
             subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), f"{folder}/image"], check=True)
             image = Path(folder, "image").read_bytes()
         kind = re.sub(r"^.*-", "", Path(elf).stem)
@@ -44,7 +45,7 @@ class Rig:
         self.addresses, self.stack_area, self.elf = symbols.addresses(elf), symbols.stack_area(elf), elf
         self.stack_limit = self.stack_area[1] - self.stack_area[0] - scenarios.STACK_SPARE
         self.notes, self.expected_resets = [], []
-        self.begun = None # See beginnings.py.
+        self.begun = None  # See beginnings.py.
 
     def run(self, span_ns):
         self.machine.run(span_ns)
@@ -113,6 +114,7 @@ def judge(rig, scenario):
     def play():
         scenario(rig)
         rig.judge()
+
     return attempt(play), rig.notes, time.time() - started
 
 
@@ -120,7 +122,7 @@ def play(group):
     """[(name, error or None, notes, seconds)] of scenarios that begin alike."""
     library, folder, board, image, oscillator, several = group
     Machine.library = Controller.library = load_model(library)
-    gc.disable() # It takes a twentieth of the time, and has little to find before the end.
+    gc.disable()  # It takes a twentieth of the time, and has little to find before the end.
     rig = Rig(board, Path(folder) / f"{board}-{image}.elf", oscillator)
     failed = attempt(beginnings.run, rig, beginnings.of(several[0]))
     verdicts = []
@@ -138,8 +140,11 @@ def groups(chosen, full):
     for board in BOARDS:
         for image, several in scenarios.BY_BOARD[board].items():
             for scenario in several:
-                if board in chosen or f"{board}.{scenario.__name__}" in chosen or (not chosen and (
-                        full or board != "stm32f407" or scenario not in scenarios.LONG)):
+                if (
+                    board in chosen
+                    or f"{board}.{scenario.__name__}" in chosen
+                    or (not chosen and (full or board != "stm32f407" or scenario not in scenarios.LONG))
+                ):
                     found.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
     return sorted(((*alike[:3], several) for alike, several in found.items()), key=lambda group: -len(group[3]))
 

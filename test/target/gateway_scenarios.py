@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
+
 import itertools
 import random
 
@@ -11,7 +12,7 @@ from host import Host, framed
 SECOND = 1000 * MS
 ZERO = (0, 2000)
 LEASE_NS, PERIOD_NS = 200 * MS, 20 * MS
-RAMP_NS = 110 * MS # From 100 mm/s at 1500 mm/s2, and a period.
+RAMP_NS = 110 * MS  # From 100 mm/s at 1500 mm/s2, and a period.
 SPEED = 100
 EDGE_TO_ZERO_NS = 5 * MS
 
@@ -155,7 +156,7 @@ def relay_killed_and_anew(rig):
     assert_stops(rig, begun_ns, PERIOD_NS + RAMP_NS)
     host.arm()
     armed_ns = rig.machine.now_ns
-    host.raw(old.replace(b'"id":7', b'"id":8')) # Its CRC is wrong now; and as it was:
+    host.raw(old.replace(b'"id":7', b'"id":8'))  # Its CRC is wrong now; and as it was:
     host.raw(old)
     assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"
     assert not moving(rig, armed_ns)
@@ -178,7 +179,7 @@ def stale_in_every_way(rig):
     host = start_driving(rig)
     last_ns, old_us, used = rig.machine.now_ns, host.t_us - 250_000, host.seq[1]
     for turn in range(12):
-        if turn % 4 == 3: # The lease has run out meanwhile: armed again, without a command.
+        if turn % 4 == 3:  # The lease has run out meanwhile: armed again, without a command.
             rig.run(2 * SECOND)
             assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
             host.arm()
@@ -240,13 +241,26 @@ def estop_random(rig):
     rig.note(f"edge to zero on the bus at most {worst_ns / MS:.2f} ms")
 
 
-FLOODS = {"config, all keys": {"cmd": "config"}, "config, one key": {"cmd": "config", "key": "drive.max_speed_mm_s"},
-          "config, staged": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 400}, "config, refused": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000},
-          "config, no such key": {"cmd": "config", "key": "drive.lease", "value": 1}, "config, discarded": {"cmd": "config", "commit": False},
-          "config, committed in motion": {"cmd": "config", "commit": True}, "hello": {"cmd": "hello", "name": "a name as long as names may be"}, "status": {"cmd": "status"},
-          "watch": {"cmd": "watch", "topics": ["state", "stop", "estop", "force", "bus", "lease"], "rate_hz": 100}, "why": {"cmd": "why"}, "arm": {"cmd": "arm", "name": "again"},
-          "tare": {"cmd": "tare"}, "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"}, "reset": {"cmd": "reset"}, "unknown": {"cmd": "nonsense"},
-          "text that is no object": b'[1,2,{"cmd":"drive","left_mm_s":100}]', "bytes that are no text": bytes(range(128, 192))}
+FLOODS = {
+    "config, all keys": {"cmd": "config"},
+    "config, one key": {"cmd": "config", "key": "drive.max_speed_mm_s"},
+    "config, staged": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 400},
+    "config, refused": {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000},
+    "config, no such key": {"cmd": "config", "key": "drive.lease", "value": 1},
+    "config, discarded": {"cmd": "config", "commit": False},
+    "config, committed in motion": {"cmd": "config", "commit": True},
+    "hello": {"cmd": "hello", "name": "a name as long as names may be"},
+    "status": {"cmd": "status"},
+    "watch": {"cmd": "watch", "topics": ["state", "stop", "estop", "force", "bus", "lease"], "rate_hz": 100},
+    "why": {"cmd": "why"},
+    "arm": {"cmd": "arm", "name": "again"},
+    "tare": {"cmd": "tare"},
+    "confirm": {"cmd": "confirm", "item": "wheel_radius", "value": "192"},
+    "reset": {"cmd": "reset"},
+    "unknown": {"cmd": "nonsense"},
+    "text that is no object": b'[1,2,{"cmd":"drive","left_mm_s":100}]',
+    "bytes that are no text": bytes(range(128, 192)),
+}
 
 
 def estop_in_floods(rig):
@@ -256,7 +270,7 @@ def estop_in_floods(rig):
     for name, message in FLOODS.items():
         for _ in range(3):
             host.keep_driving(SPEED, 300)
-            for turn in range(40): # At least 10 ms of the line, and more than the receive buffer.
+            for turn in range(40):  # At least 10 ms of the line, and more than the receive buffer.
                 host.say(2 if turn % 2 else 1, message)
             rig.run(2 * MS + chance.randrange(3000) * US)
             assert rig.setpoints()[-1].setpoint()[0] == SPEED, "the wheels are not driven"
@@ -301,7 +315,7 @@ def reset_in_motion(rig):
         reset()
         reset_ns = rig.machine.now_ns
         old = host.boot
-        for _ in range(20): # The relay goes on as if nothing had happened.
+        for _ in range(20):  # The relay goes on as if nothing had happened.
             host.drive(SPEED, wait=False, boot=old)
             rig.run(20 * MS)
         if len(boots) == 1:
@@ -311,7 +325,7 @@ def reset_in_motion(rig):
             hung = [when for when, cause in rig.machine.resets if cause == "watchdog"]
             assert hung and not moving(rig, hung[-1]), "the wheels were not told to stand"
         rig.run(1800 * MS)
-        host.rest = b"" # The reset cut a line.
+        host.rest = b""  # The reset cut a line.
         host.uart.sent.clear()
         host.say(0, {"cmd": "link"})
         host.wait(lambda line: line.channel == 0 and line.message.get("event") == "link")
@@ -335,8 +349,14 @@ def config_in_flash(rig):
     host = start(rig)
     first = host.ask(1, {"cmd": "config"})
     assert keys_of(first)["drive.lease_ms"] == "200" and keys_of(first)["wheels.setpoint_type"] == "1" and not first["staged"], first
-    for key, value, words in (("bus.interface", "can0", "no key of a board"), ("drive.lease", "200", "no key"), ("drive.lease_ms", "5000", "20 to 500"),
-                              ("wheels.gear_ratio", "1/x", "N or N/M"), ("left.invert", "maybe", "no or yes"), ("drive.lease_ms", "2e2", "20 to 500")):
+    for key, value, words in (
+        ("bus.interface", "can0", "no key of a board"),
+        ("drive.lease", "200", "no key"),
+        ("drive.lease_ms", "5000", "20 to 500"),
+        ("wheels.gear_ratio", "1/x", "N or N/M"),
+        ("left.invert", "maybe", "no or yes"),
+        ("drive.lease_ms", "2e2", "20 to 500"),
+    ):
         refused = host.ask(1, {"cmd": "config", "key": key, "value": value})
         assert refused["error"] == "bad_value" and words in refused["message"], refused
     host.ask(1, {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000})
@@ -344,7 +364,13 @@ def config_in_flash(rig):
     assert keys_of(host.ask(1, {"cmd": "config", "commit": False})) == keys_of(first)
     host.arm()
     host.keep_driving(SPEED, 200)
-    for key, value in (("drive.lease_ms", 300), ("wheels.gear_ratio", "31/2"), ("wheels.track_mm", 600), ("right.invert", "yes"), ("wheels.current_role", "limit")):
+    for key, value in (
+        ("drive.lease_ms", 300),
+        ("wheels.gear_ratio", "31/2"),
+        ("wheels.track_mm", 600),
+        ("right.invert", "yes"),
+        ("wheels.current_role", "limit"),
+    ):
         assert host.ask(1, {"cmd": "config", "key": key, "value": value})["staged"]
     assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written while the wheels turn"
     host.ask(1, {"cmd": "stop"})
@@ -377,8 +403,8 @@ def power_cut_while_writing(rig):
         rig.machine.flash.cut_after = cut
         host.say(1, {"cmd": "config", "commit": True})
         rig.run(100 * MS)
-        if rig.machine.flash.cut_after is not None: # The commit was through before.
-            rig.machine.flash.cut_after, rig.machine.flash.next_cut = None, cut // 2 # And now the counting of the next power-on.
+        if rig.machine.flash.cut_after is not None:  # The commit was through before.
+            rig.machine.flash.cut_after, rig.machine.flash.next_cut = None, cut // 2  # And now the counting of the next power-on.
             rig.machine.lose_power()
         host.begin_again()
         now = int(keys_of(host.ask(1, {"cmd": "config"}))["drive.lease_ms"])
@@ -408,7 +434,7 @@ def learnt_in_flash(rig):
     assert flash.operations == before, "written before two seconds of silence have passed"
     rig.run(300 * MS)
     assert flash.operations > before, "not written"
-    rig.run(2 * SECOND) # A tare wants two quiet seconds.
+    rig.run(2 * SECOND)  # A tare wants two quiet seconds.
     tared = host.ask(1, {"cmd": "tare", "side": "left"})["left"]["offset_mN"]
     rig.run(20 * MS)
     told = host.events("offset")
@@ -483,7 +509,7 @@ def damaged(chance, line):
     if way == 0:
         data[at] ^= 1 << chance.randrange(8)
     elif way == 1:
-        del data[at:at + chance.randrange(1, 20)]
+        del data[at : at + chance.randrange(1, 20)]
     elif way == 2:
         data[at:at] = bytes(chance.randrange(256) for _ in range(chance.randrange(1, 12)))
     elif way == 3:
@@ -525,7 +551,7 @@ def hostile_line(rig):
     assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "an old line was obeyed"
     host.drive(50)
     fresh = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 60, "right_mm_s": 60})) + b"\n"
-    for _ in range(50): # Doubled: obeyed once, fed once.
+    for _ in range(50):  # Doubled: obeyed once, fed once.
         host.raw(fresh)
         count += 1
         rig.run(10 * MS)
@@ -593,6 +619,27 @@ def crowd(rig):
     rig.note(f"worst gap between setpoints {gap_ns / MS:.1f} ms")
 
 
-SCENARIOS = (talks, both_words_and_turns, lease_alone, close_ends, silent_relay, relay_killed_and_anew, relay_stopped_goes_on, stale_in_every_way,
-             nobody_feeds_another, estop_random, estop_in_floods, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, learnt_in_flash, power_cut_while_learning, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
+SCENARIOS = (
+    talks,
+    both_words_and_turns,
+    lease_alone,
+    close_ends,
+    silent_relay,
+    relay_killed_and_anew,
+    relay_stopped_goes_on,
+    stale_in_every_way,
+    nobody_feeds_another,
+    estop_random,
+    estop_in_floods,
+    software_estop,
+    reset_in_motion,
+    config_in_flash,
+    power_cut_while_writing,
+    learnt_in_flash,
+    power_cut_while_learning,
+    bus_off_driven,
+    hostile_line,
+    noise_on_the_wire,
+    crowd,
+)
 LONG = (both_words_and_turns, estop_random, estop_in_floods, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)

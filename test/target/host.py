@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The host's end of the serial line, for the scenarios of the image `gateway`: a relay that says what it is told to, right or wrong."""
+
 import json
 import zlib
 
@@ -45,6 +46,7 @@ class Host:
             if self.alive_ns is not None:
                 self.say(0, {"cmd": "alive"})
                 self.machine.at(self.machine.now_ns + 100 * MS, tick)
+
         tick()
 
     def fall_silent(self):

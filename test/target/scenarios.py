@@ -3,6 +3,7 @@
 
 Verdicts are passed on the bus, the lamp and the count of resets: on what can be seen from outside.
 """
+
 import itertools
 import re
 
@@ -13,7 +14,7 @@ from emulator.can import LEFT, RIGHT, Frame
 from emulator.chip import MS, PINRSTF, US
 
 SECOND = 1000 * MS
-ZERO = (0, 2000) # Role "limit": zero speed with the configured maximum current.
+ZERO = (0, 2000)  # Role "limit": zero speed with the configured maximum current.
 EDGE_TO_ZERO_NS = 5 * MS
 LISTENING, NO_BUS, NO_CRYSTAL = "1 flashes, 6.25 % lit", "2 flashes, 12.5 % lit", "3 flashes, 18.75 % lit"
 ARMED, ESTOP, LATCHED = "steady", "1 flashes, 50 % lit", "2 flashes, 50 % lit"
@@ -67,7 +68,7 @@ def assert_held_then_silent(rig, since_ns, hold_ns=1475 * MS):
 
 
 def open_estop(rig):
-    rig.machine.board.drive("estop", None) # Nothing but the pull-up drives the pin then, as with a cut wire.
+    rig.machine.board.drive("estop", None)  # Nothing but the pull-up drives the pin then, as with a cut wire.
 
 
 def close_estop(rig):
@@ -156,7 +157,7 @@ def fast_watchdog(rig):
 
 def passes_wrap(rig, wrap_ms):
     """Time is set to 600 ms before, at the start; then the other way round nothing may be seen of it."""
-    while not 1 <= rig.peek("ticks_ms") < 4: # Before, RAM has not been cleared yet.
+    while not 1 <= rig.peek("ticks_ms") < 4:  # Before, RAM has not been cleared yet.
         rig.run(50 * US)
     rig.poke("ticks_ms", wrap_ms - 600)
     rig.poke("ticks_slept", wrap_ms - 600)
@@ -306,15 +307,18 @@ def console(rig):
     """The first line tells version, clock, pins, bit timing, e-stop; a line each change; and both again when somebody types."""
     rig.run(1500 * MS)
     machine, lines = rig.machine, rig.console()
-    told = re.fullmatch(r"iwheel \d+\.\d+\.\d+ on (\w+) \([\w ]+\): clock (\d+) MHz from a crystal of (\d+) kHz; CAN on PB8 PB9 at (\d+) bit/s, "
-                        r"sampled at 62\.5 %, BTR 0x([0-9A-F]{8}); e-stop on PB0: released; holds both wheels at zero", lines[0])
+    told = re.fullmatch(
+        r"iwheel \d+\.\d+\.\d+ on (\w+) \([\w ]+\): clock (\d+) MHz from a crystal of (\d+) kHz; CAN on PB8 PB9 at (\d+) bit/s, "
+        r"sampled at 62\.5 %, BTR 0x([0-9A-F]{8}); e-stop on PB0: released; holds both wheels at zero",
+        lines[0],
+    )
     assert told, lines[0]
     facts = (machine.board.name.upper(), machine.clocks.core_hz // 10**6, machine.clocks.crystal_hz // 1000, 10**6, machine.can.read(0x1C))
     assert (told[1], *map(int, told.groups()[1:4]), int(told[5], 16)) == facts, (told.groups(), facts)
     assert lines[-2:] == ["armed; bus active; e-stop released", ""], lines
     machine.uart.send(b"?")
     rig.run(500 * MS)
-    assert rig.console()[len(lines) - 1:] == [lines[0], lines[-2], ""], rig.console()
+    assert rig.console()[len(lines) - 1 :] == [lines[0], lines[-2], ""], rig.console()
     open_estop(rig)
     rig.run(300 * MS)
     assert rig.console()[-2].startswith("latched by estop_line; bus active; e-stop pressed; to reset: "), rig.console()
@@ -510,7 +514,7 @@ def full_bus(rig):
     arm(rig)
     bus, start_ns, flooded = rig.machine.bus, rig.machine.now_ns, rig.machine.bus.flooded
     before = rig.counter("bad_format")
-    bus.flood = Frame(545, b"", sender="flood", remote_dlc=3) # 47 bits with the space: none is shorter.
+    bus.flood = Frame(545, b"", sender="flood", remote_dlc=3)  # 47 bits with the space: none is shorter.
     rig.run(500 * MS)
     bus.flood = None
     rig.run(50 * MS)
@@ -769,15 +773,15 @@ def demo_estop(rig):
         pressed_ns = rig.machine.now_ns
         open_estop(rig)
         rig.run(300 * MS)
-        press_button(rig) # A reset while pressed is refused.
+        press_button(rig)  # A reset while pressed is refused.
         close_estop(rig)
         rig.run(300 * MS)
         after = rig.setpoints(pressed_ns)
         zero = next(frame for frame in after if frame.setpoint() == ZERO)
         worst_ns = max(worst_ns, zero.time_ns - pressed_ns)
-        assert_zero(after[after.index(zero):])
+        assert_zero(after[after.index(zero) :])
         assert after.index(zero) <= 2, "more than one pair after the edge"
-        press_button(rig) # The reset.
+        press_button(rig)  # The reset.
         rig.run(SECOND)
         assert_zero(rig.setpoints(zero.time_ns))
     assert worst_ns <= EDGE_TO_ZERO_NS, f"first zero {worst_ns / MS:.3f} ms after the edge"
@@ -787,25 +791,91 @@ def demo_estop(rig):
 # image -> scenarios; the watchdog's oscillator is nominal, slowest (0) or fastest (1) where given.
 SCENARIOS = {
     "listen": (listening, reset_while_listening),
-    "zero": (nominal, console, time_never_goes_back, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, fast_watchdog,
-             estop, estop_pulse, estop_wakes, estop_chatters, estop_at_start, reset_by_button, wheel_missing, wheel_lost,
-             no_acknowledgement, stuck_at_start, open_at_start, full_bus, overrun, second_master, no_crystal, slow_crystal,
-             stuck_while_listening),
+    "zero": (
+        nominal,
+        console,
+        time_never_goes_back,
+        time_passes_32_bits_of_microseconds,
+        time_passes_32_bits_of_milliseconds,
+        fast_watchdog,
+        estop,
+        estop_pulse,
+        estop_wakes,
+        estop_chatters,
+        estop_at_start,
+        reset_by_button,
+        wheel_missing,
+        wheel_lost,
+        no_acknowledgement,
+        stuck_at_start,
+        open_at_start,
+        full_bus,
+        overrun,
+        second_master,
+        no_crystal,
+        slow_crystal,
+        stuck_while_listening,
+    ),
     "setpoint": (setpoint_role,),
-    "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_button_held_through_reset, demo_estop, acknowledgement_lost,
-             silence_is_silent, abort_without_end, cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck, reset_again,
-             reset_after_the_hold, reset_after_unproven_hold, stack_overflow),
+    "demo": (
+        demo_profile,
+        demo_second_press_stops,
+        demo_button_held,
+        demo_button_held_through_reset,
+        demo_estop,
+        acknowledgement_lost,
+        silence_is_silent,
+        abort_without_end,
+        cable_torn,
+        receiver_open,
+        bus_off,
+        stuck_in_motion,
+        babbling,
+        crystal_dies,
+        hang,
+        loop_stuck,
+        reset_again,
+        reset_after_the_hold,
+        reset_after_unproven_hold,
+        stack_overflow,
+    ),
     "gateway": gateway_scenarios.SCENARIOS,
 }
 # The STM32F446 has the files of the STM32F407: what may differ is its clock.
-BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (usb_pins,), "crystal12": (other_crystal,),
-                          "gateway_slow": (gateway_scenarios.another_rate,), "gateway_fast": (gateway_scenarios.another_rate,)},
-            "stm32f407": {**SCENARIOS, "crystal": (other_crystal,)},
-            "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,), "gateway": (gateway_scenarios.talks,)}}
+BY_BOARD = {
+    "stm32f103": {
+        **SCENARIOS,
+        "usb": (usb_pins,),
+        "crystal12": (other_crystal,),
+        "gateway_slow": (gateway_scenarios.another_rate,),
+        "gateway_fast": (gateway_scenarios.another_rate,),
+    },
+    "stm32f407": {**SCENARIOS, "crystal": (other_crystal,)},
+    "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,), "gateway": (gateway_scenarios.talks,)},
+}
 # Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
-LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_button_held, second_master, babbling, overrun, cable_torn,
-        stuck_while_listening, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, reset_by_button, reset_again,
-        reset_while_listening, silence_is_silent, abort_without_end, reset_after_the_hold, reset_after_unproven_hold, *gateway_scenarios.LONG)
+LONG = (
+    wheel_lost,
+    estop_chatters,
+    demo_profile,
+    demo_second_press_stops,
+    demo_button_held,
+    second_master,
+    babbling,
+    overrun,
+    cable_torn,
+    stuck_while_listening,
+    time_passes_32_bits_of_microseconds,
+    time_passes_32_bits_of_milliseconds,
+    reset_by_button,
+    reset_again,
+    reset_while_listening,
+    silence_is_silent,
+    abort_without_end,
+    reset_after_the_hold,
+    reset_after_unproven_hold,
+    *gateway_scenarios.LONG,
+)
 # image -> of its serial port, where it is not 115200.
 BAUD = {"gateway": host.BAUD, "gateway_slow": 115_200, "gateway_fast": 2_000_000}
 # Of the stack that sections.ld keeps so much stays unused in every scenario.

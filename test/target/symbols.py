@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Where a field of a structure is in the image's RAM, asked of the compiler and of the linker."""
+
 import functools
 import re
 import subprocess
@@ -51,8 +52,9 @@ def stack_area(elf):
 def variable(elf, name):
     """(address, size) of a variable."""
     run = subprocess.run(["arm-none-eabi-nm", "-S", str(elf)], capture_output=True, text=True, check=True)
-    return next((int(address, 16), int(size, 16)) for address, size, kind, *found in map(str.split, run.stdout.splitlines())
-                if kind in "bBdD" and found == [name])
+    return next(
+        (int(address, 16), int(size, 16)) for address, size, kind, *found in map(str.split, run.stdout.splitlines()) if kind in "bBdD" and found == [name]
+    )
 
 
 def function(elf, name):

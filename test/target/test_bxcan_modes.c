@@ -235,8 +235,8 @@ static void test_error_passive_is_told_apart(void) {
         bxcan_model_end(model, mailbox, MODEL_NO_ACKNOWLEDGEMENT);
     }
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
-    TEST_ASSERT_EQUAL(128, brd_bxcan_errors(driver).transmit_errors);
-    TEST_ASSERT_EQUAL(3, brd_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(128, RIG_ESR_TEC(rig_read_esr(0)));
+    TEST_ASSERT_EQUAL(3, RIG_ESR_LEC(rig_read_esr(0)));
 }
 
 static void test_receive_errors_are_told(void) {
@@ -244,8 +244,8 @@ static void test_receive_errors_are_told(void) {
     for (int i = 0; i < 130; i++) {
         bxcan_model_hear_error(model);
     }
-    TEST_ASSERT_EQUAL(130, brd_bxcan_errors(driver).receive_errors);
-    TEST_ASSERT_EQUAL(1, brd_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(130, RIG_ESR_REC(rig_read_esr(0)));
+    TEST_ASSERT_EQUAL(1, RIG_ESR_LEC(rig_read_esr(0)));
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
 }
 
@@ -334,7 +334,7 @@ static void test_bus_held_dominant_while_listening_is_passive_only(void) {
     rig_start(0);
     bxcan_model_hold(model, 1000000, false);
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
-    TEST_ASSERT_GREATER_THAN(127, brd_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_GREATER_THAN(127, RIG_ESR_REC(rig_read_esr(0)));
 }
 
 int main(void) {

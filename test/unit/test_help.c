@@ -47,15 +47,45 @@ static void test_help_names_the_configuration_that_is_read(void) {
 #endif
 }
 
+/// The comment of each key is compiled in from the file in share/, by its section and name.
+static void expect_comments(const settings_form_t *form) {
+    for (size_t i = 0; i < form->count; i++) {
+        const settings_key_t *key = &form->keys[i];
+        const settings_help_t *help = form->help;
+        while (help->section != NULL &&
+               (strcmp(help->section, key->section) != 0 || strcmp(help->key, key->key) != 0)) {
+            help++;
+        }
+        TEST_ASSERT_NOT_NULL_MESSAGE(help->text, key->key);
+        TEST_ASSERT_EQUAL_STRING_LEN_MESSAGE("; ", help->text, 2, key->key);
+        TEST_ASSERT_EQUAL_CHAR_MESSAGE('\n', help->text[strlen(help->text) - 1U], key->key);
+    }
+}
+
+static void test_help_of_each_key_is_in_its_configuration_file(void) {
+    expect_comments(&mqtt_settings_form);
+    expect_comments(&ros_settings_form);
+    expect_comments(&serial_settings_form);
+#ifdef WITH_WEB
+    expect_comments(&web_settings_form);
+#endif
+}
+
 static void test_help_says_durations_as_they_are_read(void) {
     expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
     expect_said(help_record, "--for TIME  " DURATION_FORM ";");
 }
 
+/// The verb of that place in the program's page, or a null pointer behind the last.
+static const verb_t *verb_at(unsigned number) {
+    const char *name = help_find("help")->choice(number);
+    return (name != NULL) ? help_find(name) : NULL;
+}
+
 /// Completion and the program's page take the words and the summary from their places in the page.
 static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
     const verb_t *verb = NULL;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         char begin[64];
         char summary[64];
         const size_t length = (size_t)snprintf(begin, sizeof begin, "Usage: iwheelctl [--socket PATH]%s %s",
@@ -70,7 +100,7 @@ static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
 
 static void test_help_fits_a_terminal_of_80_columns(void) {
     const verb_t *verb = NULL;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         for (const char *line = verb->page; *line != '\0'; line += strcspn(line, "\n") + 1U) {
             TEST_ASSERT_LESS_OR_EQUAL_size_t_MESSAGE(80U, strcspn(line, "\n"), line);
         }
@@ -81,7 +111,7 @@ static void test_help_fits_a_terminal_of_80_columns(void) {
 static void test_help_names_each_word_that_may_follow(void) {
     const verb_t *verb = NULL;
     unsigned choices = 0;
-    for (unsigned i = 0; (verb = help_verb(i)) != NULL; i++) {
+    for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         for (unsigned k = 0; verb->choice != NULL && verb->choice(k) != NULL && strcmp(verb->name, "help") != 0; k++) {
             expect_said(verb->page, verb->choice(k));
             choices++;
@@ -113,6 +143,7 @@ static void test_help_of_confirm_lists_the_items_and_no_other(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_help_names_the_configuration_that_is_read);
+    RUN_TEST(test_help_of_each_key_is_in_its_configuration_file);
     RUN_TEST(test_help_says_durations_as_they_are_read);
     RUN_TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places);
     RUN_TEST(test_help_fits_a_terminal_of_80_columns);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The pair as a machine: droop, slope, kerb, free wheel, late wheel, yaw inertia, cut rpm; the ranges of what is ordinary.
-#include "iwheel_sim/ranges.h"
+#include "sim_ranges.h"
 #include "test_sim_rig.h"
 
 #include "unity.h"

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
 from bus import now_us
-from harness import Process, Rig
+from harness import WORDS, Process, Rig
 from trials import until
 
 # For any machine, however busy; as in the demonstration.
@@ -50,7 +50,9 @@ class Person:
     def ask(self, method, target, **options):
         """(status, JSON). A bridge that was started again does not know the session."""
         for _ in range(2):
-            status, body = self.rig.ask(method, target, headers={"Authorization": self.header(method, target), **options.pop("headers", {})}, token="", **options)
+            status, body = self.rig.ask(
+                method, target, headers={"Authorization": self.header(method, target), **options.pop("headers", {})}, token="", **options
+            )
             answer = json.loads(body)
             if status != 401 or answer["error"] != "bad_session":
                 break
@@ -90,8 +92,8 @@ class WebRig(Rig):
         for section, keys in (settings or {}).items():
             self.web_settings[section].update(keys)
 
-    def words(self):
-        return self.web.text() if self.web else ""
+    def said(self):
+        return (self.web.text()[-WORDS:] if self.web else "") + super().said()
 
     def gateway_command(self, *extra):
         return super().gateway_command("--watch-socket", self.path("watch.sock"), *extra)

@@ -49,8 +49,6 @@ void bridge_line_drop(bridge_line_t *self, iwc_result_t why) {
     }
 }
 
-// ---- connecting ---------------------------------------------------------------------------------------------------
-
 static iwc_result_t meaning_of(int error) {
     if (error == EACCES || error == EPERM) {
         return IWC_DENIED;
@@ -103,8 +101,6 @@ bridge_line_state_t bridge_line_greet(bridge_line_t *self, uint64_t now_us) {
     }
     return self->state;
 }
-
-// ---- asking and listening -----------------------------------------------------------------------------------------
 
 iwc_result_t bridge_line_send(bridge_line_t *self, const char *request, const bridge_sent_t *sent) {
     if (self->state != BRIDGE_HERE) {

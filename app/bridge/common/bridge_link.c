@@ -23,7 +23,6 @@ bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, con
     return bridge_stop_open(&self->stop, terms->socket, self->epoll_fd) && lines && self->epoll_fd >= 0;
 }
 
-/// Takes a waiting question out of its place.
 static bridge_question_t take_out(bridge_link_t *self, unsigned at) {
     const bridge_question_t question = self->waits[at];
     self->count--;
@@ -46,8 +45,6 @@ void bridge_link_close(bridge_link_t *self) {
     bridge_stop_close(&self->stop);
     (void)close(self->epoll_fd);
 }
-
-// ---- here and gone ------------------------------------------------------------------------------------------------
 
 /// Becomes AWAY, or stays so: the line has ended, or was never there.
 static void lose(bridge_link_t *self) {
@@ -141,8 +138,6 @@ static int come_here(bridge_link_t *self) {
     }
     return 0;
 }
-
-// ---- listening ----------------------------------------------------------------------------------------------------
 
 static void listen_now(bridge_link_t *self) {
     iwc_message_t event;

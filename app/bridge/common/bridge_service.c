@@ -17,10 +17,18 @@ static void ask_end(int number) {
     end_asked = 1;
 }
 
-uint64_t bridge_now_us(void) {
+static int64_t read_us(clockid_t clock) {
     struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000U + (uint64_t)now.tv_nsec / 1000U;
+    (void)clock_gettime(clock, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+uint64_t bridge_now_us(void) {
+    return (uint64_t)read_us(CLOCK_MONOTONIC);
+}
+
+int64_t bridge_wall_us(void) {
+    return read_us(CLOCK_REALTIME);
 }
 
 void bridge_service_take_signals(void) {

@@ -16,6 +16,9 @@ typedef struct {
 /// CLOCK_MONOTONIC.
 uint64_t bridge_now_us(void);
 
+/// CLOCK_REALTIME since 1970: for people, decides nothing.
+int64_t bridge_wall_us(void);
+
 /// From here on SIGTERM and SIGINT come only while `bridge_service_wait` waits. Call it before a thread is made: all inherit it.
 void bridge_service_take_signals(void);
 

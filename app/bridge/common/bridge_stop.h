@@ -60,7 +60,6 @@ bool bridge_stop_ask(bridge_stop_t *self, const char *request, bridge_answer_t a
 /// The answers for this context are not needed any more; the stop itself is still delivered.
 void bridge_stop_forget(bridge_stop_t *self, const void *context);
 
-/// True if a request of this text is a `stop` or an `estop`.
 bool bridge_is_stop(const char *request);
 
 /// Twice as long as `wait_us`, at most `longest_us`, into `*wait_us`; returns a time in its upper half from now. Many bridges do not come

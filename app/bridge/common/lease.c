@@ -41,8 +41,6 @@ void bridge_lease_close(bridge_lease_t *self) {
     }
 }
 
-// ---- arming -------------------------------------------------------------------------------------------------------
-
 static void hold(bridge_place_t *place, const iwc_message_t *reply) {
     bridge_lease_t *self = place->lease;
     const bridge_asker_t asker = place->asker;
@@ -125,8 +123,6 @@ static void go_on_asking(bridge_place_t *place, uint64_t now_us) {
         place->request[0] = '\0';
     }
 }
-
-// ---- driving ------------------------------------------------------------------------------------------------------
 
 const char *bridge_lease_key(const bridge_lease_t *self) {
     return (self->holder != NULL) ? self->holder->key : NULL;
@@ -216,8 +212,6 @@ void bridge_lease_forget(bridge_lease_t *self, const void *context) {
     }
 }
 
-// ---- the round ----------------------------------------------------------------------------------------------------
-
 static void step_place(bridge_place_t *place, uint64_t now_us) {
     iwc_message_t event;
     if (place->state == BRIDGE_ASKING) {
@@ -256,8 +250,6 @@ uint64_t bridge_lease_next_us(const bridge_lease_t *self, uint64_t now_us) {
     }
     return next_us;
 }
-
-// ---- deflected sticks -----------------------------------------------------------------------------------------------
 
 void bridge_movers_note(bridge_movers_t *self, const char *name, uint64_t now_us) {
     size_t at = 0;

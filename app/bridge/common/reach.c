@@ -25,8 +25,6 @@ typedef union {
     struct sockaddr_in6 v6;
 } address_t;
 
-// ---- one socket -----------------------------------------------------------------------------------------------------
-
 static int option_of(int fd, int name) {
     int value = 0;
     socklen_t size = sizeof value;
@@ -82,8 +80,6 @@ static void describe(int fd, const address_t *address, char out_text[BRIDGE_REAC
     (void)snprintf(out_text, BRIDGE_REACH_TEXT, "%s %s port %u",
                    (option_of(fd, SO_TYPE) == SOCK_STREAM) ? "TCP" : "UDP", host, ntohs(address->v4.sin_port));
 }
-
-// ---- all of them ----------------------------------------------------------------------------------------------------
 
 /// Called with each socket that receives from other machines; false ends the walk.
 typedef bool (*visit_t)(void *context, int fd, const address_t *address);
@@ -153,8 +149,6 @@ bool bridge_reach_is_local(const char *program, const int *except, size_t count)
     }
     return found == 0U;
 }
-
-// ---- to the loopback interface ----------------------------------------------------------------------------------------
 
 /// What was received from other machines before is passed on while nothing acts on it yet.
 static bool await_empty(int fd) {

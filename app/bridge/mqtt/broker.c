@@ -28,8 +28,6 @@
 #define BEHIND_MAX 64U
 #define GOODBYE_MS 200
 
-// ---- what it is told by the library -------------------------------------------------------------------------------
-
 static void on_log(struct mosquitto *client, void *context, int level, const char *words) {
     mqtt_broker_t *self = context;
     (void)client;
@@ -118,8 +116,6 @@ static void on_message(struct mosquitto *client, void *context, const struct mos
     free(correlation);
 }
 
-// ---- opening ------------------------------------------------------------------------------------------------------
-
 int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener) {
     *self = (mqtt_broker_t){.settings = settings,
                             .listener = *listener,
@@ -133,8 +129,6 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
     }
     return mqtt_credentials_read(settings, &self->user, &self->password);
 }
-
-// ---- connecting ---------------------------------------------------------------------------------------------------
 
 /// A broker that ends the connection just after it accepted it, again and again, has usually given its name to another client: MQTT 3.1.1
 /// has no word for that.
@@ -290,8 +284,6 @@ static void end_connecting(mqtt_broker_t *self) {
     self->state = MQTT_GREETING;
     self->until_us = self->now_us + MQTT_GREETING_US;
 }
-
-// ---- working ------------------------------------------------------------------------------------------------------
 
 static void work(mqtt_broker_t *self) {
     int result = mosquitto_loop_read(self->client, PACKETS);

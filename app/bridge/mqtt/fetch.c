@@ -43,8 +43,6 @@ void fetch_begin(fetch_t *self, const char *id, const char *from, uint64_t patie
     self->next_us = now_us;
 }
 
-// ---- which one ----------------------------------------------------------------------------------------------------
-
 /// `stop-000017-wheel_lost`: by all of it, or by its number.
 static bool is_meant(const fetch_recording_t *recording, const char *name) {
     const char *digits = strchr(recording->name, '-');
@@ -90,8 +88,6 @@ void fetch_choose(fetch_t *self, const char *name, uint64_t now_us) {
              self->id, self->list[place].name);
     }
 }
-
-// ---- asking -------------------------------------------------------------------------------------------------------
 
 static void write_command(fetch_t *self, const char **out_verb, char out_payload[512]) {
     iwn_out_t json;
@@ -148,8 +144,6 @@ bool fetch_step(fetch_t *self, uint64_t now_us, const char **out_verb, char out_
     write_command(self, out_verb, out_payload);
     return true;
 }
-
-// ---- answers ------------------------------------------------------------------------------------------------------
 
 /// A text that moves no terminal.
 static void read_text(iwn_json_t object, const char *name, char *out, size_t size) {

@@ -175,8 +175,6 @@ void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t le
     }
 }
 
-// ---- showing ------------------------------------------------------------------------------------------------------
-
 static void show_battery(iwc_value_t value, FILE *out) {
     if (value.known) {
         (void)fprintf(out, " %4" PRId64 ".%" PRId64, value.value / 10,

@@ -50,8 +50,6 @@ static int complain(int code, const char *what, const char *why) {
     return code;
 }
 
-// ---- files --------------------------------------------------------------------------------------------------------
-
 /// Their names, which must be free: what is there is not touched.
 static int name_files(asking_t *self) {
     const char *name = self->fetch.list[self->fetch.chosen].name;
@@ -124,8 +122,6 @@ static void remove_parts(const asking_t *self) {
         }
     }
 }
-
-// ---- the broker ---------------------------------------------------------------------------------------------------
 
 static void up(void *context) {
     asking_t *self = context;
@@ -234,8 +230,6 @@ static int with_list(const mqtt_settings_t *settings, const fleet_wanted_t *want
     }
     return code;
 }
-
-// ---- the verbs ----------------------------------------------------------------------------------------------------
 
 static void show_list(const fetch_t *fetch) {
     char when[32];

@@ -3,6 +3,7 @@
 #include "fleet_verbs.h"
 
 #include "begin/begin.h"
+#include "common/bridge_service.h"
 
 #include "mqtt_texts.h"
 
@@ -10,7 +11,6 @@
 #include <stdarg.h>
 #include <string.h>
 #include <sysexits.h>
-#include <time.h>
 #include <unistd.h>
 
 #define DAY_US 86400000000LL
@@ -48,12 +48,6 @@ __attribute__((format(printf, 1, 2))) static int misuse(const char *format, ...)
     return EX_USAGE;
 }
 
-static int64_t wall_us(void) {
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /// -1: go on; else the exit code.
 static int take_number(const char *option, uint64_t *out_number) {
     uint32_t number = 0;
@@ -75,7 +69,7 @@ static int take_last(history_config_t *span) {
     if (!history_span(optarg, &last_us)) {
         return misuse("--last wants a span such as 90min, 12h or 7d, not \"%.40s\"", optarg);
     }
-    span->since_us = wall_us() - last_us;
+    span->since_us = bridge_wall_us() - last_us;
     return -1;
 }
 
@@ -169,7 +163,7 @@ static int judge(words_t *self) {
     span->machine = self->wanted.id;
     span->json = self->wanted.json;
     if (!self->until) {
-        span->until_us = wall_us();
+        span->until_us = bridge_wall_us();
     }
     if (span->since_us <= 0) {
         span->since_us = span->until_us - DAY_US;

@@ -12,7 +12,6 @@
 #include <poll.h>
 #include <string.h>
 #include <sysexits.h>
-#include <time.h>
 #include <unistd.h>
 
 #define SHOW_US 1000000U
@@ -37,8 +36,6 @@ static int complain(int code, const char *why) {
     (void)fprintf(stderr, "iwheel-fleet: %s\n", why);
     return code;
 }
-
-// ---- the table ----------------------------------------------------------------------------------------------------
 
 void fleet_ignore(void *context) {
     (void)context;
@@ -90,10 +87,8 @@ static int write_file(const console_t *self, const char *path) {
                        ? open(part, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0640)
                        : -1;
     FILE *file = (fd >= 0) ? fdopen(fd, "w") : NULL;
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
     if (file != NULL) {
-        fleet_write(&self->fleet, self->now_us, (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000, file);
+        fleet_write(&self->fleet, self->now_us, bridge_wall_us(), file);
     }
     if (file == NULL || fclose(file) != 0 || rename(part, path) != 0) {
         (void)fprintf(stderr, "iwheel-fleet: %s: %s; name a file in a folder that this user may write to\n", path,
@@ -168,8 +163,6 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
     fleet_close(&console.fleet);
     return code;
 }
-
-// ---- the history --------------------------------------------------------------------------------------------------
 
 typedef struct {
     history_t *history;

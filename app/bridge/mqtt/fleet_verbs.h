@@ -34,7 +34,6 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
 /// What happened in a span of time.
 int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
-/// Which recordings a machine has.
 int fleet_verb_recordings(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
 /// Fetches one of them into files of this machine, all of them whole or none.

@@ -23,8 +23,6 @@ void history_close(history_t *self) {
     self->machines = NULL;
 }
 
-// ---- times --------------------------------------------------------------------------------------------------------
-
 void history_time(int64_t wall_us, char out[HISTORY_TIME_SIZE]) {
     const time_t seconds = (time_t)(wall_us / 1000000);
     struct tm parts;
@@ -73,8 +71,6 @@ bool history_span(const char *text, int64_t *out_us) {
     }
     return false;
 }
-
-// ---- doubles and gaps ---------------------------------------------------------------------------------------------
 
 history_machine_t *history_machine(history_t *self, const char *id) {
     for (size_t i = 0; i < self->count; i++) {
@@ -196,8 +192,6 @@ static void forget_gap(history_machine_t *machine) {
     machine->unheard = 0;
     machine->began = false;
 }
-
-// ---- telling ------------------------------------------------------------------------------------------------------
 
 /// Of an event that is no stop, what is in it that tells most.
 static void write_fields(const iwc_message_t *event, const char *name, char *out, size_t size) {

@@ -7,8 +7,6 @@
 #include <inttypes.h>
 #include <string.h>
 
-// ---- what machines say of themselves ------------------------------------------------------------------------------
-
 static uint64_t count_of(const iwc_message_t *info, const char *path) {
     const iwc_value_t value = iwc_integer(info, path);
     return (value.known && value.value > 0) ? (uint64_t)value.value : 0U;

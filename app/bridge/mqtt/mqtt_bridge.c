@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "mqtt_bridge.h"
 
+#include "common/bridge_service.h"
 #include "folder.h"
 
 #include <errno.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sysexits.h>
-#include <time.h>
-#include <unistd.h>
 
 #define SECOND_US 1000000U
 #define INFO_US   60000000U
@@ -19,18 +18,10 @@ static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
     return (mqtt_buffer_t){self->payload, sizeof self->payload};
 }
 
-static int64_t wall_us(void) {
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
     return self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
 }
-
-// ---- what the bridge says of itself -------------------------------------------------------------------------------
 
 static void tell_info(mqtt_bridge_t *self) {
     iwc_message_t state;
@@ -69,8 +60,6 @@ static void tell_availability(mqtt_bridge_t *self, bool always) {
     }
 }
 
-// ---- events -------------------------------------------------------------------------------------------------------
-
 /// An event that is worth to be kept; `stop_us` is the wall clock of the newest stop, by which one is known that happened unseen.
 static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
     if (length == 0U) {
@@ -94,7 +83,7 @@ static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
 }
 
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
-    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
     remember_stop(self, event);
     bridge_lease_end(&self->lease, self->now_us);
@@ -107,12 +96,11 @@ static void take_why(void *context, const iwc_message_t *reply) {
         remember_stop(self, reply);
     }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
-        const size_t length = mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, wall_us(), reply, buffer(self));
+        const size_t length =
+            mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, bridge_wall_us(), reply, buffer(self));
         keep_event(self, "stop", length, stop_us);
     }
 }
-
-// ---- what the gateway says ----------------------------------------------------------------------------------------
 
 /// What makes a state worth sending at once: everything in it that is no measurement.
 static void read_condition(const iwc_message_t *state, char *out, size_t size) {
@@ -193,7 +181,7 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
         if (strcmp(name, "lease") == 0) {
             take_lease(self, event);
         }
-        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, bridge_wall_us(), event, buffer(self));
         keep_event(self, name, length, self->spool.mark);
     }
     mqtt_events_send(self);
@@ -212,8 +200,6 @@ static void gateway_gone(void *context, uint64_t now_us) {
     tell_availability(self, false);
     tell_info(self);
 }
-
-// ---- the broker ---------------------------------------------------------------------------------------------------
 
 static void broker_up(void *context) {
     mqtt_bridge_t *self = context;
@@ -234,8 +220,6 @@ static void broker_down(void *context) {
     self->sensors_us = 0;
     mqtt_bridge_stop_if_ours(self);
 }
-
-// ---- the whole ----------------------------------------------------------------------------------------------------
 
 static bool make_boot(char out[MQTT_BOOT_SIZE]) {
     uint64_t number = 0;
@@ -324,7 +308,7 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     return mqtt_broker_open(&self->broker, settings, &broker);
 }
 
-static void poll(mqtt_bridge_t *self) {
+static void poll_events(mqtt_bridge_t *self) {
     mqtt_spool_poll(&self->spool);
     if (self->spool.behind != self->told_behind) {
         self->told_behind = self->spool.behind;
@@ -361,7 +345,7 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     mqtt_spool_sync(&self->spool);
     if (now_us >= self->second_us) {
         self->second_us = now_us + SECOND_US;
-        poll(self);
+        poll_events(self);
     }
     return code;
 }

@@ -50,8 +50,6 @@ static bool drop(mqtt_order_t *order, mqtt_verdict_t verdict, const char *why) {
     return false;
 }
 
-// ---- reading ------------------------------------------------------------------------------------------------------
-
 /// A whole number of the command's; false: there is none.
 static bool number_of(iwn_json_t root, const char *name, int64_t *out_number) {
     iwn_json_t value;
@@ -164,8 +162,6 @@ static bool write_request(iwn_json_t root, mqtt_order_t *order) {
     order->request[length - 1U] = '\0'; // The newline: a client's library adds its own.
     return true;
 }
-
-// ---- judging ------------------------------------------------------------------------------------------------------
 
 /// Where this sender's `seq` is kept; the longest silent one's place, if it has none. MQTT_SENDERS: all are taken.
 static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_us) {

@@ -13,8 +13,6 @@
 
 static const mqtt_way_t once = {.qos = 1};
 
-// ---- messages -----------------------------------------------------------------------------------------------------
-
 /// The log's next line names an event, if one is among them.
 static void count_refusal(mqtt_bridge_t *self, const char *topic, const char *why, bool is_event) {
     mqtt_refusals_t *refusals = &self->refusals;
@@ -45,8 +43,6 @@ int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name,
     mqtt_topic(self->settings->machine.id, what, name, topic);
     return mqtt_bridge_publish_to(self, topic, length, way);
 }
-
-// ---- events -------------------------------------------------------------------------------------------------------
 
 /// The event does not block those behind it: it waits until events that are set aside are tried again.
 static void set_aside(mqtt_bridge_t *self, uint64_t number) {

@@ -3,6 +3,8 @@
 
 #include "mqtt_command.h"
 
+#include "mqtt_keys.h"
+
 #include <arpa/inet.h>
 #include <ctype.h>
 #include <string.h>
@@ -29,57 +31,27 @@ static const char *wrong_name(const char *text) {
 }
 
 static const settings_key_t keys[] = {
-    {"gateway", "socket", "", "Of the gateway: its watch socket, or to drive, the one to drive by.",
-     TEXT(gateway.socket), .wrong = settings_wrong_socket},
-    {"machine", "id", "",
-     "Name of this machine in topics, iwheel/ID/...: letters, digits, _ and -. No person's name: topics are read by\n"
-     "many. With one user per machine at the broker it is that user's name.",
-     TEXT(machine.id), .wrong = wrong_name},
-    {"broker", "host", "",
-     "Name or address of the broker, as its certificate has it, or the path of its unix socket; of a cluster several,\n"
-     "separated by blanks, tried in turn.",
-     TEXT(broker.host)},
-    {"broker", "port", "", "By custom 1883 without TLS, 8883 with it.", NUMBER(broker.port, 1, 65535)},
-    {"broker", "protocol", "",
-     "Of MQTT. 5: messages expire at the broker too, and commands may name a response topic. nats-server 2.9 speaks "
-     "3.1.1 only.",
-     .kind = SETTINGS_WORD, .words = protocols, FIELD(broker.protocol)},
-    {"broker", "stream_port", "",
-     "For iwheel-fleet: where these hosts, being nats-servers, speak NATS, by custom 4222: the fleet's history is read "
-     "there.\n0: there is none.",
-     NUMBER(broker.stream_port, 0, 65535)},
-    {"broker", "keepalive_s", " s", "After 1.5 times this without a sign of life both sides count the other as gone.",
-     NUMBER(broker.keepalive_s, 5, 3600)},
-    {"broker", "process_user", "",
-     "User of the broker's process on this machine. Without TLS a broker that is not this user's, root's or this\n"
-     "program's own gets no credentials, and its commands do not drive.",
-     TEXT(broker.process_user)},
-    {"broker", "credentials", "",
-     "File with one line USER:PASSWORD, which only the bridge's user and root may read; none: without.",
-     TEXT(broker.credentials)},
-    {"broker", "ca", "", "PEM file of who signed the broker's certificate; none: without TLS.", TEXT(broker.ca)},
-    {"broker", "certificate", "", "PEM file, where the broker wants one of this machine; none.",
-     TEXT(broker.certificate)},
-    {"broker", "key", "", "PEM file of its private key.", TEXT(broker.key)},
-    {"broker", "allow_plain", "",
-     "yes: without TLS to another machine. WHOEVER IS BETWEEN READS ALL AND MAY STOP. Not with [drive] enabled.",
-     SWITCH(broker.allow_plain)},
-    {"state", "every_ms", " ms",
-     "How often iwheel/ID/state is sent (about 5 kB each), beside at once when it changes. 100 is for driving.",
-     NUMBER(state.every_ms, 100, 3600000)},
-    {"spool", "directory", "", "Where events wait that the broker has not confirmed; it outlives a restart.",
-     TEXT(spool.directory)},
-    {"spool", "max_kB", " kB", "Of the spool. Beyond it the oldest event is dropped and counted.",
-     NUMBER(spool.max_kB, 64, 65536)},
-    {"home_assistant", "enabled", "", "yes: tell Home Assistant which sensors there are.",
-     SWITCH(home_assistant.enabled)},
-    {"home_assistant", "prefix", "", "Of its discovery topics.", TEXT(home_assistant.prefix), .wrong = wrong_name},
-    {"drive", "enabled", "",
-     "yes: WHO MAY WRITE TO iwheel/ID/cmd MAY ARM AND DRIVE. The bridge needs the right to drive for that.",
-     SWITCH(drive.enabled)},
-    {"drive", "allow_reset", "", "yes: who may write there may reset a latched stop. Needs enabled = yes.",
-     SWITCH(drive.allow_reset)},
-    {"drive", "ttl_ms", " ms", "Older commands that drive are dropped.", NUMBER(drive.ttl_ms, 50, MQTT_TTL_MAX_MS)},
+    {"gateway", "socket", "", TEXT(gateway.socket), .wrong = settings_wrong_socket},
+    {"machine", "id", "", TEXT(machine.id), .wrong = wrong_name},
+    {"broker", "host", "", TEXT(broker.host)},
+    {"broker", "port", "", NUMBER(broker.port, 1, 65535)},
+    {"broker", "protocol", "", .kind = SETTINGS_WORD, .words = protocols, FIELD(broker.protocol)},
+    {"broker", "stream_port", "", NUMBER(broker.stream_port, 0, 65535)},
+    {"broker", "keepalive_s", " s", NUMBER(broker.keepalive_s, 5, 3600)},
+    {"broker", "process_user", "", TEXT(broker.process_user)},
+    {"broker", "credentials", "", TEXT(broker.credentials)},
+    {"broker", "ca", "", TEXT(broker.ca)},
+    {"broker", "certificate", "", TEXT(broker.certificate)},
+    {"broker", "key", "", TEXT(broker.key)},
+    {"broker", "allow_plain", "", SWITCH(broker.allow_plain)},
+    {"state", "every_ms", " ms", NUMBER(state.every_ms, 100, 3600000)},
+    {"spool", "directory", "", TEXT(spool.directory)},
+    {"spool", "max_kB", " kB", NUMBER(spool.max_kB, 64, 65536)},
+    {"home_assistant", "enabled", "", SWITCH(home_assistant.enabled)},
+    {"home_assistant", "prefix", "", TEXT(home_assistant.prefix), .wrong = wrong_name},
+    {"drive", "enabled", "", SWITCH(drive.enabled)},
+    {"drive", "allow_reset", "", SWITCH(drive.allow_reset)},
+    {"drive", "ttl_ms", " ms", NUMBER(drive.ttl_ms, 50, MQTT_TTL_MAX_MS)},
 };
 
 const mqtt_settings_t mqtt_settings_standard = {
@@ -172,6 +144,7 @@ static void relate(settings_report_t *report, const void *values, const unsigned
 
 const settings_form_t mqtt_settings_form = {
     .keys = keys,
+    .help = mqtt_keys,
     .count = sizeof keys / sizeof keys[0],
     .program = "iwheel-mqtt",
     .missing = "create it from share/mqtt.conf",

@@ -190,8 +190,6 @@ size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
     return end(&out);
 }
 
-// ---- Home Assistant -----------------------------------------------------------------------------------------------
-
 typedef struct {
     const char *kind; ///< sensor or binary_sensor
     const char *key;

@@ -108,8 +108,6 @@ static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
     }
 }
 
-// ---- the lease ----------------------------------------------------------------------------------------------------
-
 /// The source of a deflected stick, whose next command would move the wheels as soon as they may; NULL: there is none.
 static const char *mover(const mqtt_bridge_t *self, const mqtt_order_t *order) {
     iwc_message_t state;

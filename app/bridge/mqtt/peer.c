@@ -38,8 +38,6 @@ static mqtt_peer_t judge(uid_t uid, const mqtt_peers_t *allowed) {
     return MQTT_PEER_STRANGER;
 }
 
-// ---- the kernel's table of TCP connections ------------------------------------------------------------------------
-
 /// The kernel prints each 32-bit word of an address as this machine's number.
 static void write_end(const void *address, size_t words, in_port_t port, char out[END_SIZE]) {
     uint32_t word[4] = {0};
@@ -131,8 +129,6 @@ mqtt_peer_t mqtt_peer_judge(int fd, const mqtt_peers_t *allowed, uid_t *out_uid)
     }
     return judge(*out_uid, allowed);
 }
-
-// ---- before a secret is sent --------------------------------------------------------------------------------------
 
 static mqtt_peer_t probe(const struct sockaddr *address, socklen_t length, const mqtt_peers_t *allowed,
                          uid_t *out_uid) {

@@ -70,8 +70,6 @@ static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint
     put(record + 4, iwn_line_crc(0, record + HEAD_SIZE, BODY_SIZE + rest), 4);
 }
 
-// ---- in memory ----------------------------------------------------------------------------------------------------
-
 /// Removes the record at this place; those before it, which are set aside, move up.
 static void forget_at(mqtt_spool_t *self, size_t at) {
     const size_t length = length_of(self->data + at);
@@ -136,8 +134,6 @@ bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_even
     }
     return false;
 }
-
-// ---- on the disk --------------------------------------------------------------------------------------------------
 
 static bool write_all(int file, const void *bytes, size_t length) {
     const uint8_t *at = bytes;
@@ -212,8 +208,6 @@ static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
     return true;
 }
 
-// ---- reading it again ---------------------------------------------------------------------------------------------
-
 static size_t read_event(mqtt_spool_t *self, const uint8_t *record, size_t length) {
     const uint64_t number = number_of(record);
     if ((record[HEAD_SIZE] != EVENT && !is_aside(record)) || number <= self->last ||
@@ -278,8 +272,6 @@ static void read_file(mqtt_spool_t *self, int file) {
         (void)close(file);
     }
 }
-
-// ---- the spool ----------------------------------------------------------------------------------------------------
 
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
     *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory), .file = -1};

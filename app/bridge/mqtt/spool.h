@@ -20,8 +20,7 @@
 
 /// The longest event with its name.
 #define MQTT_SPOOL_EVENT_MAX 8192U
-/// The file in its directory.
-#define MQTT_SPOOL_FILE "events"
+#define MQTT_SPOOL_FILE      "events"
 
 /// For the thread that waits for the disk.
 typedef enum { MQTT_SYNC_IDLE, MQTT_SYNC_BUSY, MQTT_SYNC_FAILED } mqtt_sync_state_t;

@@ -39,8 +39,6 @@ static void end(reader_t *self) {
     *self = (reader_t){.options = NULL};
 }
 
-// ---- connecting ---------------------------------------------------------------------------------------------------
-
 static bool is_address(const char *host) {
     uint8_t bytes[16];
     return inet_pton(AF_INET, host, bytes) == 1 || inet_pton(AF_INET6, host, bytes) == 1;
@@ -105,8 +103,6 @@ static int find_server(reader_t *self, const mqtt_settings_t *settings, char out
                 "[broker]",
                 (unsigned)settings->broker.stream_port, told);
 }
-
-// ---- reading ------------------------------------------------------------------------------------------------------
 
 /// The consumer is of the kind that forgets itself: nothing is written down for it, and what it was handed is not confirmed.
 static natsStatus subscribe(reader_t *self, const stream_config_t *config, jsErrCode *out_code) {

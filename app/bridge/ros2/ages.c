@@ -14,8 +14,6 @@ void ros_ages_init(ros_ages_t *self, bool local, bool synchronised, ros_moment_t
     self->offset_us = now.wall_us - now.mono_us;
 }
 
-// ---- this machine's clock -------------------------------------------------------------------------------------------
-
 /// True if the wall clock was not set back since the oldest sample that could pass now.
 static bool may_trust_wall(ros_ages_t *self, ros_moment_t now) {
     const int64_t offset_us = now.wall_us - now.mono_us;
@@ -37,8 +35,6 @@ static ros_age_t judge_absolutely(int64_t sent_us, ros_moment_t now, int64_t *ou
     }
     return (*out_age_us > ROS_OLD_US) ? ROS_AGE_LATE : ROS_AGE_FRESH;
 }
-
-// ---- a writer's clock -----------------------------------------------------------------------------------------------
 
 static void begin_anew(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
     entry->known = false;
@@ -104,8 +100,6 @@ static ros_age_t judge_by_writer(ros_ages_t *self, uint64_t source, int64_t sent
     }
     return (*out_age_us > ROS_LATE_US) ? ROS_AGE_LATE : ROS_AGE_FRESH;
 }
-
-// ---- both -----------------------------------------------------------------------------------------------------------
 
 ros_age_t ros_ages_command(ros_ages_t *self, uint64_t source, int64_t sent_us, ros_moment_t now, int64_t *out_age_us) {
     const bool trusted = may_trust_wall(self, now);

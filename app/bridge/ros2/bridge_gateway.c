@@ -2,24 +2,14 @@
 // The gateway's side: there and gone, and what it says.
 #include "bridge_parts.h"
 
-#include <string.h>
-
 #define CONNECT_MS     200
 #define BACKOFF_MAX_US 2000000
 /// A snapshot that came so long after the lease was granted was made after it.
 #define GRANTED_US 200000
 
-int64_t bridge_clock_us(clockid_t clock) {
-    struct timespec now;
-    (void)clock_gettime(clock, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 int64_t bridge_monotonic_us(void) {
-    return bridge_clock_us(CLOCK_MONOTONIC);
+    return (int64_t)bridge_now_us();
 }
-
-// ---- there and gone -----------------------------------------------------------------------------------------------
 
 void bridge_end_lease(bridge_t *self) {
     self->leased_us = 0;
@@ -130,8 +120,6 @@ iwc_result_t bridge_call(bridge_t *self) {
     }
     return IWC_OK;
 }
-
-// ---- what the gateway says ----------------------------------------------------------------------------------------
 
 static void take_stop(bridge_t *self, const iwc_message_t *event) {
     const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);

@@ -3,9 +3,8 @@
 #ifndef ROS2_BRIDGE_PARTS_H
 #define ROS2_BRIDGE_PARTS_H
 
+#include "common/bridge_service.h"
 #include "ros2_bridge.h"
-
-#include <time.h>
 
 /// For an answer of the gateway's; none in this time, and it hangs.
 #define BRIDGE_ASK_MS 150
@@ -24,8 +23,7 @@ void bridge_end_lease(bridge_t *self);
 /// Takes what the gateway has said, and publishes what is new of it.
 void bridge_listen(bridge_t *self);
 
-/// Microseconds.
-int64_t bridge_clock_us(clockid_t clock);
+/// As `bridge_now_us`, with a sign.
 int64_t bridge_monotonic_us(void);
 
 /// Executes a request, or refuses it with the reason, and answers it.

@@ -7,7 +7,7 @@
 #define SHOWN_US 1000000
 
 ros_moment_t bridge_moment(void) {
-    return (ros_moment_t){bridge_clock_us(CLOCK_MONOTONIC), bridge_clock_us(CLOCK_REALTIME)};
+    return (ros_moment_t){bridge_monotonic_us(), bridge_wall_us()};
 }
 
 const char *bridge_why_not_drive(const bridge_t *self) {
@@ -25,7 +25,7 @@ const char *bridge_why_not_drive(const bridge_t *self) {
 
 /// `age_us` ago by the clock of the gateway's events. A snapshot that came late makes it older, never younger.
 static iwc_value_t since(const bridge_t *self, int64_t age_us) {
-    const int64_t gateway_us = self->facts.machine.now.t_us + bridge_clock_us(CLOCK_MONOTONIC) - self->received_us;
+    const int64_t gateway_us = self->facts.machine.now.t_us + bridge_monotonic_us() - self->received_us;
     return (iwc_value_t){.known = true, .value = gateway_us - age_us};
 }
 
@@ -35,7 +35,7 @@ iwc_result_t bridge_arm(bridge_t *self, int64_t age_us, iwc_terms_t *out_terms) 
     self->commanded_us = 0;
     self->silenced = false;
     bridge_end_lease(self);
-    self->leased_us = (result == IWC_OK) ? bridge_clock_us(CLOCK_MONOTONIC) : 0;
+    self->leased_us = (result == IWC_OK) ? bridge_monotonic_us() : 0;
     if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
         bridge_lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
     }
@@ -54,8 +54,6 @@ static void answer_result(bridge_t *self, const ros_request_t *request, iwc_resu
         bridge_lose(self, iwc_words(result));
     }
 }
-
-// ---- what permits motion or opens a latch -----------------------------------------------------------------------------
 
 /// Empty: somebody wants it now.
 static const char *why_not_meant(bridge_t *self, const ros_request_t *request, int64_t *out_age_us) {
@@ -103,7 +101,7 @@ static void take_arm(bridge_t *self, const ros_request_t *request, int64_t age_u
 
 /// Who asks means the stop that iwheel/state shows, and has had time to see it.
 static void take_reset(bridge_t *self, const ros_request_t *request, int64_t age_us) {
-    const int64_t asked_us = bridge_clock_us(CLOCK_MONOTONIC) - age_us;
+    const int64_t asked_us = bridge_monotonic_us() - age_us;
     if (self->shown.known && asked_us - self->shown_us < SHOWN_US) {
         ros_answer(self->ros, request, false,
                    "the last stop is younger than a second: read iwheel/state, then ask again");

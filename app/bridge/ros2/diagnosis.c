@@ -29,8 +29,6 @@ static const char *word(iwc_machine_t machine) {
     return words[machine];
 }
 
-// ---- the gateway and what stops the wheels ------------------------------------------------------------------------
-
 static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
     const ros_machine_t *machine = &facts->machine;
     add(status, "lease_ms", true, machine->lease_ms);
@@ -142,8 +140,6 @@ static void tell_assumptions(const ros_facts_t *facts, ros_status_t *status) {
     }
 }
 
-// ---- cmd_vel ------------------------------------------------------------------------------------------------------
-
 static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     const ros_commands_t *commands = &facts->commands;
     const int64_t lease_ms = (facts->machine.lease_ms > 0) ? facts->machine.lease_ms : 200;
@@ -186,8 +182,6 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             (3000 + lease_ms - 1) / lease_ms, lease_ms);
     }
 }
-
-// ---- all of it ----------------------------------------------------------------------------------------------------
 
 void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status) {
     static const char *const names[ROS_TELLS] = {"iwheel: gateway",     "iwheel: e-stop",     "iwheel: bus",

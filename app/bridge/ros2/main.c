@@ -10,8 +10,6 @@
 #include <stdlib.h>
 #include <sysexits.h>
 
-// ---- running ------------------------------------------------------------------------------------------------------
-
 static void loop(bridge_t *bridge) {
     struct pollfd entries[2] = {{.fd = ros_fd(bridge->ros), .events = POLLIN}};
     bridge_service_t service;
@@ -56,8 +54,6 @@ static int run(const ros_settings_t *settings) {
     free(bridge);
     return result;
 }
-
-// ---- checking -----------------------------------------------------------------------------------------------------
 
 static int check_gateway(const ros_settings_t *settings) {
     iwc_t *gateway = iwc_new();

@@ -13,8 +13,6 @@ typedef struct {
     ros_raw_t raw;
 } data_t;
 
-// ---- samples ----------------------------------------------------------------------------------------------------------
-
 static data_t *data_new(const struct ddsi_sertype *type, enum ddsi_serdata_kind kind) {
     data_t *data = calloc(1, sizeof *data);
     if (data != NULL) {
@@ -180,8 +178,6 @@ static const struct ddsi_serdata_ops data_functions = {
     .print = data_print,
     .get_keyhash = data_key_hash,
 };
-
-// ---- the type -----------------------------------------------------------------------------------------------------------
 
 static void type_free(struct ddsi_sertype *type) {
     ddsi_sertype_fini(type);

@@ -48,8 +48,6 @@ static const ros_topic_t twist = {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc
 static const ros_topic_t twist_stamped = {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false};
 static const ros_topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
 
-// ---- making entities ----------------------------------------------------------------------------------------------
-
 dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept) {
     const dds_data_representation_id_t classic = DDS_DATA_REPRESENTATION_XCDR1;
     dds_qos_t *qos = dds_create_qos();
@@ -128,8 +126,6 @@ static bool open_topics(ros_t *self) {
     return good && self->asks > 0;
 }
 
-// ---- the node in the graph ----------------------------------------------------------------------------------------
-
 typedef rmw_dds_common_msg_dds__Gid_ gid_bytes_t;
 typedef rmw_dds_common_humble_msg_dds__Gid_ old_gid_bytes_t;
 typedef rmw_dds_common_msg_dds__ParticipantEntitiesInfo_ node_info_t;
@@ -182,8 +178,6 @@ static bool announce(ros_t *self) {
     return self->graph > 0 &&
            dds_write(self->graph, old ? (const void *)&old_info : (const void *)&info) == DDS_RETCODE_OK;
 }
-
-// ---- joining and leaving ------------------------------------------------------------------------------------------
 
 /// CycloneDDS sends from the interface of its configuration, but its receiving sockets have the address 0.0.0.0. It opens them with the
 /// domain; no reader is there yet, so what came before they are bound to `lo` is passed to nobody.
@@ -265,8 +259,6 @@ void ros_woken(ros_t *self) {
     (void)!read(self->fd, &times, sizeof times);
     ros_send_replies(self);
 }
-
-// ---- taking -------------------------------------------------------------------------------------------------------
 
 static int64_t time_of(const builtin_interfaces_msg_dds__Time_ *time) {
     return (int64_t)time->sec * 1000000 + time->nanosec / 1000;

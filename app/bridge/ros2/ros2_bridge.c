@@ -8,8 +8,6 @@
 /// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
 #define SILENT_US 150000
 
-// ---- commands ----------------------------------------------------------------------------------------------------
-
 /// What a command is, besides what it wants.
 typedef struct {
     ros_twist_t twist;
@@ -117,8 +115,6 @@ static void take_from_ros(bridge_t *self) {
     }
 }
 
-// ---- time ---------------------------------------------------------------------------------------------------------
-
 static void judge_silence(bridge_t *self, int64_t now) {
     const int64_t timeout_us = (int64_t)self->settings.drive.timeout_ms * 1000;
     if (self->commanded_us == 0 || now - self->commanded_us <= timeout_us) {
@@ -162,7 +158,7 @@ static void tell(bridge_t *self, int64_t now) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&self->facts, (ros_tells_t)i, &statuses[i]);
     }
-    ros_publish_diagnostics(self->ros, statuses, bridge_clock_us(CLOCK_REALTIME));
+    ros_publish_diagnostics(self->ros, statuses, bridge_wall_us());
     if (now >= self->second_us) {
         self->second_us = now + SECOND_US;
         self->assumptions_due = true;
@@ -230,8 +226,6 @@ static bool take_now(void *context) {
     (void)pthread_mutex_unlock(&self->lock);
     return can;
 }
-
-// ---- begin and end ------------------------------------------------------------------------------------------------
 
 static int open_both(bridge_t *self) {
     self->gateway = iwc_new();

@@ -26,8 +26,6 @@ static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
 
 _Static_assert((int)ROS_VERBS == (int)ROS_MARK_WRITERS, "a writer of replies for each service");
 
-// ---- the way out ------------------------------------------------------------------------------------------------------
-
 /// CycloneDDS calls `sendmsg` below in each of its threads, also to repeat a reply, and without a context: one node at a time.
 static struct {
     pthread_mutex_t lock;
@@ -88,8 +86,6 @@ ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
     return changed ? sent : send_as_it_is(fd, message, flags);
 }
 
-// ---- the way in -------------------------------------------------------------------------------------------------------
-
 /// Of `recvmsg` below, also in each of its threads.
 static struct {
     pthread_mutex_t lock;
@@ -141,8 +137,6 @@ void ros_close_services(ros_t *self) {
     (void)pthread_mutex_unlock(&out.lock);
 }
 
-// ---- opening ----------------------------------------------------------------------------------------------------------
-
 static dds_entity_t topic_of(const ros_t *self, ros_verb_t verb, bool is_reply) {
     char verb_name[40];
     char name[ROS_NAME_SIZE];
@@ -179,8 +173,6 @@ bool ros_open_service(ros_t *self, ros_verb_t verb) {
     self->requests[verb] = ros_reader(self, topic_of(self, verb, false), ros_qos(user_data, 10, true, false), ros_wake);
     return self->requests[verb] > 0 && self->replies[verb] > 0;
 }
-
-// ---- requests -----------------------------------------------------------------------------------------------------------
 
 static bool take_service(ros_t *self, ros_verb_t verb, ros_request_t *out_request) {
     ros_raw_t raw;
@@ -225,8 +217,6 @@ bool ros_take_request(ros_t *self, ros_request_t *out_request) {
     }
     return take_ask(self, out_request);
 }
-
-// ---- replies ------------------------------------------------------------------------------------------------------------
 
 /// By this rmw_cyclonedds says which reader and writer are of one client: "clientid=...;" in their user data. Empty: it says nothing.
 static void client_id(const dds_builtintopic_endpoint_t *endpoint, char id[CLIENT_ID_SIZE]) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ros_settings.h"
 
+#include "ros_keys.h"
+
 #include <ctype.h>
 #include <string.h>
 
@@ -28,38 +30,22 @@ static const char *wrong_name(const char *text) {
 }
 
 static const settings_key_t keys[] = {
-    {"gateway", "socket", "", "Of the gateway; to watch only, its watch socket suffices.",
-     TEXT(gateway.socket, settings_wrong_socket)},
-    {"ros", "domain", "", "DDS domain, ROS_DOMAIN_ID of the others.", NUMBER(ros.domain, 0, 232)},
-    {"ros", "network", "",
-     "loopback: this machine only, without multicast. default: as CYCLONEDDS_URI says; the unit also keeps it on this\n"
-     "machine, docs/ros2.md tells how to open it.",
-     WORD(ros.loopback, networks)},
-    {"ros", "clocks", "",
-     "Of other machines. synchronised: NTP or PTP keeps them equal to this one's; only then other machines may arm\n"
-     "and reset.",
-     WORD(ros.synchronised, clocks)},
-    {"ros", "release", "", "jazzy: Iron and newer; humble: Humble and older. Only `ros2 node list` depends on it.",
-     WORD(ros.humble, releases)},
-    {"ros", "namespace", "", "Before all names, for several machines in one domain, or none.",
-     TEXT(ros.ns, wrong_name)},
-    {"ros", "node", "", "Name in `ros2 node list`.", TEXT(ros.node, wrong_name)},
-    {"drive", "enabled", "", "no: watch only. WHO REACHES THE DDS DOMAIN MAY DRIVE AND ARM.",
-     WORD(drive.enabled, settings_no_yes)},
-    {"drive", "command", "", "What cmd_vel is.", WORD(drive.stamped, twists)},
-    {"drive", "timeout_ms", " ms", "Silence of cmd_vel after which the bridge says stop. The lease may end earlier.",
-     NUMBER(drive.timeout_ms, 50, 500)},
-    {"drive", "auto_arm", "",
-     "yes: a command after 500 ms of zeros or silence arms; not after a stop that had another reason than its\n"
-     "own source's silence, and after a person's stop only once the source was silent for a second.",
-     WORD(drive.auto_arm, settings_no_yes)},
-    {"drive", "allow_reset", "", "yes: the service iwheel/reset resets a latched stop.",
-     WORD(drive.allow_reset, settings_no_yes)},
-    {"odometry", "rate_hz", " Hz", "Of odom, joint_states, wrench.", NUMBER(odometry.rate_hz, 1, 100)},
-    {"odometry", "odom_frame", "", "Frame of odom.", TEXT(odometry.odom_frame, wrong_name)},
-    {"odometry", "base_frame", "", "Frame of the machine.", TEXT(odometry.base_frame, wrong_name)},
-    {"odometry", "tf", "", "yes: publish the transform too; no, if robot_localization does.",
-     WORD(odometry.tf, settings_no_yes)},
+    {"gateway", "socket", "", TEXT(gateway.socket, settings_wrong_socket)},
+    {"ros", "domain", "", NUMBER(ros.domain, 0, 232)},
+    {"ros", "network", "", WORD(ros.loopback, networks)},
+    {"ros", "clocks", "", WORD(ros.synchronised, clocks)},
+    {"ros", "release", "", WORD(ros.humble, releases)},
+    {"ros", "namespace", "", TEXT(ros.ns, wrong_name)},
+    {"ros", "node", "", TEXT(ros.node, wrong_name)},
+    {"drive", "enabled", "", WORD(drive.enabled, settings_no_yes)},
+    {"drive", "command", "", WORD(drive.stamped, twists)},
+    {"drive", "timeout_ms", " ms", NUMBER(drive.timeout_ms, 50, 500)},
+    {"drive", "auto_arm", "", WORD(drive.auto_arm, settings_no_yes)},
+    {"drive", "allow_reset", "", WORD(drive.allow_reset, settings_no_yes)},
+    {"odometry", "rate_hz", " Hz", NUMBER(odometry.rate_hz, 1, 100)},
+    {"odometry", "odom_frame", "", TEXT(odometry.odom_frame, wrong_name)},
+    {"odometry", "base_frame", "", TEXT(odometry.base_frame, wrong_name)},
+    {"odometry", "tf", "", WORD(odometry.tf, settings_no_yes)},
 };
 const ros_settings_t ros_settings_standard = {
     .gateway = {"/run/iwheel/gateway.sock"},
@@ -74,6 +60,7 @@ const char *ros_settings_space(const ros_settings_t *settings) {
 
 const settings_form_t ros_settings_form = {
     .keys = keys,
+    .help = ros_keys,
     .count = sizeof keys / sizeof keys[0],
     .program = "iwheel-ros2",
     .missing = "create it from share/ros2.conf",

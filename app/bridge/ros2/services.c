@@ -27,8 +27,6 @@ static int64_t read_long(const uint8_t *bytes, bool little) {
     return (int64_t)(little ? second << 32 | first : first << 32 | second);
 }
 
-// ---- payloads -------------------------------------------------------------------------------------------------------
-
 void ros_service_read(const uint8_t *payload, size_t size, ros_caller_t *caller) {
     const size_t body = (size > ENCAPSULATION) ? size - ENCAPSULATION : 0U;
     const size_t header = HEADER_GUID + sizeof caller->number;
@@ -71,8 +69,6 @@ size_t ros_service_write(const ros_caller_t *caller, bool success, const char *t
     memcpy(out + used, text, length);
     return used + length + 1U;
 }
-
-// ---- RTPS -----------------------------------------------------------------------------------------------------------
 
 /// A DATA submessage.
 typedef struct {

@@ -76,8 +76,6 @@ static void leave(void *context, sock_client_t *client) {
     }
 }
 
-// ---- a request ----------------------------------------------------------------------------------------------------
-
 /// A refusal takes its turn among the answers.
 static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_t error, const char *message) {
     serial_request_t *place = serial_queue_place(&channel->queue);
@@ -174,8 +172,6 @@ static void carry_out(void *context, sock_client_t *client, const char *line, si
 sock_handler_t relay_handler(relay_t *self) {
     return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
 }
-
-// ---- an answer ----------------------------------------------------------------------------------------------------
 
 /// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
 static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request_t *request, const char *rest,
@@ -278,8 +274,6 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     }
 }
 
-// ---- coming and going ---------------------------------------------------------------------------------------------
-
 static void drop_client(relay_t *self, relay_channel_t *channel) {
     sock_client_t *client = sock_clients_find(&self->clients, channel->client);
     release(channel);
@@ -342,8 +336,6 @@ uint64_t relay_channels_next_us(const relay_t *self) {
     }
     return next_us;
 }
-
-// ---- what the board is told ---------------------------------------------------------------------------------------
 
 static size_t write_line(uint8_t channel, const char *json, size_t length, char *out, size_t size) {
     return iwn_line_write(&(iwn_line_t){.channel = channel, .json = json, .length = length}, out, size);

@@ -11,7 +11,6 @@
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
 #include <sysexits.h>
-#include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
 #define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 6)
@@ -24,8 +23,6 @@
 #define BACKOFF_MAX_US 2000000U
 /// As rarely the loop comes round when there is nothing to do.
 #define IDLE_US 1000000U
-
-// ---- the port -----------------------------------------------------------------------------------------------------
 
 static void watch_port(relay_t *self, int operation) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = SOCK_TAG_BUS}};
@@ -191,8 +188,6 @@ static void poll_port(relay_t *self) {
     }
 }
 
-// ---- the loop -----------------------------------------------------------------------------------------------------
-
 static int watch(const relay_t *self, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
     return (fd < 0 || epoll_ctl(self->clients.epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0) ? 0 : errno;
@@ -320,8 +315,6 @@ static int loop(relay_t *self) {
     }
     return 0;
 }
-
-// ---- begin and end ------------------------------------------------------------------------------------------------
 
 static int open_sockets(relay_t *self) {
     const serial_settings_t *settings = self->settings;

@@ -31,8 +31,6 @@ void web_call_resume(web_call_t *self) {
     }
 }
 
-// ---- answering ----------------------------------------------------------------------------------------------------
-
 /// Nothing is loaded from elsewhere, nothing frames the page, nothing is kept, and nobody is told where a reader came from.
 static void add_headers(struct MHD_Response *response, const char *type) {
     static const char *const headers[][2] = {
@@ -86,8 +84,6 @@ enum MHD_Result web_call_refuse(web_call_t *self, unsigned status, const char *e
     self->server->own.refused++;
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }
-
-// ---- the bridge's own answers ---------------------------------------------------------------------------------------
 
 static enum MHD_Result send_file(web_call_t *self) {
     const web_file_t *file = &self->server->files[self->verdict.route - web_routes()];
@@ -240,8 +236,6 @@ static enum MHD_Result carry_out(web_call_t *self) {
         return web_call_ask(self);
     }
 }
-
-// ---- from and to the library ----------------------------------------------------------------------------------------
 
 static bool has_body(struct MHD_Connection *connection) {
     const char *length = header(connection, "Content-Length");

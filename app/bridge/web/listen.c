@@ -23,8 +23,6 @@ static int complain(const char *what, const char *fix) {
     return (errno == EACCES) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-// ---- a unix socket --------------------------------------------------------------------------------------------------
-
 static bool is_socket(const char *path) {
     struct stat status;
     return lstat(path, &status) == 0 && S_ISSOCK(status.st_mode);
@@ -51,8 +49,6 @@ static int listen_unix(const char *path) {
     }
     return fd;
 }
-
-// ---- addresses ------------------------------------------------------------------------------------------------------
 
 typedef union {
     struct sockaddr any;
@@ -132,8 +128,6 @@ static int open_own(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENE
     }
     return 0;
 }
-
-// ---- of systemd -----------------------------------------------------------------------------------------------------
 
 static unsigned count_passed(void) {
     const char *pid = getenv("LISTEN_PID");

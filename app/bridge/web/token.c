@@ -52,7 +52,6 @@ static bool is_over(const web_token_t *self, const struct stat *status) {
     return self->hours > 0U && now.tv_sec - status->st_mtim.tv_sec >= (time_t)self->hours * 3600;
 }
 
-/// The file, open; -1 with errno.
 static int open_file(const web_token_t *self) {
     return open(self->path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
 }

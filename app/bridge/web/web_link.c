@@ -11,8 +11,6 @@
 /// All places for questions are in use.
 #define WHY_AGAIN_US 200000U
 
-// ---- listening ----------------------------------------------------------------------------------------------------
-
 static char *copy_of(const iwc_message_t *message) {
     char *copy = malloc(message->length + 1U);
     if (copy != NULL) {
@@ -95,8 +93,6 @@ static void gateway_gone(void *context, uint64_t now_us) {
     forget_state(self);
     (void)web_feed_add(&self->feed, "gateway", "{\"event\":\"gateway\",\"connected\":false}", 37, false);
 }
-
-// ---- the link -----------------------------------------------------------------------------------------------------
 
 bool web_link_open(web_link_t *self, const char *socket, unsigned rate_hz, bool drives) {
     const bridge_link_terms_t terms = {"iwheel-web", socket, rate_hz, drives, true};

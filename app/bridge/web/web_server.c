@@ -27,8 +27,6 @@ static int complain(int code, const char *what, const char *cure) {
     return code;
 }
 
-// ---- files --------------------------------------------------------------------------------------------------------
-
 /// The whole file, ended by a NUL; NULL: it cannot be read.
 static char *read_all(const char *path, size_t *out_length) {
     FILE *file = fopen(path, "re");
@@ -106,8 +104,6 @@ static int read_certificate(web_server_t *self) {
                                           "cannot be read; give a PEM file that the bridge's user may read");
 }
 
-// ---- the library ----------------------------------------------------------------------------------------------------
-
 /// Called at both ends of a connection.
 static void take_peer(void *context, struct MHD_Connection *connection, void **place,
                       enum MHD_ConnectionNotificationCode what) {
@@ -169,8 +165,6 @@ static struct MHD_Daemon *start(web_server_t *self) {
         MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
 }
 
-// ---- life -----------------------------------------------------------------------------------------------------------
-
 int web_server_check(web_server_t *self, const web_settings_t *settings) {
     *self = (web_server_t){.settings = settings, .door = {.listen_fds = {-1, -1}, .epoll_fd = -1}};
     self->now_us = bridge_now_us();
@@ -230,8 +224,6 @@ void web_server_close(web_server_t *self) {
     free(self->certificate);
     free(self->key);
 }
-
-// ---- who is let in, and who makes room ------------------------------------------------------------------------------
 
 static void show_out(web_peer_t *peer) {
     peer->state = WEB_PEER_LEAVING;
@@ -306,8 +298,6 @@ static void let_in(web_server_t *self) {
         count += (MHD_add_connection(self->daemon, fd, (struct sockaddr *)&address, size) == MHD_YES) ? 1U : 0U;
     }
 }
-
-// ---- the round ------------------------------------------------------------------------------------------------------
 
 static void look_at_token(web_server_t *self) {
     bool changed = false;

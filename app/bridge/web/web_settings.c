@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "web_settings.h"
 
+#include "web_keys.h"
+
 #include <arpa/inet.h>
 #include <string.h>
 
@@ -23,39 +25,22 @@ static const char *wrong_listen(const char *text) {
 }
 
 static const settings_key_t keys[] = {
-    {"gateway", "socket", "", "Of the gateway: its watch socket, or to drive, the one to drive by.",
-     TEXT(gateway.socket), .wrong = settings_wrong_socket},
-    {"gateway", "rate_hz", " Hz", "How often the page is told the state.", NUMBER(gateway.rate_hz, 1, 100)},
-    {"web", "listen", "", "127.0.0.1, another address (needs certificate and key), or unix:PATH for a reverse proxy.",
-     TEXT(web.listen), .wrong = wrong_listen},
-    {"web", "port", "", "Of the page.", NUMBER(web.port, 1, 65535)},
-    {"web", "hosts", "",
-     "Names by which browsers call this machine, separated by blanks, or none. Requests for other names are refused;\n"
-     "addresses and localhost need not be listed.",
-     TEXT(web.hosts)},
-    {"web", "token_file", "",
-     "The secret without which nothing is told; made at the first start, readable by the bridge only.",
-     TEXT(web.token_file)},
-    {"web", "token_hours", " h", "After so long another token is made, and the old one is refused; 0: never.",
-     NUMBER(web.token_hours, 0, 8760)},
-    {"web", "max_connections", "",
-     "At once; a page takes two. Five in eight may watch; who has no token makes room for newcomers.",
-     NUMBER(web.max_connections, 8, 700)},
-    {"web", "page", "", "Folder with the page's files.", TEXT(web.page)},
-    {"web", "certificate", "", "PEM file for TLS; none: without TLS, for this machine only.", TEXT(web.certificate)},
-    {"web", "key", "", "PEM file of its private key.", TEXT(web.key)},
-    {"fleet", "source", "",
-     "File that iwheel-fleet --output rewrites, for the page /fleet: who has the token sees the whole fleet there; "
-     "none.",
-     TEXT(fleet.source)},
-    {"drive", "enabled", "", "yes: WHO HAS THE TOKEN MAY ARM AND DRIVE. The bridge needs the right to drive for that.",
-     SWITCH(drive.enabled)},
-    {"drive", "allow_reset", "", "yes: who has the token may reset a latched stop. Needs enabled = yes.",
-     SWITCH(drive.allow_reset)},
-    {"drive", "max_speed_mm_s", " mm/s", "Of the page's pad; the gateway's limits hold beside it.",
-     NUMBER(drive.max_speed_mm_s, 10, 2000)},
-    {"drive", "ttl_ms", " ms", "A drive command that was on its way longer is dropped.",
-     NUMBER(drive.ttl_ms, 50, 1000)},
+    {"gateway", "socket", "", TEXT(gateway.socket), .wrong = settings_wrong_socket},
+    {"gateway", "rate_hz", " Hz", NUMBER(gateway.rate_hz, 1, 100)},
+    {"web", "listen", "", TEXT(web.listen), .wrong = wrong_listen},
+    {"web", "port", "", NUMBER(web.port, 1, 65535)},
+    {"web", "hosts", "", TEXT(web.hosts)},
+    {"web", "token_file", "", TEXT(web.token_file)},
+    {"web", "token_hours", " h", NUMBER(web.token_hours, 0, 8760)},
+    {"web", "max_connections", "", NUMBER(web.max_connections, 8, 700)},
+    {"web", "page", "", TEXT(web.page)},
+    {"web", "certificate", "", TEXT(web.certificate)},
+    {"web", "key", "", TEXT(web.key)},
+    {"fleet", "source", "", TEXT(fleet.source)},
+    {"drive", "enabled", "", SWITCH(drive.enabled)},
+    {"drive", "allow_reset", "", SWITCH(drive.allow_reset)},
+    {"drive", "max_speed_mm_s", " mm/s", NUMBER(drive.max_speed_mm_s, 10, 2000)},
+    {"drive", "ttl_ms", " ms", NUMBER(drive.ttl_ms, 50, 1000)},
 };
 
 const web_settings_t web_settings_standard = {
@@ -123,6 +108,7 @@ static void relate(settings_report_t *report, const void *values, const unsigned
 
 const settings_form_t web_settings_form = {
     .keys = keys,
+    .help = web_keys,
     .count = sizeof keys / sizeof keys[0],
     .program = "iwheel-web",
     .missing = "create it from share/web.conf",

@@ -148,7 +148,7 @@ static int pump(ctl_t *self) {
             return CTL_OK;
         }
         if (result != IWC_OK && result != IWC_TIMEOUT) {
-            return ctl_lost(self, result);
+            return ctl_lost(result);
         }
         const bool event = json_object_get(line, "event") != NULL;
         json_decref(line);

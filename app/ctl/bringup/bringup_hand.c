@@ -2,7 +2,6 @@
 // What wheels count while hands turn or push them. Nothing is sent.
 #include "bringup.h"
 
-#include <errno.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>

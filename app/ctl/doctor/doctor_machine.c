@@ -5,7 +5,6 @@
 #include "iwheel_northbound/text.h"
 
 #include <dirent.h>
-#include <errno.h>
 #include <grp.h>
 #include <linux/can.h>
 #include <stdio.h>
@@ -29,7 +28,6 @@ static bool is_local(const char *bus) {
     return strncmp(bus, "unix:", 5U) == 0;
 }
 
-/// Reads the first word of a file of sysfs.
 static bool read_word(const char *path, char *out_word, size_t size) {
     FILE *file = fopen(path, "re");
     if (file == NULL) {

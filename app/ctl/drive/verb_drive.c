@@ -104,7 +104,6 @@ static iwc_result_t send_drive(drive_t *self, int64_t now_us) {
     return result;
 }
 
-/// What a line from the gateway means for the drive.
 static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
     const json_t *ok = json_object_get(line, "ok");
     if (ok == NULL) {
@@ -141,7 +140,7 @@ static end_t end_of(const drive_t *self, iwc_result_t result) {
     }
     if (result != IWC_OK && result != IWC_TIMEOUT) {
         clear_progress(self);
-        (void)ctl_lost(self->ctl, result);
+        (void)ctl_lost(result);
         return END_LOST;
     }
     return END_NONE;
@@ -326,7 +325,7 @@ static int wait_a_moment(const drive_t *self) {
         result = client_receive(&self->ctl->client, until_us, &event);
         json_decref(event);
     }
-    return (result == IWC_TIMEOUT) ? CTL_OK : ctl_lost(self->ctl, result);
+    return (result == IWC_TIMEOUT) ? CTL_OK : ctl_lost(result);
 }
 
 static bool passes(const json_t *reply) {

@@ -11,7 +11,6 @@
 
 #include "iwheel/codec.h"
 
-/// The eleven ids.
 #define LEARN_IDS 11U
 /// Other ids told one by one.
 #define LEARN_OTHERS_MAX 32U

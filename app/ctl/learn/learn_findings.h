@@ -17,7 +17,6 @@
 /// A wheel showed nothing that it did not show for this long.
 #define LEARN_SHOWN_MIN_US 500000
 
-/// Both sides.
 #define LEARN_BOTH IW_SIDES
 
 typedef struct {

@@ -44,7 +44,6 @@ static int sign_of(const learn_answer_t *answer) {
     return (answer->against_us * 20 < all) ? 1 : (answer->with_us * 20 < all) ? -1 : 0;
 }
 
-/// Why no sign can be told of that wheel.
 static const char *no_sign(const learn_t *self, unsigned side) {
     const learn_wheel_t *wheel = &self->wheel[side];
     if (self->setpoint[side].count == 0U) {

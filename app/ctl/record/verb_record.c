@@ -3,7 +3,6 @@
 #include "decode/frame.h"
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
-#include "text/ctl_text.h"
 
 #include "iwheel_linux/backend.h"
 
@@ -156,7 +155,7 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
             break;
         }
         if (result != IWC_OK && result != IWC_TIMEOUT) {
-            code = ctl_lost(ctl, result);
+            code = ctl_lost(result);
         }
     }
     return code;

@@ -3,7 +3,6 @@
 #include "recordings/events.h"
 #include "replay.h"
 #include "talk/ctl.h"
-#include "text/ctl_text.h"
 
 #include <errno.h>
 #include <inttypes.h>

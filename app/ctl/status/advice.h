@@ -6,7 +6,6 @@
 #include <jansson.h>
 #include <stdbool.h>
 
-/// How many lines of advice there may be.
 #define ADVICE_LINES 6U
 #define ADVICE_SIZE  320U
 

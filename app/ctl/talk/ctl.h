@@ -88,7 +88,7 @@ int ctl_refused(const json_t *reply);
 void ctl_explain_assumptions(json_t *assumptions);
 
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
-int ctl_lost(const ctl_t *self, iwc_result_t result);
+int ctl_lost(iwc_result_t result);
 
 // --- a gateway that may be there or not: looked for without a word -----------------------------------------------
 

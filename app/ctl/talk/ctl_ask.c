@@ -101,11 +101,10 @@ static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t resul
     if (result == IWC_REFUSED) {
         return tell_refusal(iwc_error(self->client.gateway), iwc_reason(self->client.gateway));
     }
-    return ctl_lost(self, result);
+    return ctl_lost(result);
 }
 
-int ctl_lost(const ctl_t *self, iwc_result_t result) {
-    (void)self;
+int ctl_lost(iwc_result_t result) {
     switch (result) {
     case IWC_TIMEOUT:
         return ctl_fail(CTL_TIMEOUT, "no answer within 2 s; the gateway hangs or this is not its socket, see its log");
@@ -168,7 +167,7 @@ int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
         return code;
     }
     const iwc_result_t result = client_ask(&self->client, request, out_reply);
-    return (result == IWC_OK) ? CTL_OK : ctl_lost(self, result);
+    return (result == IWC_OK) ? CTL_OK : ctl_lost(result);
 }
 
 static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *stop) {
@@ -205,7 +204,7 @@ int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply) {
     }
     self->client.line = reply.text;
     *out_reply = json_loadb(reply.text, reply.length, JSON_REJECT_DUPLICATES, NULL);
-    return (*out_reply != NULL) ? ctl_accept(self, out_reply) : ctl_lost(self, IWC_GARBLED);
+    return (*out_reply != NULL) ? ctl_accept(self, out_reply) : ctl_lost(IWC_GARBLED);
 }
 
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Speed and force over the last minute, drawn with characters where a terminal has room to spare.
-#include "text/ctl_text.h"
 #include "top.h"
 
 #include <curses.h>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "assumptions_file.h"
 
-#include "iwheel/codec.h"
-#include "iwheel/observation.h"
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/line.h"
@@ -104,7 +102,6 @@ static bool read_text(iwn_json_t object, const char *field, char *out_text, size
     return iwn_json_find(object, field, &value) && iwn_json_text(value, out_text, size);
 }
 
-/// Whether a field is this text.
 static bool is_text(iwn_json_t object, const char *field, const char *text) {
     iwn_json_t value;
     return iwn_json_find(object, field, &value) && iwn_json_is(value, text);

@@ -52,7 +52,6 @@ size_t gw_assumptions_file_write(const gw_stored_t *known, const char *bus, char
 bool gw_assumptions_file_read(const char *text, size_t length, const char *bus, gw_stored_t *out_known,
                               char out_reason[GW_ASSUMPTIONS_REASON_SIZE]);
 
-/// The name of the file for this bus.
 void gw_assumptions_file_name(const char *bus, char *out_name, size_t size);
 
 /// What measuring can give. What was stored is held to the same: a file whose checksum is right can still hold what no

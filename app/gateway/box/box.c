@@ -4,7 +4,6 @@
 #include "disk/box_files.h"
 #include "sockets/log.h"
 
-#include "iwheel/gateway.h"
 #include "iwheel_linux/clock.h"
 #include "iwheel_northbound/words.h"
 

@@ -2,7 +2,6 @@
 #include "wheels.h"
 
 #include "iwheel_linux/clock.h"
-#include "iwheel_northbound/words.h"
 
 #include <string.h>
 

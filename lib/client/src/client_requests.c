@@ -89,7 +89,6 @@ iwc_result_t iwc_send(iwc_t *self, const char *request, int timeout_ms, int64_t 
     return send_as(self, request, id, iwc_deadline_us(timeout_ms));
 }
 
-/// Reads until the reply to `self->awaited` is there.
 static iwc_result_t await_answer(iwc_t *self, int64_t deadline_us) {
     for (;;) {
         iwc_result_t result = iwc_fill(self);
@@ -139,8 +138,6 @@ bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply) {
     out_reply->id = iwc_integer(out_reply, "id").value;
     return true;
 }
-
-// ---- composing ----------------------------------------------------------------------------------------------------
 
 /// Room for the longest request of ours: `estop` with a reason that is escaped throughout.
 #define TEXT_SIZE        640U

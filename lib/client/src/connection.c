@@ -66,8 +66,6 @@ const char *iwc_words(iwc_result_t result) {
     return (index < sizeof words / sizeof words[0]) ? words[index] : "";
 }
 
-// ---- waiting, reading, writing ------------------------------------------------------------------------------------
-
 iwc_result_t iwc_await(const iwc_t *self, short events, int64_t deadline_us) {
     const int64_t now_us = iwc_now_us();
     const int64_t left_us = (deadline_us > now_us) ? deadline_us - now_us : 0;
@@ -143,8 +141,6 @@ iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadl
     }
     return IWC_OK;
 }
-
-// ---- connecting ---------------------------------------------------------------------------------------------------
 
 static void begin(iwc_t *self) {
     iwc_close(self);
@@ -274,8 +270,6 @@ iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
     return (result == IWC_OK) ? greet(self, deadline_us) : result;
 }
 
-// ---- what there is to know ----------------------------------------------------------------------------------------
-
 int iwc_fd(const iwc_t *self) {
     return self->fd;
 }
@@ -321,8 +315,6 @@ void iwc_let_in(iwc_t *self, const sigset_t *mask) {
         self->let_in = &self->mask;
     }
 }
-
-// ---- messages -----------------------------------------------------------------------------------------------------
 
 iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
     const int64_t deadline_us = iwc_deadline_us(timeout_ms);

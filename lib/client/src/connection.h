@@ -64,7 +64,6 @@ iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadl
 /// Ends the connection with that result. What came before stays.
 void iwc_end(iwc_t *self, iwc_result_t result);
 
-/// Keeps name and words of a refusal.
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
 
 /// Sends a request that stops through a connection of its own, by one socket of the gateway or the other: client_stop.c.

@@ -16,7 +16,6 @@ bool iwc_json_is_object(const char *text, size_t length) {
     return iwn_json_check(text, length, &work, &root, &fault) && iwn_json_kind(root) == IWN_JSON_OBJECT;
 }
 
-/// The value of one key.
 static iwc_span_t find_key(iwc_span_t object, const char *key, size_t length) {
     iwn_json_t rest = {object.at + 1};
     iwn_json_t name;

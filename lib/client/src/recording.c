@@ -2,23 +2,14 @@
 // Recordings, in pieces that are checked.
 #include "connection.h"
 
+#include "iwheel_northbound/line.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
 /// Of a name: the gateway takes no longer one.
 #define NAME_MAX_BYTES 63U
-
-static uint32_t crc32_of(uint32_t before, const uint8_t *bytes, size_t length) {
-    uint32_t crc = ~before;
-    for (size_t i = 0; i < length; i++) {
-        crc ^= bytes[i];
-        for (unsigned bit = 0; bit < 8U; bit++) {
-            crc = (crc >> 1U) ^ (((crc & 1U) != 0U) ? 0xEDB88320U : 0U);
-        }
-    }
-    return ~crc;
-}
 
 /// 0..63; 64: no digit of base64.
 static uint32_t digit(char c) {
@@ -73,12 +64,12 @@ bool iwc_piece_take(const iwc_message_t *reply, void *out, iwc_piece_t *piece) {
     piece->size = iwc_integer(reply, "size").value;
     if (!from.known || from.value != piece->next || !crc.known ||
         !decode((iwc_span_t){data, length}, (uint8_t *)out, &piece->length) ||
-        crc.value != crc32_of(0, (const uint8_t *)out, piece->length)) {
+        crc.value != iwn_line_crc(0, out, piece->length)) {
         return false;
     }
     const bool goes_on = piece->length > 0U || piece->next == piece->size; // Else it would be asked for without end.
     piece->next += (int64_t)piece->length;
-    piece->crc32 = crc32_of(piece->crc32, (const uint8_t *)out, piece->length);
+    piece->crc32 = iwn_line_crc(piece->crc32, out, piece->length);
     return goes_on && piece->next <= piece->size && (!whole.known || whole.value == piece->crc32);
 }
 

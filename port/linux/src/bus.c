@@ -6,7 +6,6 @@
 #include <errno.h>
 #include <net/if.h>
 #include <string.h>
-#include <sys/socket.h>
 
 /// Frames of unknown ids taken at once, after those of known ids, and how often: a full bus brings fewer in that time.
 #define OTHERS_AT_ONCE  256U

@@ -44,7 +44,6 @@ void iwl_gpio_note(iwl_estop_seen_t *out_seen, const char *chip, const char *lin
 /// Copies where the line is.
 void iwl_gpio_place(iwl_estop_seen_t *out_seen, const char *node, unsigned offset);
 
-/// Whether the line is called as the address expects.
 bool iwl_gpio_is_expected(const iwl_gpio_address_t *address, const iwl_estop_seen_t *seen);
 void iwl_gpio_line_close(iwl_gpio_line_t *self);
 

@@ -5,7 +5,6 @@
 #include "unix_link.h"
 
 #include <errno.h>
-#include <sys/socket.h>
 
 typedef struct {
     iwl_bus_t bus;

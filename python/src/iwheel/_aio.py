@@ -279,9 +279,7 @@ class AsyncGateway:
         self._kept = True
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._kept = False
         self.close()
 
@@ -347,9 +345,7 @@ class AsyncGateway:
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found, how=how)))
 
-    async def config(
-        self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None
-    ) -> Configured:
+    async def config(self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None) -> Configured:
         """As `Gateway.config`."""
         wanted = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Configured, without_envelope(await self._ask("config", key=key, value=wanted, commit=commit)))
@@ -487,9 +483,7 @@ class _Arming:
             raise
         return self._armed
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         assert self._armed is not None
         await self._armed.__aexit__(kind, error, trace)
 
@@ -506,9 +500,7 @@ class AsyncArmed:
         stream.arms += 1
         self._number = stream.arms
 
-    async def drive(
-        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None
-    ) -> Applied:
+    async def drive(self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None) -> Applied:
         fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
         return await self._command("drive", fields)
 
@@ -551,9 +543,7 @@ class AsyncArmed:
     async def __aenter__(self) -> AsyncArmed:
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if kind is GeneratorExit:  # Its task was dropped: no wait is possible any more.
             self._end("its block was dropped")
             self._stream.close()

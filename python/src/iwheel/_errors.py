@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 
-
 class IWheelError(Exception):
     """The base of everything this package raises, beside programming errors."""
 

@@ -64,9 +64,7 @@ class Gateway:
         self._kept = True
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._kept = False
         self.close()
 
@@ -163,9 +161,7 @@ class Gateway:
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
 
-    def config(
-        self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None
-    ) -> Configured:
+    def config(self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None) -> Configured:
         """The configuration of a gateway that keeps it itself (a board, docs/serial.md); a daemon's is its file, and it raises Refused.
 
         Alone it reads; with `key` (`drive.lease_ms`) and `value` it stages that; with `commit` True it writes what is staged, after
@@ -334,9 +330,7 @@ class Armed:
         connection.arms += 1
         self._number = connection.arms
 
-    def drive(
-        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None
-    ) -> Applied:
+    def drive(self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None) -> Applied:
         """Sets both wheels' speed. The currents may be left out, both, unless the configuration says current_role = setpoint."""
         fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
         return self._command("drive", fields)
@@ -383,9 +377,7 @@ class Armed:
     def __enter__(self) -> Armed:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         trouble = "one of them still turns"
         at_rest = False
         try:

@@ -144,6 +144,7 @@ def measure(pair, client_type, rounds=3, seconds=6.0):
 
 def rows(taken):
     """(metric, figure, goal)"""
+
     def middle(who, key):
         return statistics.median(figures[key] for figures in taken[who])
 
@@ -154,7 +155,11 @@ def rows(taken):
         if hostile:
             yield (f"one who floods, {watchers} watchers: gap p99 added", f"{gap_us / 1000:+.2f} ms", "≤ 1 ms")
         elif watchers == MANY:
-            yield (f"{watchers} watching everything at 100 Hz, frames too: gap p99 added, processor in all", f"{gap_us / 1000:+.2f} ms, {share:.1%}", "≤ 1 ms, ≤ 8%")
+            yield (
+                f"{watchers} watching everything at 100 Hz, frames too: gap p99 added, processor in all",
+                f"{gap_us / 1000:+.2f} ms, {share:.1%}",
+                "≤ 1 ms, ≤ 8%",
+            )
         elif watchers:
             yield (f"{watchers} watching at 50 Hz: gap p99 added, processor for each", f"{gap_us / 1000:+.2f} ms, {share / watchers:.2%}", "≤ 1 ms, linear")
 

@@ -45,8 +45,12 @@ def get_packages():
     missing = sorted({package for program, package in PACKAGES.items() if not have(program)})
     if missing and os.geteuid() == 0 and have("apt-get"):
         print(f"installing: apt-get install -y --no-install-recommends {' '.join(missing)}")
-        subprocess.run(["apt-get", "-qq", "install", "-y", "--no-install-recommends", *missing], stdout=subprocess.DEVNULL, check=False,
-                       env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"})
+        subprocess.run(
+            ["apt-get", "-qq", "install", "-y", "--no-install-recommends", *missing],
+            stdout=subprocess.DEVNULL,
+            check=False,
+            env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"},
+        )
     for program, package in PACKAGES.items():
         if not have(program):
             print(f"left out: {program} ({package} is not installed)")
@@ -103,8 +107,7 @@ def measure(build, wish, measures=ALL, candidates=None, limit_s=LIMIT_S, show=pr
         folder = Path(name)
         build_tools(folder)
         peers = get_python_can(folder / "peers") if candidates is None else ""
-        plan = {**wish, "guest": str(HERE / "guest.py"), "build": str(Path(build).resolve()), "tools": name, "peers": peers,
-                "measures": list(measures)}
+        plan = {**wish, "guest": str(HERE / "guest.py"), "build": str(Path(build).resolve()), "tools": name, "peers": peers, "measures": list(measures)}
         plan |= {"candidates": list(candidates)} if candidates else {}
         for result in play(kernel, folder, plan, limit_s):
             show(result)
@@ -117,7 +120,14 @@ def measure(build, wish, measures=ALL, candidates=None, limit_s=LIMIT_S, show=pr
 
 # ---- rows ---------------------------------------------------------------------------------------------------------
 
-NAMES = {"bcm": "CAN_BCM", "looks": "leanest that looks", "driving": "gateway that drives", "attended": "gateway beside a client", "python_can": "python-can", "gpiomon": "gpiomon and cansend"}
+NAMES = {
+    "bcm": "CAN_BCM",
+    "looks": "leanest that looks",
+    "driving": "gateway that drives",
+    "attended": "gateway beside a client",
+    "python_can": "python-can",
+    "gpiomon": "gpiomon and cansend",
+}
 
 
 def whole(taken, name):
@@ -154,10 +164,20 @@ def period_rows(taken):
     for name, words in (("period_idle", "a quiet bus"), ("period_loaded", "617 frames/s of telemetry")):
         if whole(taken, name):
             of = taken[name]
-            yield row(f"setpoint period, deviation p50, {words}", us(middle(of["floor"], "p50")), times(ratio(of, "gateway", "p50")),
-                      peers_of(of, lambda c, of=of: times(ratio(of, c, "p50"))), "≤ 1.6 ×")
-            yield row(f"its mean error, {words}", f"{middle(of['floor'], 'ppm'):.0f} ppm", f"{middle(of['gateway'], 'ppm'):.0f} ppm",
-                      peers_of(of, lambda c, of=of: f"{middle(of[c], 'ppm'):.0f} ppm"), "≤ 100 ppm")
+            yield row(
+                f"setpoint period, deviation p50, {words}",
+                us(middle(of["floor"], "p50")),
+                times(ratio(of, "gateway", "p50")),
+                peers_of(of, lambda c, of=of: times(ratio(of, c, "p50"))),
+                "≤ 1.6 ×",
+            )
+            yield row(
+                f"its mean error, {words}",
+                f"{middle(of['floor'], 'ppm'):.0f} ppm",
+                f"{middle(of['gateway'], 'ppm'):.0f} ppm",
+                peers_of(of, lambda c, of=of: f"{middle(of[c], 'ppm'):.0f} ppm"),
+                "≤ 100 ppm",
+            )
 
 
 def flood_rows(taken):
@@ -166,26 +186,46 @@ def flood_rows(taken):
     of = taken["flood"]
     lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
     yield row("21 000 frames/s: lost", f"{lost['floor']:.1%}", f"{lost['gateway']:.1%}", peers_of(of, lambda c: f"{lost[c]:.1%}"), "0")
-    yield row("21 000 frames/s: processor time", "1 ×", times(ratio(of, "gateway", "processor_ns")), peers_of(of, lambda c: times(ratio(of, c, "processor_ns"))),
-              "≤ 1.8 ×")
+    yield row(
+        "21 000 frames/s: processor time",
+        "1 ×",
+        times(ratio(of, "gateway", "processor_ns")),
+        peers_of(of, lambda c: times(ratio(of, c, "processor_ns"))),
+        "≤ 1.8 ×",
+    )
 
 
 def loaded_flood_rows(taken):
     if whole(taken, "flood_loaded"):
         of = taken["flood_loaded"]
         lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
-        yield row("21 000 frames/s beside four programs that compute: lost", f"{lost['floor']:.1%}", f"{lost['gateway']:.1%}",
-                  peers_of(of, lambda c: f"{lost[c]:.1%}"), "0")
+        yield row(
+            "21 000 frames/s beside four programs that compute: lost",
+            f"{lost['floor']:.1%}",
+            f"{lost['gateway']:.1%}",
+            peers_of(of, lambda c: f"{lost[c]:.1%}"),
+            "0",
+        )
 
 
 def call_rows(taken):
     if whole(taken, "calls"):
         of = dict(taken["calls"])
         if "driving" in of:
-            yield row("617 frames/s: system calls for a frame, driving", "--", f"{middle(of.pop('driving'), 'per_frame'):.2f}",
-                      peers_of({c: of[c] for c in of if c != "attended"}, lambda c: f"{middle(of[c], 'per_frame'):.2f}"), "≤ 2.5")
-        yield row("617 frames/s: system calls for a frame, no client", "--", f"{middle(of['gateway'], 'per_frame'):.2f}",
-                  peers_of(of, lambda c: f"{middle(of[c], 'per_frame'):.2f}"), "≤ 2.5")
+            yield row(
+                "617 frames/s: system calls for a frame, driving",
+                "--",
+                f"{middle(of.pop('driving'), 'per_frame'):.2f}",
+                peers_of({c: of[c] for c in of if c != "attended"}, lambda c: f"{middle(of[c], 'per_frame'):.2f}"),
+                "≤ 2.5",
+            )
+        yield row(
+            "617 frames/s: system calls for a frame, no client",
+            "--",
+            f"{middle(of['gateway'], 'per_frame'):.2f}",
+            peers_of(of, lambda c: f"{middle(of[c], 'per_frame'):.2f}"),
+            "≤ 2.5",
+        )
 
 
 def latency_rows(taken):
@@ -197,8 +237,13 @@ def latency_rows(taken):
     for name, words, parts in wanted:
         for key, goal in parts if whole(taken, name) else ():
             of = taken[name]
-            yield row(f"{words}, {key}", us(middle(of["floor"], key)), times(ratio(of, "gateway", key)),
-                      peers_of(of, lambda c, of=of, key=key: times(ratio(of, c, key))), goal)
+            yield row(
+                f"{words}, {key}",
+                us(middle(of["floor"], key)),
+                times(ratio(of, "gateway", key)),
+                peers_of(of, lambda c, of=of, key=key: times(ratio(of, c, key))),
+                goal,
+            )
 
 
 def rows(taken):

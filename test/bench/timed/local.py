@@ -31,8 +31,20 @@ class Local:
     def __init__(self, pair, tools):
         self.pair, self.tools = pair, Path(tools)
         self.bus = f"unix:{pair.folder}/floor-bus"
-        self.wheels = subprocess.Popen([pair.build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", "--can", self.bus,
-                                        "--estop", f"{pair.folder}/floor-estop", "--control", f"{pair.folder}/floor-control"])
+        self.wheels = subprocess.Popen(
+            [
+                pair.build / "app/sim/iwheel-sim",
+                "--quiet",
+                "--uptime",
+                "120",
+                "--can",
+                self.bus,
+                "--estop",
+                f"{pair.folder}/floor-estop",
+                "--control",
+                f"{pair.folder}/floor-control",
+            ]
+        )
         wait_for(Path(self.bus[5:]))
 
     def end(self):
@@ -138,8 +150,11 @@ def measure(pair, client_type, tools, rounds=ROUNDS):
 
 def rows(taken):
     """(metric, figure, goal): medians of the rounds' ratios to the floor."""
-    for name, key, words, goal in (("period", "p50", "setpoint period, deviation p50", "≤ 1.4 ×"), ("line", "p50", "client's line to frame on the bus, p50", "≤ 1.2 ×"),
-                                   ("line", "p90", "client's line to frame on the bus, p90", "≤ 1.4 ×")):
+    for name, key, words, goal in (
+        ("period", "p50", "setpoint period, deviation p50", "≤ 1.4 ×"),
+        ("line", "p50", "client's line to frame on the bus, p50", "≤ 1.2 ×"),
+        ("line", "p90", "client's line to frame on the bus, p90", "≤ 1.4 ×"),
+    ):
         of = taken[name]
         if of["floor"]:
             ratio = statistics.median(mine[key] / max(floor[key], 0.5) for mine, floor in zip(of["gateway"], of["floor"], strict=True))

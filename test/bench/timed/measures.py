@@ -357,7 +357,9 @@ class Line(Measure):
 
     def cansend(self):
         count = max(self.plan["count"] // 5, 5)
-        return self.judge(self.around.tool("ask_program", self.around.interface, count, "cansend", self.around.interface, "10A#0100640000", piped=True).text(120))
+        return self.judge(
+            self.around.tool("ask_program", self.around.interface, count, "cansend", self.around.interface, "10A#0100640000", piped=True).text(120)
+        )
 
     def gateway(self):
         self.around.start_gateway()
@@ -399,9 +401,7 @@ class Told(Line):
         self.around.start_gateway()
         try:
             watch = '{"id":1,"cmd":"watch","topics":["frame"]}'
-            return self.judge(
-                self.around.tool("ask_frame", self.around.interface, self.plan["count"], self.around.socket, watch, piped=True).text(120)
-            )
+            return self.judge(self.around.tool("ask_frame", self.around.interface, self.plan["count"], self.around.socket, watch, piped=True).text(120))
         finally:
             self.around.end_gateway()
 
@@ -511,4 +511,14 @@ class Estop(Measure):
             self.around.end_gateway()
 
 
-MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "flood_loaded": FloodLoaded, "pair": Pair, "calls": Calls, "line": Line, "told": Told, "estop": Estop}
+MEASURES = {
+    "period_idle": Period,
+    "period_loaded": PeriodLoaded,
+    "flood": Flood,
+    "flood_loaded": FloodLoaded,
+    "pair": Pair,
+    "calls": Calls,
+    "line": Line,
+    "told": Told,
+    "estop": Estop,
+}

@@ -28,8 +28,12 @@ class Started:
         self.words = list(map(str, command))
         self.errors = open(os.path.join(folder, f"{os.path.basename(self.words[0])}.err"), "ab")  # noqa: SIM115
         self.child = subprocess.Popen(
-            self.words, stdin=standard_input or subprocess.DEVNULL, stdout=subprocess.PIPE if piped else subprocess.DEVNULL,
-            stderr=self.errors, env=environment, preexec_fn=as_a_service if served else None
+            self.words,
+            stdin=standard_input or subprocess.DEVNULL,
+            stdout=subprocess.PIPE if piped else subprocess.DEVNULL,
+            stderr=self.errors,
+            env=environment,
+            preexec_fn=as_a_service if served else None,
         )
 
     def text(self, within_s):
@@ -85,8 +89,7 @@ class Surroundings:
 
     def python_can(self, *arguments):
         environment = {**os.environ, "PYTHONPATH": self.plan["peers"]}
-        return Started([sys.executable, os.path.join(HERE, "python_can_peer.py"), *arguments], self.folder, environment=environment, piped=True,
-                       served=True)
+        return Started([sys.executable, os.path.join(HERE, "python_can_peer.py"), *arguments], self.folder, environment=environment, piped=True, served=True)
 
     def built(self, folder, name, *arguments, **options):
         return Started([os.path.join(self.plan["build"], "app", folder, name), *arguments], self.folder, **options)
@@ -96,8 +99,19 @@ class Surroundings:
         with open("pace", "w", encoding="ascii") as file:
             file.write(f"at 0 slow {slow}\n")
         self.wheels = self.built(
-            "sim", "iwheel-sim", "--quiet", "--uptime", "120", "--can", self.interface, "--estop", f"{self.folder}/button",
-            "--control", f"{self.folder}/control", "--script", f"{self.folder}/pace"
+            "sim",
+            "iwheel-sim",
+            "--quiet",
+            "--uptime",
+            "120",
+            "--can",
+            self.interface,
+            "--estop",
+            f"{self.folder}/button",
+            "--control",
+            f"{self.folder}/control",
+            "--script",
+            f"{self.folder}/pace",
         )
 
     def end_wheels(self):
@@ -107,8 +121,9 @@ class Surroundings:
 
     def start_gateway(self, program=None, served=True):
         program = program or os.path.join(self.plan["build"], "app", "gateway", "iwheel-gateway")
-        self.gateway = Started([program, "-c", f"{self.folder}/gateway.conf", "--can", self.interface, "--socket", self.socket,
-                                "--log-level", "error"], self.folder, served=served)
+        self.gateway = Started(
+            [program, "-c", f"{self.folder}/gateway.conf", "--can", self.interface, "--socket", self.socket, "--log-level", "error"], self.folder, served=served
+        )
         client = self.client()
         client.request("hello")
         client.close()

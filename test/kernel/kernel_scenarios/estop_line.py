@@ -437,5 +437,3 @@ def row11_without_rights(t):
         if not one_press(t, rig, client, client, chance):
             break
     t.judge(rig)
-
-

@@ -323,9 +323,14 @@ def restart_as_the_unit_does(t, interface):
 
 def told_by_the_tool(t, rig):
     """What `iwheelctl why` and `doctor` say of it, in one text each."""
+
     def ask(*words):
-        return " ".join(subprocess.run([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), *words], text=True,
-                                       stdin=subprocess.DEVNULL, capture_output=True, check=False).stdout.split())
+        return " ".join(
+            subprocess.run(
+                [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), *words], text=True, stdin=subprocess.DEVNULL, capture_output=True, check=False
+            ).stdout.split()
+        )
+
     return {"why": ask("why"), "doctor": ask("doctor", "--no-press", "--listen", "300ms"), "status": ask("status")}
 
 
@@ -399,8 +404,7 @@ def power_cut(t, setup):
     t.arm(client)
     stream = Streamer(client, 800, 800, 0.02)
     time.sleep(1.0)
-    fault_us = fault(rig, lambda: (netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "block"),
-                                   rig.sim.ask("power off")), 120)
+    fault_us = fault(rig, lambda: (netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "block"), rig.sim.ask("power off")), 120)
     time.sleep(0.3)
     stream.stop()
     why = client.request("why")

@@ -10,7 +10,17 @@ from boot import HERE
 from catalogue import kernel_test
 
 # The rig itself with a planted late gateways and an adapter, driving, a crash, a lost line.
-INSIDE = ("plumbing_vcan", "plumbing_discipline", "plumbing_gpio", "plumbing_slcan", "plumbing_late_gateway", "plumbing_gateway_halted", "vcan_nominal", "vcan_row25_killed", "row14_")
+INSIDE = (
+    "plumbing_vcan",
+    "plumbing_discipline",
+    "plumbing_gpio",
+    "plumbing_slcan",
+    "plumbing_late_gateway",
+    "plumbing_gateway_halted",
+    "vcan_nominal",
+    "vcan_row25_killed",
+    "row14_",
+)
 LIMIT_S = 300
 LAST_WORDS = 1500
 

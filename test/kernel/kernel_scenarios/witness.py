@@ -9,10 +9,9 @@ import time
 from can_bus import FRAME, open_raw
 from catalogue import Entry, kernel_test
 from client import Streamer
-from guest_run import GuestRun, run_one
+from guest_run import GuestRun, attempt_of, run_one
 from judge_log import LEFT, RIGHT
 from kernel_rig import ESTOP_US, LEVEL_US, PRESS_LATE_US, TICK_US, VcanRig, machine_late
-from runner import attempt_of
 from scenario import Skip
 from verdict import FAILED, INCONCLUSIVE, RETRIES
 

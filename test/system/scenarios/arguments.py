@@ -34,9 +34,7 @@ def arguments(t):
     recorded = os.path.isdir(DEFAULT_DIRECTORY)
     for program in ("iwheel-gateway", "iwheelctl", "iwheel-sim"):
         code, text = call(rig, program, "--help")
-        t.check(
-            code == 0 and program in text and len(text.splitlines()) >= 8, f"{program} --help: {code}, {text[:100]!r}"
-        )
+        t.check(code == 0 and program in text and len(text.splitlines()) >= 8, f"{program} --help: {code}, {text[:100]!r}")
         t.check(max(map(len, text.splitlines())) <= 120, f"{program} --help has lines over 120 columns")
         code, text = call(rig, program, "--version")
         t.check(
@@ -73,9 +71,7 @@ def arguments(t):
     ]
     for program, words, expected in cases:
         code, text = call(rig, program, *words)
-        t.check(
-            code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}"
-        )
+        t.check(code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}")
         t.check(len(text) > 15, f"{program} {words} says nothing")
     code, text = call(
         rig,
@@ -161,9 +157,7 @@ def closed_streams(t):
     for program in built(rig):
         pipe = closed_pipe()
         for words, code in ((("--nonsense",), USAGE), (("--version",), 0), (("--help",), 0)):
-            done = subprocess.run(
-                [rig.program(program), *words], stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, timeout=5, check=False
-            )
+            done = subprocess.run([rig.program(program), *words], stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, timeout=5, check=False)
             t.check(done.returncode == code, f"{program} {words}: {done.returncode}, not {code}")
         os.close(pipe)
     if "iwheel-fleet" in built(rig):

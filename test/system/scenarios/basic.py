@@ -28,9 +28,7 @@ def nominal_drive_and_turn(t):
     )
     t.drive_for(client, -200, 200, 1.2)
     status = client.request("status")
-    t.check(
-        status["left"]["speed_mm_s"] < -150 and status["right"]["speed_mm_s"] > 150, "the machine turns on the spot"
-    )
+    t.check(status["left"]["speed_mm_s"] < -150 and status["right"]["speed_mm_s"] > 150, "the machine turns on the spot")
     t.expect(client.request("stop"))
     t.check(client.request("status")["state"] == "stopping", "stop leads to stopping")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again after the hold")
@@ -100,11 +98,7 @@ def other_configuration(t):
         refusal = refusal or (None if reply["ok"] else reply)
         time.sleep(0.05)
     t.check(refusal is None, f"drive with currents: {refusal}")
-    left = [
-        frame
-        for frame in rig.bus.frames
-        if frame.id == 266 and frame.data[1:3] == (-300).to_bytes(2, "big", signed=True)
-    ]
+    left = [frame for frame in rig.bus.frames if frame.id == 266 and frame.data[1:3] == (-300).to_bytes(2, "big", signed=True)]
     t.check(
         left and all(frame.data[3:5] == (-1000).to_bytes(2, "big", signed=True) for frame in left[2:]),
         "speed and current are negated for the mirrored wheel",
@@ -119,10 +113,7 @@ def force_offset_and_tare(t):
     rig, client = t.running()
     status = rig.wait_status(
         client,
-        lambda s: all(
-            s[side]["offset_provenance"] == "wheel" and s[side]["force_validity"] == "valid"
-            for side in ("left", "right")
-        ),
+        lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_validity"] == "valid" for side in ("left", "right")),
         6,
     )
     if not t.check(

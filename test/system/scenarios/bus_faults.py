@@ -34,11 +34,7 @@ def power_cut(t, seconds, speed):
     rig.fault("power off", within_ms=70)
     time.sleep(0.3)
     stream.stop()
-    why = (
-        t.stopped_by(client, "wheel_lost")
-        if client.request("why")["cause"] != "send_stalled"
-        else t.stopped_by(client, "send_stalled")
-    )
+    why = t.stopped_by(client, "wheel_lost") if client.request("why")["cause"] != "send_stalled" else t.stopped_by(client, "send_stalled")
     refusal = client.request("reset")
     t.check(not refusal["ok"], "reset waits until the wheels are heard")
     time.sleep(seconds - 0.4)
@@ -129,9 +125,7 @@ def row19_second_master_listening(t):
         if end - time.monotonic() < 0.9:  # after the first frames were surely seen
             t.expect(client.arm(), "second_master")
     t.check(client.request("status")["state"] == "listening", "it is an event, not a latch")
-    t.check(
-        any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes"
-    )
+    t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
     t.rule(not rig.bus.setpoints(), "nothing is sent")
     time.sleep(1.1)
     t.arm(client)
@@ -218,9 +212,7 @@ def row15_bus_gone(t):
     back_us = now_us()
     rig.note("alive")
     t.check(
-        rig.wait_status(
-            client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6
-        ),
+        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6),
         "found again",
     )
     wait_reset(t, client)

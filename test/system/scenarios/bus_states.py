@@ -19,9 +19,7 @@ from .process import driving
 
 def drive_again(t, rig, client, seconds=8):
     """Both wheels are heard, reset is accepted, nothing moves by itself, and it drives."""
-    heard = rig.wait_status(
-        client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds
-    )
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds)
     if not t.check(heard, f"heard again: {client.request('status')['bus']}"):
         return
     wait_reset(t, client)

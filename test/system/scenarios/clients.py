@@ -28,9 +28,7 @@ def row01_client_killed(t):
     killed_us = now_us()
     rig.timeline.append(Event(killed_us, "gone"))
     process.signal(signal.SIGKILL)
-    ms = (
-        t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
-    )
+    ms = t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "client_gone", "stopping")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
@@ -98,17 +96,13 @@ def row04_two_clients(t):
     t.expect(refusal, "busy")
     t.check("first" in refusal.get("message", ""), f"busy tells who: {refusal.get('message')}")
     refusal = second.arm(takeover=True)
-    t.check(
-        not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"no hand-over in motion: {refusal}"
-    )
+    t.check(not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"no hand-over in motion: {refusal}")
     before = len([1 for _, _, speed in rig.bus.setpoints() if speed == 0])
     time.sleep(0.3)
     t.check(len([1 for _, _, speed in rig.bus.setpoints() if speed == 0]) == before, "the owner is undisturbed")
     stream.target = (0, 0)
     t.check(
-        rig.wait_status(
-            second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4
-        ),
+        rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4),
         "at rest",
     )
     time.sleep(0.6)

@@ -212,9 +212,7 @@ def row05_watchers_and_recordings(t):
                 pass
         sock.close()
 
-    threads = [
-        threading.Thread(target=read_recording, args=(rig.path("watch.sock"), name, pieces, over)) for _ in range(2)
-    ]
+    threads = [threading.Thread(target=read_recording, args=(rig.path("watch.sock"), name, pieces, over)) for _ in range(2)]
     threads += [threading.Thread(target=flood) for _ in range(4)]
     t.arm(owner)
     stream = Streamer(owner, 300, 300)
@@ -306,9 +304,7 @@ def row33_stop_never_refused(t):
     worst = 0
     for kind in ("idle", "poll", "reconnect"):
         crowd = Crowd(paths, {paths[0]: 1}, kind == "poll")
-        floods = [
-            subprocess.Popen([sys.executable, "-c", RECONNECT, path]) for path in (paths if kind == "reconnect" else ())
-        ]
+        floods = [subprocess.Popen([sys.executable, "-c", RECONNECT, path]) for path in (paths if kind == "reconnect" else ())]
         time.sleep(0.4)
         try:
             for path in paths:

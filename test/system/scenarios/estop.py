@@ -47,9 +47,7 @@ def presses(t, seed):
             f"press {number}: {status['state']}, {status['cause']}",
         )
         refusal = stream.stop() or client.drive(300, 300)
-        t.check(
-            refusal.get("error") in ("latched", "estop_pressed"), f"press {number}: drive after the press: {refusal}"
-        )
+        t.check(refusal.get("error") in ("latched", "estop_pressed"), f"press {number}: drive after the press: {refusal}")
         t.expect(pusher.request("reset"), "estop_pressed")
         rig.release()
         time.sleep(chance.uniform(0.0, 0.05))
@@ -93,9 +91,7 @@ def row13_pressed_at_start(t):
     rig.start_gateway(wheels=False)
     client = rig.client()
     t.check(
-        rig.wait_status(
-            client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3
-        ),
+        rig.wait_status(client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3),
         "latched from the start",
     )
     t.stopped_by(client, "estop_line")

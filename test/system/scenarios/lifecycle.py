@@ -31,9 +31,7 @@ def crash(t, number):
     again = rig.bus.setpoints(killed_us + 20_000)
     t.check(again and again[0][0] - killed_us < 600_000, "zeros soon after the restart")
     t.rule(not any(speed for _, _, speed in again), f"nothing but zeros after the restart: {again[:3]}")
-    t.figure(
-        f"answers after {answered_ms:.0f} ms, zeros {(again[0][0] - killed_us) / 1000 if again else 0:.0f} ms after the kill"
-    )
+    t.figure(f"answers after {answered_ms:.0f} ms, zeros {(again[0][0] - killed_us) / 1000 if again else 0:.0f} ms after the kill")
     t.check(observer.request("status")["cause"] == "restart", "the cause is the restart")
     t.expect(observer.drive(300, 300), "not_armed")
     t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
@@ -145,9 +143,7 @@ def ended_by(t, number):
     stream.stop()
     t.check(code == 0, f"exit code {code}")
     zeros = [at for at, _, speed in rig.bus.setpoints(t_us) if speed == 0]
-    t.check(
-        zeros and zeros[-1] - zeros[0] >= 1_450_000, "zeros are held for zero_hold_ms, a second signal changes nothing"
-    )
+    t.check(zeros and zeros[-1] - zeros[0] >= 1_450_000, "zeros are held for zero_hold_ms, a second signal changes nothing")
     t.figure(f"exit after {(ended_us - t_us) / 1e6:.2f} s")
     t.check(not os.path.exists(rig.path("gateway.sock")), "the socket is removed")
     quiet_us = now_us()

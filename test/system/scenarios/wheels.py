@@ -75,9 +75,7 @@ def row22_blocked(t):
 
 def alone(t, fault, cure, within_ms, kind):
     """The right wheel alone does something else: the pair stops, and does not latch."""
-    rig, client, why = fault_while_driving(
-        t, fault, "pair_diverges", within_ms, kind=kind, state="stopping", side="right"
-    )
+    rig, client, why = fault_while_driving(t, fault, "pair_diverges", within_ms, kind=kind, state="stopping", side="right")
     rig.sim.ask(cure)
     largest = client.request("status")["pair"]
     t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is told: {largest}, {why['sentence']}")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The boards: which peripheral is where, and what is wired to the pins."""
+
 from unicorn import arm_const as arm
 
 from . import chip
@@ -9,7 +10,7 @@ from .lamp import Lamp
 BLOCK_SIZE = 0x400
 IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
 IRQ_SERIAL_RECEIVE, IRQ_SERIAL_TRANSMIT, IRQ_SERIAL = 16, 17, 38
-NO_DEVICE = None, (None, 0), None, None # Its clock is never on.
+NO_DEVICE = None, (None, 0), None, None  # Its clock is never on.
 
 
 class Board:
@@ -19,7 +20,7 @@ class Board:
     pins = {"estop": ("port_b", 0), "button": ("port_a", 1)}
     uart_pins, can_pairs = ("port_a", 3, 2), {"PB8": ("port_b", 8, 9), "PA11": ("port_a", 11, 12)}
     ports = ("port_a", "port_b", "port_c", "port_d")
-    without_interrupts = {*ports, "watchdog", "uart"} # For those of the serial port the code does not wait.
+    without_interrupts = {*ports, "watchdog", "uart"}  # For those of the serial port the code does not wait.
 
     def __init__(self, transceiver="PB8", crystal_hz=None):
         self.transceiver, self.crystal_hz = self.can_pairs[transceiver], crystal_hz
@@ -34,20 +35,29 @@ class Board:
             setattr(machine, name, self.port())
         machine.can = Controller(machine)
         machine.bus = Bus(machine, seed)
-        machine.can_listens = False # Clocked and on its pins.
+        machine.can_listens = False  # Clocked and on its pins.
         machine.lamp = Lamp(*self.lamp)
         self.machine = machine
-        self.drive("estop", 0) # The contact is closed.
+        self.drive("estop", 0)  # The contact is closed.
         self.devices = {block: (name, clock, *self.accessors(name)) for block, (name, clock) in self.blocks.items()}
 
     def reset(self, machine):
         machine.bus.chip_vanishes()
-        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.dma, machine.flash, machine.can, *(getattr(machine, name) for name in self.ports)):
+        for part in (
+            machine.clocks,
+            machine.exti,
+            machine.watchdog,
+            machine.uart,
+            machine.dma,
+            machine.flash,
+            machine.can,
+            *(getattr(machine, name) for name in self.ports),
+        ):
             part.reset()
         self.remap = 0
         machine.can_listens = False
 
-    remap = 0 # AFIO_MAPR
+    remap = 0  # AFIO_MAPR
 
     def drive(self, what, level):
         """Something outside drives a pin; None: nothing but the pin's own pull-up does."""
@@ -69,15 +79,22 @@ class Board:
     def interrupts(self, machine):
         """The interrupts whose lines are up, each a bit."""
         lines = machine.can.lines()
-        return ((lines & 1) << IRQ_TRANSMIT | (lines >> 1 & 1) << IRQ_RECEIVE | (lines >> 2 & 1) << IRQ_ERROR | machine.exti.line() << IRQ_EXTI0
-                | machine.dma.receive.line() << IRQ_SERIAL_RECEIVE | machine.dma.transmit.line() << IRQ_SERIAL_TRANSMIT
-                | machine.uart.line() << IRQ_SERIAL)
+        return (
+            (lines & 1) << IRQ_TRANSMIT
+            | (lines >> 1 & 1) << IRQ_RECEIVE
+            | (lines >> 2 & 1) << IRQ_ERROR
+            | machine.exti.line() << IRQ_EXTI0
+            | machine.dma.receive.line() << IRQ_SERIAL_RECEIVE
+            | machine.dma.transmit.line() << IRQ_SERIAL_TRANSMIT
+            | machine.uart.line() << IRQ_SERIAL
+        )
 
     def connect_can(self):
         machine = self.machine
         port, rx, tx = self.transceiver
-        machine.can_listens = (getattr(machine, port).is_pair(rx, tx, 9) and self.is_mapped(self.transceiver)
-                               and machine.clocks.is_enabled(*self.blocks[self.can_address][1]))
+        machine.can_listens = (
+            getattr(machine, port).is_pair(rx, tx, 9) and self.is_mapped(self.transceiver) and machine.clocks.is_enabled(*self.blocks[self.can_address][1])
+        )
 
     def is_mapped(self, _):
         """The controller is led to these pins."""
@@ -95,8 +112,7 @@ class Board:
             "flash": (machine.flash.read, machine.flash.write),
             "exti": (lambda offset: machine.exti.registers[offset], machine.exti.write),
             "selection": (lambda offset: machine.exti.selection if offset == 0x8 else self.remap, self.write_selection),
-            "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns),
-                         lambda offset, value: watchdog.write(offset, value, machine.now_ns)),
+            "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns), lambda offset, value: watchdog.write(offset, value, machine.now_ns)),
             "uart": (machine.uart.read, machine.uart.write),
             "dma": (machine.dma.read, machine.dma.write),
             "can": (machine.can.read, machine.can.write),
@@ -138,7 +154,7 @@ class Board:
             write(offset, value)
         self.machine.touch()
         if name not in self.without_interrupts:
-            self.machine.clock.is_asked_to_stop = 1 # Other interrupts may come now.
+            self.machine.clock.is_asked_to_stop = 1  # Other interrupts may come now.
 
 
 class Stm32f103(Board):
@@ -147,10 +163,18 @@ class Stm32f103(Board):
     clocks, port, lamp, remap_offset = chip.ClocksF1, chip.PortF1, ("port_c", 13, 0), 0x4
     ram_size = 20 * 1024
     blocks = {
-        0x40021000: ("rcc", None), 0x40022000: ("flash", None), 0x40003000: ("watchdog", None),
-        0x40010000: ("selection", (0x18, 0)), 0x40010400: ("exti", None), 0x40010800: ("port_a", (0x18, 2)),
-        0x40010C00: ("port_b", (0x18, 3)), 0x40011000: ("port_c", (0x18, 4)), 0x40011400: ("port_d", (0x18, 5)),
-        0x40020000: ("dma", (0x14, 0)), 0x40004400: ("uart", (0x1C, 17)), 0x40006400: ("can", (0x1C, 25)),
+        0x40021000: ("rcc", None),
+        0x40022000: ("flash", None),
+        0x40003000: ("watchdog", None),
+        0x40010000: ("selection", (0x18, 0)),
+        0x40010400: ("exti", None),
+        0x40010800: ("port_a", (0x18, 2)),
+        0x40010C00: ("port_b", (0x18, 3)),
+        0x40011000: ("port_c", (0x18, 4)),
+        0x40011400: ("port_d", (0x18, 5)),
+        0x40020000: ("dma", (0x14, 0)),
+        0x40004400: ("uart", (0x1C, 17)),
+        0x40006400: ("can", (0x1C, 25)),
     }
 
     def is_mapped(self, transceiver):
@@ -165,10 +189,18 @@ class Stm32f407(Board):
     clocks, port, lamp = chip.ClocksF4, chip.PortF4, ("port_d", 12, 1)
     ram_size = 128 * 1024
     blocks = {
-        0x40023800: ("rcc", None), 0x40023C00: ("flash", None), 0x40003000: ("watchdog", None),
-        0x40013800: ("selection", (0x44, 14)), 0x40013C00: ("exti", None), 0x40020000: ("port_a", (0x30, 0)),
-        0x40020400: ("port_b", (0x30, 1)), 0x40020800: ("port_c", (0x30, 2)), 0x40020C00: ("port_d", (0x30, 3)),
-        0x40026000: ("dma", (0x30, 21)), 0x40004400: ("uart", (0x40, 17)), 0x40006400: ("can", (0x40, 25)),
+        0x40023800: ("rcc", None),
+        0x40023C00: ("flash", None),
+        0x40003000: ("watchdog", None),
+        0x40013800: ("selection", (0x44, 14)),
+        0x40013C00: ("exti", None),
+        0x40020000: ("port_a", (0x30, 0)),
+        0x40020400: ("port_b", (0x30, 1)),
+        0x40020800: ("port_c", (0x30, 2)),
+        0x40020C00: ("port_d", (0x30, 3)),
+        0x40026000: ("dma", (0x30, 21)),
+        0x40004400: ("uart", (0x40, 17)),
+        0x40006400: ("can", (0x40, 25)),
     }
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A bus at 1 Mbit/s with arbitration, acknowledgements and errors; the chip's controller on it; two wheels."""
+
 import ctypes
 import functools
 import math
@@ -14,20 +15,31 @@ LEFT, RIGHT = 266, 298
 
 
 class RawFrame(ctypes.Structure):
-    _fields_ = [("id", ctypes.c_uint32), ("extended", ctypes.c_uint8), ("remote", ctypes.c_uint8), ("dlc", ctypes.c_uint8),
-                ("data", ctypes.c_uint8 * 8)]
+    _fields_ = [("id", ctypes.c_uint32), ("extended", ctypes.c_uint8), ("remote", ctypes.c_uint8), ("dlc", ctypes.c_uint8), ("data", ctypes.c_uint8 * 8)]
 
 
 def load_model(path):
     library = ctypes.CDLL(str(path))
     pointer, number, frame = ctypes.c_void_p, ctypes.c_uint32, ctypes.POINTER(RawFrame)
     for name, result, arguments in (
-            ("create", pointer, [number]), ("reset", None, [pointer, number]), ("read", number, [pointer, number]),
-            ("write", None, [pointer, number, number]), ("is_on", ctypes.c_bool, [pointer]), ("recessive", None, [pointer, number]),
-            ("dominant", None, [pointer]), ("hold", None, [pointer, number, ctypes.c_bool]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]), ("slow_aborts", None, [pointer, number]),
-            ("end", None, [pointer, ctypes.c_int, ctypes.c_int]), ("hear", ctypes.c_bool, [pointer, frame]),
-            ("hear_error", None, [pointer]), ("lines", number, [pointer]), ("violation", ctypes.c_char_p, [pointer]),
-            ("overruns", number, [pointer])):
+        ("create", pointer, [number]),
+        ("reset", None, [pointer, number]),
+        ("read", number, [pointer, number]),
+        ("write", None, [pointer, number, number]),
+        ("is_on", ctypes.c_bool, [pointer]),
+        ("recessive", None, [pointer, number]),
+        ("dominant", None, [pointer]),
+        ("hold", None, [pointer, number, ctypes.c_bool]),
+        ("offer", ctypes.c_int, [pointer, frame]),
+        ("begin", None, [pointer, ctypes.c_int]),
+        ("slow_aborts", None, [pointer, number]),
+        ("end", None, [pointer, ctypes.c_int, ctypes.c_int]),
+        ("hear", ctypes.c_bool, [pointer, frame]),
+        ("hear_error", None, [pointer]),
+        ("lines", number, [pointer]),
+        ("violation", ctypes.c_char_p, [pointer]),
+        ("overruns", number, [pointer]),
+    ):
         function = getattr(library, f"bxcan_model_{name}")
         function.restype, function.argtypes = result, arguments
     return library
@@ -50,7 +62,7 @@ def length_bits(identifier, data, remote_dlc):
         last = bit
         if run == 5:
             stuffed, run, last = stuffed + 1, 1, 1 - bit
-    return len(body) + stuffed + 3 + 7 + 3 # Delimiters and acknowledgement, end of frame, space.
+    return len(body) + stuffed + 3 + 7 + 3  # Delimiters and acknowledgement, end of frame, space.
 
 
 @dataclass
@@ -59,25 +71,40 @@ class Frame:
     data: bytes
     time_ns: int = 0
     sender: str = ""
-    remote_dlc: int = None # A remote frame with this length, and no data.
+    remote_dlc: int = None  # A remote frame with this length, and no data.
 
     def bits(self):
         return length_bits(self.id, self.data, self.remote_dlc)
 
     def setpoint(self):
         """(speed in mm/s, current in mA) of a setpoint."""
-        return tuple(int.from_bytes(self.data[at:at + 2], "big", signed=True) for at in (1, 3))
+        return tuple(int.from_bytes(self.data[at : at + 2], "big", signed=True) for at in (1, 3))
 
 
 class Controller:
     """The chip's bxCAN: the model of the driver's host tests, and what BTR makes of the chip's clock."""
 
-    library = None # Set by the runner, see load_model.
+    library = None  # Set by the runner, see load_model.
 
     def __init__(self, machine):
         self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
-        for name in ("read", "write", "is_on", "recessive", "dominant", "hold", "offer", "begin", "end", "hear", "hear_error", "lines",
-                     "violation", "overruns", "slow_aborts"):
+        for name in (
+            "read",
+            "write",
+            "is_on",
+            "recessive",
+            "dominant",
+            "hold",
+            "offer",
+            "begin",
+            "end",
+            "hear",
+            "hear_error",
+            "lines",
+            "violation",
+            "overruns",
+            "slow_aborts",
+        ):
             setattr(self, name, functools.partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
 
     def reset(self):
@@ -101,7 +128,7 @@ class Controller:
         if mailbox < 0:
             return None, None
         self.machine.expect(not raw.extended and not raw.remote, "an extended or remote frame was sent")
-        return mailbox, Frame(raw.id, bytes(raw.data[:raw.dlc]), sender="chip")
+        return mailbox, Frame(raw.id, bytes(raw.data[: raw.dlc]), sender="chip")
 
     def deliver(self, frame):
         remote = frame.remote_dlc is not None
@@ -115,12 +142,12 @@ class Controller:
 class Wheel:
     """One wheel: telemetry at the document's periods, speed following its setpoint, its own watchdog of 1 s."""
 
-    side: int # 0 left, 1 right
+    side: int  # 0 left, 1 right
     phase_ns: int
     powered: bool = True
     speed_mm_s: float = 0.0
     target_mm_s: int = 0
-    heard_ns: int = -10**12
+    heard_ns: int = -(10**12)
     ticks: float = 0.0
     queue: list = field(default_factory=list)
     due: dict = field(default_factory=dict)
@@ -146,7 +173,7 @@ class Wheel:
 
     def speed(self, now_ns):
         target = self.target_mm_s if now_ns - self.heard_ns < 1000 * MS else 0
-        step = 8.0 # 2000 mm/s2 in 4 ms
+        step = 8.0  # 2000 mm/s2 in 4 ms
         self.speed_mm_s += max(-step, min(step, target - self.speed_mm_s))
         self.ticks += self.speed_mm_s * 0.004 / (2 * math.pi * 0.192 * 1000 / 60)
         rpm = round(self.speed_mm_s / (2 * math.pi * 192 / 60))
@@ -167,18 +194,18 @@ class Bus:
         self.wheels = [Wheel(side, chance.randrange(4 * MS)) for side in (0, 1)]
         for wheel in self.wheels:
             wheel.power(True, 0)
-        self.extra = []            # Frames of somebody else, sent once each.
-        self.flood = None          # A frame that somebody sends without end.
+        self.extra = []  # Frames of somebody else, sent once each.
+        self.flood = None  # A frame that somebody sends without end.
         self.flooded = 0
-        self.stuck = False         # Held dominant.
-        self.stuck_in_ours = False # ... since the middle of a frame of the chip.
-        self.cut = None            # Where the chip is cut off: "cable" (it still hears itself) or "receiver" (always recessive).
+        self.stuck = False  # Held dominant.
+        self.stuck_in_ours = False  # ... since the middle of a frame of the chip.
+        self.cut = None  # Where the chip is cut off: "cable" (it still hears itself) or "receiver" (always recessive).
         self.corrupt_chip = False  # What the chip sends is destroyed.
         self.acknowledge_chip = True
-        self.current = None        # (frame, mailbox or None, end)
+        self.current = None  # (frame, mailbox or None, end)
         self.idle_ns = 0
-        self.calm = False          # Nothing happens before what next_event_ns told last.
-        self.suspended_ns = 0      # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
+        self.calm = False  # Nothing happens before what next_event_ns told last.
+        self.suspended_ns = 0  # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
         times = [wheel.next_ns for wheel in self.wheels]
@@ -226,7 +253,7 @@ class Bus:
         for wheel in self.wheels:
             wheel.produce(now_ns)
             if self.cut:
-                wheel.queue.clear() # They go on among themselves.
+                wheel.queue.clear()  # They go on among themselves.
         if self.stuck:
             bits = (now_ns - self.idle_ns) // BIT_NS
             self.idle_ns += bits * BIT_NS
@@ -275,7 +302,7 @@ class Bus:
         else:
             done = self.finish_theirs(frame)
         if done:
-            frame.time_ns = end_ns - 10 * BIT_NS # Valid at the end of the frame's last-but-one bit, before the space.
+            frame.time_ns = end_ns - 10 * BIT_NS  # Valid at the end of the frame's last-but-one bit, before the space.
             self.log.append(Frame(frame.id, frame.data, frame.time_ns, frame.sender))
             for wheel in self.wheels:
                 wheel.hear(frame)
@@ -287,7 +314,7 @@ class Bus:
         understood = self.machine.can.understands() and not self.corrupt_chip and self.cut != "receiver"
         heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
         self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if heard else NO_ACKNOWLEDGEMENT)
-        if self.machine.can.read(0x18) & 2: # ESR.EPVF
+        if self.machine.can.read(0x18) & 2:  # ESR.EPVF
             self.suspended_ns = self.idle_ns + 8 * BIT_NS
         return understood and heard
 
@@ -310,5 +337,4 @@ class Bus:
 
     def setpoints(self, since_ns=0, until_ns=None):
         """What the chip has put on the bus."""
-        return [frame for frame in self.log
-                if frame.sender == "chip" and frame.time_ns >= since_ns and (until_ns is None or frame.time_ns <= until_ns)]
+        return [frame for frame in self.log if frame.sender == "chip" and frame.time_ns >= since_ns and (until_ns is None or frame.time_ns <= until_ns)]

@@ -5,7 +5,7 @@ What the reference manual forbids is written into `violations`: access to a bloc
 a bus clock beyond its limit, too few wait states. What is not modelled cannot be accessed.
 """
 
-US = 1000 # Times are nanoseconds.
+US = 1000  # Times are nanoseconds.
 MS = 1000 * US
 
 HSION, HSIRDY, HSEON, HSERDY, HSEBYP, CSSON, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 18, 19, 24, 25))
@@ -132,7 +132,7 @@ class ClocksF4(Clocks):
     apb1_reset_offset = 0x20
     pll_bits = 0
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 42_000_000, 84_000_000
-    reserved, reserved_value = 0xF << 28, 2 << 28 # Of PLLCFGR, kept as after reset.
+    reserved, reserved_value = 0xF << 28, 2 << 28  # Of PLLCFGR, kept as after reset.
 
     def pll_from_hse(self):
         return bool(self.pllcfgr >> 22 & 1)
@@ -308,7 +308,7 @@ class Uart:
 
     def reset(self):
         self.brr = self.cr1 = self.cr3 = 0
-        self.free_ns = self.came_ns = 0 # The transmitter is free; the next byte from outside is there.
+        self.free_ns = self.came_ns = 0  # The transmitter is free; the next byte from outside is there.
         self.idle_ns, self.flags, self.noisy, self.said_sr = None, 0, 0, False
 
     def send(self, text):
@@ -403,18 +403,20 @@ class DmaChannel:
         self.left = self.length = self.registers["count"]
         self.start_ns = max(self.chip.now_ns, self.chip.uart.free_ns)
         self.chip.expect(self.registers["peripheral"] == 0x40004404, "the DMA does not serve the USART's data register")
-        self.chip.expect(self.registers["memory"] >= 0x20000000 and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
-                         "the DMA reaches where no RAM is")
+        self.chip.expect(
+            self.registers["memory"] >= 0x20000000 and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
+            "the DMA reaches where no RAM is",
+        )
 
     def put(self, byte):
         if not self.is_on() or not self.left:
-            return # The byte stays in the data register, and the next one overwrites it.
+            return  # The byte stays in the data register, and the next one overwrites it.
         self.chip.cpu.mem_write(self.registers["memory"] + self.length - self.left, bytes((byte,)))
         self.left -= 1
         self.half |= self.left == self.length // 2
         if self.left == 0:
             self.finish()
-        if self.left == 0 and self.control() & self.CIRCULAR: # RM0008 13.3.3, RM0090 10.3.9: else the channel serves no further request.
+        if self.left == 0 and self.control() & self.CIRCULAR:  # RM0008 13.3.3, RM0090 10.3.9: else the channel serves no further request.
             self.left = self.length
 
     def until_event(self):
@@ -531,7 +533,7 @@ class Flash:
     same for the time after the next power-on."""
 
     def __init__(self, chip):
-        self.chip, self.memory = chip, bytearray(b"\xFF" * self.size)
+        self.chip, self.memory = chip, bytearray(b"\xff" * self.size)
         self.operations, self.erasures, self.cut_after, self.next_cut = 0, 0, None, None
         self.reset()
 
@@ -540,7 +542,7 @@ class Flash:
 
     def fetch(self, address, size):
         at = address - self.base
-        return int.from_bytes(self.memory[at:at + size], "little")
+        return int.from_bytes(self.memory[at : at + size], "little")
 
     def spend_ns(self, span_ns):
         self.chip.spend(span_ns * self.chip.clocks.core_hz // 10**9)
@@ -563,7 +565,7 @@ class Flash:
         chip.expect(old == (1 << 8 * size) - 1, f"0x{address:08X} of the flash was programmed twice")
         self.operations += 1
         cut = self.is_cut()
-        self.memory[at:at + size] = (old & (value | (0x5A5A5A5A if cut else 0)) & (1 << 8 * size) - 1).to_bytes(size, "little")
+        self.memory[at : at + size] = (old & (value | (0x5A5A5A5A if cut else 0)) & (1 << 8 * size) - 1).to_bytes(size, "little")
         self.spend_ns(self.program_ns)
 
     def erase(self, address, size):
@@ -573,7 +575,7 @@ class Flash:
         self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is not for what is kept")
         self.operations, self.erasures = self.operations + 1, self.erasures + 1
         cut = self.is_cut()
-        self.memory[at:at + size] = bytes(old | 0xA5 for old in self.memory[at:at + size]) if cut else b"\xFF" * size
+        self.memory[at : at + size] = bytes(old | 0xA5 for old in self.memory[at : at + size]) if cut else b"\xff" * size
         self.spend_ns(self.erase_ns)
 
     def read(self, offset):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Somebody who looks at the lamp and reads its pattern."""
+
 from .chip import MS
 
 SLOT_NS = 62_500_000

@@ -4,10 +4,23 @@
 Time passes by executed code: two cycles for each 16 bits of it (block_hook.c), ACCESS_CYCLES for each access to a peripheral. Both
 are on the slow side, so that a verdict about time is too. Interrupts all have one priority, as the image leaves them.
 """
+
 import ctypes
 import struct
 
-from unicorn import (UC_ARCH_ARM, UC_ERR_FETCH_UNMAPPED, UC_ERR_OK, UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_HOOK_BLOCK, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError)
+from unicorn import (
+    UC_ARCH_ARM,
+    UC_ERR_FETCH_UNMAPPED,
+    UC_ERR_OK,
+    UC_ERR_READ_UNMAPPED,
+    UC_ERR_WRITE_UNMAPPED,
+    UC_HOOK_BLOCK,
+    UC_HOOK_INTR,
+    UC_MODE_MCLASS,
+    UC_MODE_THUMB,
+    Uc,
+    UcError,
+)
 from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
@@ -17,11 +30,11 @@ from .registers import Registers
 
 ACCESS_CYCLES = 12
 EXC_RETURN = 0xFFFFFFF9
-EXCEPTION_EXIT = 8 # Unicorn's number for a return from an exception.
-ABORTS = (3, 4) # And those for code and data where the memory map allows none.
+EXCEPTION_EXIT = 8  # Unicorn's number for a return from an exception.
+ABORTS = (3, 4)  # And those for code and data where the memory map allows none.
 NOWHERE = 0xFFFFFFFE
 NEVER_NS = 1 << 60
-BACK, ENDLESS = 0x080F0000, 0x080F0100 # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
+BACK, ENDLESS = 0x080F0000, 0x080F0100  # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
 SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
 IT_STATE = 0x0600FC00
@@ -31,12 +44,19 @@ NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_FETCH_UNMAPPED)
 
 class BlockClock(ctypes.Structure):
     """As in block_hook.c."""
-    _fields_ = [("left", ctypes.c_int64), ("spent", ctypes.c_int64), ("is_asked_to_stop", ctypes.c_int32),
-                ("has_stopped", ctypes.c_int32), ("trap", ctypes.c_int32), ("stop", ctypes.c_void_p)]
+
+    _fields_ = [
+        ("left", ctypes.c_int64),
+        ("spent", ctypes.c_int64),
+        ("is_asked_to_stop", ctypes.c_int32),
+        ("has_stopped", ctypes.c_int32),
+        ("trap", ctypes.c_int32),
+        ("stop", ctypes.c_void_p),
+    ]
 
 
 class Machine:
-    library = None # Holds block_hook; set by the runner.
+    library = None  # Holds block_hook; set by the runner.
     SP = SP
     POISON = 0xA5  # What RAM is full of after power-on: anything but zero.
 
@@ -45,7 +65,7 @@ class Machine:
         self.violations, self.resets, self.alarms = [], [], []
         self.nmi, self.frozen, self.power_lost = False, False, False
         self.busy_ns = self.faults = 0
-        self.due_ns = self.quiet_until_ns = 0 # See run.
+        self.due_ns = self.quiet_until_ns = 0  # See run.
         self.build_cpu()
         board.build(self, seed)
         self.reset_cpu()
@@ -53,15 +73,15 @@ class Machine:
     def build_cpu(self):
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
-        kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size) # map_flash has these.
+        kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size)  # map_flash has these.
         assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into what is kept"
         cpu.mem_map(0x08000000, kept.start - 0x08000000)
         cpu.mem_map(kept.stop, 0x08100000 - kept.stop)
         cpu.mem_map(0x20000000, self.board.ram_size)
-        cpu.mem_write(0x08000000, self.image[:kept.start - 0x08000000]) # Its end, texts and no code, may share a page with what is kept: map_flash.
+        cpu.mem_write(0x08000000, self.image[: kept.start - 0x08000000])  # Its end, texts and no code, may share a page with what is kept: map_flash.
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
-        cpu.mem_map(0x1FFF0000, 0x10000) # What the maker wrote: the chip's own number.
+        cpu.mem_map(0x1FFF0000, 0x10000)  # What the maker wrote: the chip's own number.
         cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
@@ -71,8 +91,15 @@ class Machine:
         self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
         for kind, function in ((UC_HOOK_BLOCK, self.library.block_hook), (UC_HOOK_INTR, self.library.trap_hook)):
-            uclib.uc_hook_add(cpu._uch, ctypes.byref(ctypes.c_size_t()), ctypes.c_int(kind), ctypes.cast(function, ctypes.c_void_p),
-                              ctypes.byref(self.clock), ctypes.c_uint64(1), ctypes.c_uint64(0))
+            uclib.uc_hook_add(
+                cpu._uch,
+                ctypes.byref(ctypes.c_size_t()),
+                ctypes.c_int(kind),
+                ctypes.cast(function, ctypes.c_void_p),
+                ctypes.byref(self.clock),
+                ctypes.c_uint64(1),
+                ctypes.c_uint64(0),
+            )
 
     def expect(self, condition, text):
         if not condition and text not in self.violations:
@@ -96,7 +123,7 @@ class Machine:
         clock.left = max((until_ns - self.now_ns) * self.clocks.core_hz // 10**9, 1)
         clock.is_asked_to_stop = clock.has_stopped = 0
         clock.trap = -1
-        pc, = self.pc.read()
+        (pc,) = self.pc.read()
         status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
         if status in NO_MEMORY and self.error is None:
             self.spend()
@@ -118,7 +145,7 @@ class Machine:
         """An access where no memory is, which nobody but HardFault's handler takes. Without a stack the registers cannot be saved, and the
         handler begins nevertheless."""
         self.faults += 1
-        vector, = struct.unpack_from("<I", self.image, 4 * HARD_FAULT)
+        (vector,) = struct.unpack_from("<I", self.image, 4 * HARD_FAULT)
         self.active, self.sleeping = HARD_FAULT, False
         self.cpu.reg_write(PC, vector | 1)
 
@@ -131,7 +158,7 @@ class Machine:
         """Everything but the CPU is attended to when something is due, and when code has touched it (`touch`): until then nothing about it
         can change."""
         end_ns = self.now_ns + span_ns
-        self.touch() # So may have who called this.
+        self.touch()  # So may have who called this.
         while self.now_ns < end_ns:
             if self.now_ns >= self.quiet_until_ns:
                 self.attend()
@@ -154,7 +181,7 @@ class Machine:
 
     def call(self, address):
         """The 64-bit result of a function of the image without arguments, called now, with interrupts as in the main loop."""
-        while self.active: # Within a handler no interrupt would come, and what waits for one would wait for ever.
+        while self.active:  # Within a handler no interrupt would come, and what waits for one would wait for ever.
             self.run(US // 20)
         saved, asleep = self.cpu.context_save(), self.sleeping
         self.cpu.reg_write(PRIMASK, 0)
@@ -177,8 +204,14 @@ class Machine:
     def look_ahead(self):
         """When the next event is due, and whether nothing can happen before. Not so while bytes pass between memory and line, which
         goes on with every cycle, nor while the bus or the clocks come to rest."""
-        times = (self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns), self.uart.next_event_ns(), self.dma.next_event_ns(),
-                 self.alarms[0][0] if self.alarms else None)
+        times = (
+            self.tick_ns,
+            self.watchdog.deadline_ns,
+            self.bus.next_event_ns(self.now_ns),
+            self.uart.next_event_ns(),
+            self.dma.next_event_ns(),
+            self.alarms[0][0] if self.alarms else None,
+        )
         self.due_ns = min([time for time in times if time is not None], default=NEVER_NS)
         calm = self.clocks.settled and self.bus.calm and not self.uart.typed and self.uart.idle_ns is None and times[4] is None
         self.quiet_until_ns = self.due_ns if calm else 0
@@ -236,22 +269,22 @@ class Machine:
         values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
         try:
             self.cpu.mem_write(stack, struct.pack("<8I", *values))
-        except UcError: # There is no memory for the stack.
+        except UcError:  # There is no memory for the stack.
             self.hard_fault()
             return True
-        vector, = struct.unpack_from("<I", self.image, 4 * number)
-        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, vector) # A handler does not begin within an IT block.
+        (vector,) = struct.unpack_from("<I", self.image, 4 * number)
+        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, vector)  # A handler does not begin within an IT block.
         self.spend(12)
         return True
 
     def leave_exception(self):
-        stack, = self.stack.read()
+        (stack,) = self.stack.read()
         values = list(struct.unpack("<8I", self.cpu.mem_read(stack, 32)))
         stack += 32 + (4 if values[7] & 0x200 else 0)
         values[7] &= ~0x200
         self.after_exit.write(stack, *values)
         if self.active != SYSTICK:
-            self.touch() # Its line may still be up.
+            self.touch()  # Its line may still be up.
         self.active = None
         self.spend(12)
 
@@ -277,6 +310,7 @@ class Machine:
 
     def map_registers(self, base, size, read, write):
         """`read` and `write` get the address of the block and the offset in it. What they raise ends the emulation."""
+
         def on_read(_, offset, size, __):
             try:
                 self.spend(ACCESS_CYCLES)
@@ -297,8 +331,7 @@ class Machine:
 
         callbacks = (MMIO_READ_CFUNC(on_read), MMIO_WRITE_CFUNC(on_write))
         self.callbacks += callbacks
-        status = uclib.uc_mmio_map(self.cpu._uch, base, size, *(pair for function in callbacks
-                                                                for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
+        status = uclib.uc_mmio_map(self.cpu._uch, base, size, *(pair for function in callbacks for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
         if status != UC_ERR_OK:
             raise UcError(status)
 
@@ -311,12 +344,12 @@ class Machine:
         """The pages of the flash that the image writes. The rest of the first one's page of the emulator's has the end of the image, if it is
         that long: it can be read, but not executed."""
         base = flash.base & ~0xFFF
-        before = self.image[base - 0x08000000:].ljust(flash.base - base, b"\xFF")
+        before = self.image[base - 0x08000000 :].ljust(flash.base - base, b"\xff")
 
         def fetch(address, size):
             if address >= flash.base:
                 return flash.fetch(address, size)
-            return int.from_bytes(before[address - base:address - base + size], "little")
+            return int.from_bytes(before[address - base : address - base + size], "little")
 
         def guard(function, *arguments):
             try:
@@ -324,11 +357,14 @@ class Machine:
             except Exception as error:  # noqa: BLE001
                 return self.fail(error)
 
-        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(fetch, base + offset, size)),
-                     MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(flash.program, base + offset, size, value) or 0))
+        callbacks = (
+            MMIO_READ_CFUNC(lambda _, offset, size, __: guard(fetch, base + offset, size)),
+            MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(flash.program, base + offset, size, value) or 0),
+        )
         self.callbacks += callbacks
-        status = uclib.uc_mmio_map(self.cpu._uch, base, flash.base + flash.size - base, *(pair for function in callbacks
-                                                                                          for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
+        status = uclib.uc_mmio_map(
+            self.cpu._uch, base, flash.base + flash.size - base, *(pair for function in callbacks for pair in (ctypes.cast(function, ctypes.c_void_p), 0))
+        )
         if status != UC_ERR_OK:
             raise UcError(status)
 
@@ -353,7 +389,7 @@ class Machine:
         self.count_tick()
         if offset == 0x18 and self.tick_ns is not None:
             return min((self.tick_ns - self.now_ns) * self.clocks.core_hz // 10**9, self.syst[0x14])
-        if offset == 0xD04: # ICSR: PENDSTSET.
+        if offset == 0xD04:  # ICSR: PENDSTSET.
             return (SYSTICK in self.pending) << 26
         self.expect(offset in self.syst, f"0x{0xE000E000 + offset:08X} was read, which is not modelled")
         return self.syst.get(offset, 0)

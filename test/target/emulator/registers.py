@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Several registers of the CPU at once, without the cost of one wrapped call for each: that is a third of the emulation's time."""
+
 import ctypes
 
 from unicorn.unicorn_py3.unicorn import uclib

@@ -48,7 +48,6 @@ bool iwn_cmd_stops(iwn_cmd_t cmd) {
     return (cmd == IWN_CMD_STOP) || (cmd == IWN_CMD_DISARM) || (cmd == IWN_CMD_ESTOP);
 }
 
-/// A number for a message.
 static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
     iwn_text_t text = iwn_text_begin(out_digits, NUMBER_SIZE);
     iwn_text_int(&text, value);

@@ -6,8 +6,7 @@
 #include <stdint.h>
 
 /// The value that stands for 1.
-#define SIM_TRIG_ONE ((int64_t)1 << 30)
-/// One turn in nanoradians.
+#define SIM_TRIG_ONE       ((int64_t)1 << 30)
 #define SIM_TRIG_TURN_nrad INT64_C(6283185307)
 
 /// Sine of an angle in nanoradians, any angle, in units of 1 / SIM_TRIG_ONE. Error below 1e-5.

@@ -1,0 +1,277 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Sizes of the core on Cortex-M and of the STM32 images: writes docs/sizes.md, or fails if the committed one is not true any more.
+
+usage: sizes.py --update|--check M0PLUS_BUILD_DIR M3_BUILD_DIR M4_BUILD_DIR
+
+A number may differ from the committed one by 2 % or 8 bytes, whichever is more. What is linked for a use must fit the limit in USES. The images are
+those of the presets arm-m3 and arm, which listen, of the build next to arm that ends in -f446, and of the builds next to these that end in -demo and
+-gateway. Their stack: an interrupt may come anywhere, and none interrupts another, so the worst handler and the registers that the CPU saves are on
+top of the main loop's deepest path; calls through the HAL go to each of its functions. Of an image that is optimised as one program, the graph is
+that of the linker's result and of the objects apart from it.
+
+Exit status 77 (skipped) if the committed table was made by another compiler. No tool does it: `size` and bloaty measure one file, not what is linked of a
+library for a use; -fstack-usage of gcc gives frames, not paths.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph, short
+
+ROOT = Path(__file__).resolve().parent.parent
+TABLE = ROOT / "docs" / "sizes.md"
+CPUS = {"Cortex-M0+": "cortex-m0plus", "Cortex-M3": "cortex-m3", "Cortex-M4": "cortex-m4"}
+TEXT_GOAL = 6 * 1024  # What the design asks for, and what the core does not reach yet: told, not gated.
+TYPES = ("iw_gateway_t", "iw_config_t", "iw_wheel_t", "iw_force_t", "iw_permit_t", "iw_setpoint_t", "iw_confirmation_t", "iw_envelope_t")
+ROW = re.compile(r"^\| `?([^|`]+?)`? +\|(.*)\|$", re.MULTILINE)
+CODEC = "iw_codec_decode iw_codec_encode_setpoint"
+SETPOINT = "iw_setpoint_init iw_setpoint_demand iw_setpoint_command iw_setpoint_due iw_setpoint_take iw_setpoint_next_us"
+FORCE = "iw_force_init iw_force_reopen iw_force_receive iw_force_receive_offset iw_force_validity iw_force_net_mN"
+GATEWAY = (
+    "iw_config_default iw_gateway_init iw_gateway_step iw_gateway_suspended iw_gateway_bus_facts iw_gateway_arm iw_gateway_drive "
+    "iw_gateway_stop iw_gateway_estop iw_gateway_reset iw_gateway_disconnect iw_gateway_tare iw_gateway_state iw_gateway_arming"
+)
+KNOWN = "iw_gateway_set_assumption iw_gateway_restore_offset iw_config_stop_budget"
+OBSERVATION = "iw_observation_init iw_observation_step"
+# What is used: its headers, its functions, and the most that it may cost on a Cortex-M4.
+USES = {
+    "codec": ("codec.h", CODEC, 350),
+    "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2900),
+    "gateway": ("gateway.h", GATEWAY, 13000),
+    "gateway, snapshot": ("gateway.h", f"{GATEWAY} iw_gateway_snapshot", None),
+    "all": ("gateway.h observation.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {OBSERVATION}", None),
+}
+SECTION = re.compile(r"^ \.(?:text|rodata)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) \S*libiwheel_core\.a\((\w+)\.c\S*\)$", re.MULTILINE)
+# Image, which build it is in, and how that one's name goes on.
+BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
+HAL = ("brd_bxcan_send", "brd_bxcan_receive", "brd_bxcan_bus_state", "brd_bxcan_purge", "brd_estop_pressed")
+HANDLERS = ("brd_systick_handler", "brd_exti0_handler", "brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler")
+# Of the image gateway alone; and how the functions are called that northbound's refusals reach through a table.
+SERIAL_HANDLERS, THROUGH_TABLE = ("brd_serial_usart_handler", "brd_serial_receive_handler", "brd_serial_transmit_handler"), ":say_"
+SAVED_BY_CPU = 36  # Eight registers and four bytes to align them.
+
+
+def linked(library, cpu, headers, functions):
+    """{module: bytes} of what is linked."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, memory_map = Path(folder) / "use.c", Path(folder) / "map"
+        source.write_text(
+            "".join(f'#include "iwheel/{header}"\n' for header in headers.split())
+            + "void *volatile sink;\nvoid use(void) {\n"
+            + "".join(f"    sink = (void *){function};\n" for function in functions.split())
+            + "}\n"
+        )
+        subprocess.run(
+            [
+                "arm-none-eabi-gcc",
+                f"-mcpu={CPUS[cpu]}",
+                "-mthumb",
+                "-mfloat-abi=soft",
+                "-Os",
+                f"-I{ROOT / 'core/include'}",
+                "-nostartfiles",
+                "-specs=nosys.specs",
+                f"-Wl,--gc-sections,-e,use,-Map={memory_map}",
+                source,
+                library,
+                "-o",
+                Path(folder) / "used",
+            ],
+            check=True,
+            stderr=subprocess.DEVNULL,
+        )
+        text = memory_map.read_text().split("Linker script and memory map", 1)[1]
+    sizes = {}
+    for size, module in SECTION.findall(re.sub(r"\n (\.\S+)\n +0x", r"\n \1 0x", text)):
+        sizes[module] = sizes.get(module, 0) + int(size, 16)
+    return {module: size for module, size in sizes.items() if size > 0}
+
+
+def uses(builds):
+    """[(use, [bytes on each CPU])], [what is wrong], the share of each module in the gateway on a Cortex-M4."""
+    rows, findings, shares = [], [], {}
+    for use, (headers, functions, limit) in USES.items():
+        sizes = [linked(next(Path(build).rglob("libiwheel_core.a")), cpu, headers, functions) for build, cpu in zip(builds, CPUS, strict=False)]
+        rows.append((use, [sum(size.values()) for size in sizes]))
+        if limit is not None and rows[-1][1][-1] > limit:
+            findings.append(f"{use} on Cortex-M4: {rows[-1][1][-1]} B are linked, allowed {limit} B")
+        if "observation" in sizes[-1] and use != "all":
+            findings.append(f"{use}: observation is linked, although nothing calls it")
+        shares = sizes[-1] if use == "gateway" else shares
+    return rows, findings, shares
+
+
+def objects_of(build, *folders):
+    return sorted(path for path in Path(build).rglob("*.c.o*") if path.suffix in (".o", ".obj") and any(f"{folder}.dir" in path.parts for folder in folders))
+
+
+def depth_of(objects, indirect=()):
+    size, calls, findings = read_graph(objects)
+    add_runtime_calls(objects, size, calls)
+    calls[INDIRECT] = set(indirect)
+    if findings:
+        raise SystemExit("\n".join(findings))
+    return size, Depth(size, calls)
+
+
+def core_stack(build):
+    size, depth = depth_of(objects_of(build, "iwheel_core"))
+    return max(depth.of(name)[0] for name in size)
+
+
+def linked_objects(build, image):
+    """All whose code is in the image: those that its map names, or of an archive that it names. Others are of an earlier configuration."""
+    table = next(Path(build).rglob(f"{image}.map"))
+    loaded = {(table.parent / name).resolve() for name in re.findall(r"^LOAD (\S+)$", table.read_text(), re.MULTILINE)}
+    archives = {f"{path.stem.removeprefix('lib')}.dir" for path in loaded if path.suffix == ".a"}
+    objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_northbound_server", "iwheel_stm32_driver", image)
+    merged = [path for path in loaded if path.name.startswith(f"{image}.elf.ltrans")]
+    return [
+        path for path in objects if (path.resolve() in loaded or archives.intersection(path.parts)) and not (merged and b".gnu.lto_" in path.read_bytes())
+    ] + merged
+
+
+def image_stack(build, image):
+    objects = linked_objects(build, image)
+    known = read_graph(objects)[0]
+    hal = [name for name in known if short(name) in HAL]
+    serial = [name for name in SERIAL_HANDLERS if name in known]
+    tabled = [name for name in known if THROUGH_TABLE in name and serial]
+    _, depth = depth_of(objects, (*hal, *tabled))
+    handlers = (*HANDLERS, *serial)
+    missing = {*HAL, *HANDLERS} - {*map(short, hal), *known}
+    if missing:
+        raise SystemExit(f"not in the call graph of {image}: {', '.join(missing)}")
+    total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in handlers)
+    if depth.cycles:
+        raise SystemExit(f"recursion in {image}: {depth.cycles[0]}")
+    return total
+
+
+def stack_room(elf):
+    """What the linker's script leaves for the stack."""
+    run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+    return next(int(line.split()[0], 16) for line in run.stdout.splitlines() if line.endswith(" brd_link_stack_size"))
+
+
+def image_sizes(build, image):
+    """(flash, RAM without stack, worst stack); the latter must fit."""
+    elf, used = next(Path(build).rglob(f"{image}.elf")), image_stack(build, image)
+    room = stack_room(elf)
+    if used > room:
+        raise SystemExit(f"{image} needs {used} B of stack, sections.ld has {room} B")
+    run = subprocess.run(["arm-none-eabi-size", str(elf)], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, run.stdout.splitlines()[1].split()[:3])
+    return text + data, data + bss - room, used
+
+
+def stacks_and_images(builds):
+    """`builds`: those of Cortex-M0+, M3, M4."""
+    rows = [
+        "",
+        "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.",
+        "",
+        "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |",
+        "|-----------------|-----------:|-----------:|-----------:|",
+        "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |",
+        "",
+        "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
+        "is the worst of main loop and interrupt, of the 1792 that sections.ld keeps for it; in emulation at least 256 of them stay unused.",
+        "",
+        "| image             |    flash   |     RAM    |    stack   |",
+        "|-------------------|-----------:|-----------:|-----------:|",
+    ]
+    for board, (image, which, more) in BOARDS.items():
+        for kind in ("listen", "demo", "gateway"):
+            build = str(builds[which]).rstrip("/") + more + {"listen": ""}.get(kind, f"-{kind}")
+            rows.append(f"| {f'{board} {kind}':<17} | " + " | ".join(f"{number:>10}" for number in image_sizes(build, image)) + " |")
+    return rows
+
+
+def compiler():
+    run = subprocess.run(["arm-none-eabi-gcc", "-dumpfullversion"], capture_output=True, text=True, check=True)
+    return run.stdout.strip()
+
+
+def type_sizes():
+    """{type: bytes} on a 32-bit ARM, asked of the compiler through the sizes of arrays."""
+    probe = '#include "iwheel/gateway.h"\n' + "".join(f"char size_of_{name}[sizeof({name})];\n" for name in TYPES)
+    command = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-I", str(ROOT / "core/include"), "-S", "-xc", "-", "-o", "-"]
+    run = subprocess.run(command, input=probe, capture_output=True, text=True, check=True)
+    return {name: int(size) for name, size in re.findall(r"\.size\s+size_of_(\w+), (\d+)", run.stdout)}
+
+
+def render(builds):
+    rows, findings, shares = uses(builds)
+    modules = sorted(shares.items(), key=lambda item: (-item[1], item[0]))
+    kinds = sorted(type_sizes().items(), key=lambda item: -item[1])
+    lines = [
+        "# Sizes",
+        "",
+        f"Made by `scripts/sizes.py --update` with arm-none-eabi-gcc {compiler()} -Os; `./check` compares.",
+        "",
+        "Code and constants in bytes of what is linked for each use, without what is not called (`-ffunction-sections`, `--gc-sections`). The",
+        "core has no data and no bss.",
+        "",
+        "| what is used            | " + " | ".join(f"{cpu:>10}" for cpu in CPUS) + " |",
+        "|-------------------------|" + "|".join("-----------:" for _ in CPUS) + "|",
+    ]
+    lines += [f"| {name:<23} | " + " | ".join(f"{value:>10}" for value in values) + " |" for name, values in rows]
+    lines += ["", "Where the bytes of the gateway are, on Cortex-M4:", "", "| module       |   bytes |", "|--------------|--------:|"]
+    lines += [f"| {name:<12} | {size:>7} |" for name, size in modules]
+    lines += [
+        "",
+        "RAM in bytes: `iw_gateway_t` holds everything, once per pair of wheels; the others are its parts.",
+        "",
+        "| type              |     RAM    |",
+        "|-------------------|-----------:|",
+    ]
+    lines += [f"| {f'`{name}`':<17} | {size:>10} |" for name, size in kinds]
+    lines += stacks_and_images(builds)
+    return "\n".join(lines) + "\n", dict(rows)["gateway"][2], findings
+
+
+def numbers(text):
+    return {name: [int(cell) for cell in cells.split("|")] for name, cells in ROW.findall(text) if re.fullmatch(r"[\d |]+", cells)}
+
+
+def differences(old, new):
+    for name in sorted(old.keys() | new.keys()):
+        if name not in old or name not in new:
+            yield f"{name}: only in the {'committed' if name in old else 'new'} table"
+            continue
+        for committed, actual in zip(old[name], new[name], strict=True):
+            if abs(committed - actual) > max(0.02 * committed, 8):
+                yield f"{name}: {actual} B, committed {committed} B"
+
+
+def main(arguments):
+    if len(arguments) != 5 or arguments[1] not in ("--update", "--check"):
+        sys.exit(__doc__)
+    text, total, findings = render(arguments[2:])
+    if arguments[1] == "--update":
+        TABLE.parent.mkdir(exist_ok=True)
+        TABLE.write_text(text)
+    else:
+        committed = TABLE.read_text() if TABLE.exists() else ""
+        if committed and f"arm-none-eabi-gcc {compiler()} " not in committed:
+            print(f"skip: {TABLE.relative_to(ROOT)} was made by another compiler than {compiler()}")
+            print(*findings, sep="\n")
+            return 1 if findings else 77
+        if not committed:
+            findings.append(f"{TABLE.relative_to(ROOT)} is missing: ./check --update-sizes writes it")
+        changed = [*differences(numbers(committed), numbers(text))] if committed else []
+        findings += changed
+        if changed:
+            findings.append("the sizes changed: look at the reason, then ./check --update-sizes and commit docs/sizes.md")
+    print(*findings, sep="\n")
+    print(f"gateway on Cortex-M4: {total} B of code are linked (goal {TEXT_GOAL} B)")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

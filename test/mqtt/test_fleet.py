@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+"""The recipes of share/fleet as they are shipped: three servers of which the leader is killed, a mosquitto that forwards, and who may what."""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+from test_bridge import make_stops, numbers
+from harness import Process
+from mqtt_rig import ID, Far, free_port
+from trials import ROOT, Skip, until
+
+FLEET = ROOT / "share/fleet"
+HOSTS = ("127.0.0.1", "127.0.0.2", "127.0.0.3")
+
+
+def certificates(rig, *words):
+    done = subprocess.run([FLEET / "certificates", rig.path("certs"), *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def make_certificates(rig):
+    certificates(rig, "server", *HOSTS, "localhost")
+    certificates(rig, "machine", ID, "w2")
+    certificates(rig, "console")
+    certificates(rig, "keeper")
+
+
+def with_certificate(rig, name):
+    """For a client from outside: this one's certificate."""
+    return lambda client: client.tls_set(rig.path("certs/ca.pem"), rig.path(f"certs/{name}.pem"), rig.path(f"certs/{name}.key"))
+
+
+def use_tls(rig, host, port):
+    rig.mqtt_settings["broker"].update(
+        {"host": host, "port": port, "ca": rig.path("certs/ca.pem"), "certificate": rig.path(f"certs/{ID}.pem"), "key": rig.path(f"certs/{ID}.key")}
+    )
+
+
+class Cluster:
+    """Three nats-servers by the shipped configuration, on three addresses of this machine."""
+
+    def __init__(self, rig):
+        if not shutil.which("nats-server"):
+            raise Skip("nats-server is missing (scripts/install_tools check brings it)")
+        make_certificates(rig)
+        self.rig, self.servers = rig, {}
+        self.nats, self.mqtt, self.routes = free_port(), free_port(), free_port()
+        shutil.copy(FLEET / "nats-server.conf", rig.path("certs"))
+        Path(rig.path("certs/routes.conf")).write_text(
+            "routes: [" + ", ".join(f'"nats-route://{host}:{self.routes}"' for host in HOSTS) + "]\n", encoding="ascii"
+        )
+        for host in HOSTS:
+            self.start(host)
+        until(lambda: self.stream("create")[0] == 0, 30, f"the stream: {self.stream('create')}")
+
+    def start(self, host):
+        name = f"n{host[-1]}"
+        environment = {
+            **os.environ,
+            "NAME": name,
+            "NATS_LISTEN": f"{host}:{self.nats}",
+            "CLUSTER_LISTEN": f"{host}:{self.routes}",
+            "MQTT_LISTEN": f"{host}:{self.mqtt}",
+            "STORE": self.rig.path(name),
+        }
+        server = Process(["nats-server", "-c", "nats-server.conf"], self.rig.path(f"{name}.out"), cwd=self.rig.path("certs"), env=environment)
+        self.servers[host] = server
+        self.rig.processes.append(server)
+
+    def stream(self, verb):
+        """(exit code, answer) of share/fleet/stream at a server that lives."""
+        host = next(host for host, server in self.servers.items() if server.child.poll() is None)
+        done = subprocess.run([FLEET / "stream", f"{host}:{self.nats}", self.rig.path("certs"), verb], capture_output=True, text=True, timeout=30, check=False)
+        return done.returncode, (json.loads(done.stdout) if done.returncode == 0 else done.stderr[-300:])
+
+    def leader(self):
+        name = until(lambda: (told := self.stream("info"))[0] == 0 and told[1]["leader"], 20, "a leader")
+        return next(host for host in HOSTS if host[-1] == name[-1])
+
+
+def collector(rig, cluster, host, topics=("iwheel/+/event/+", "iwheel/+/availability")):
+    """Who keeps events: a session that outlasts its connection, so that the cluster keeps for it what it has confirmed to a machine."""
+    until(lambda: socket.socket().connect_ex((host, cluster.mqtt)) == 0, 10, "the server listens")
+    far = Far(cluster.mqtt, "console", topics=topics, setup=with_certificate(rig, "console"), host=host, clean=False)
+    rig.fars.append(far)
+    return far
+
+
+def test_three_servers_leader_killed_each_stop_once_in_order(rig):
+    cluster = Cluster(rig)
+    leader = cluster.leader()
+    others = [host for host in HOSTS if host != leader]
+    far = collector(rig, cluster, others[0])
+    use_tls(rig, " ".join((leader, others[1], others[0])), cluster.mqtt)
+    rig.start_gateway()
+    rig.start_bridge()
+    until(lambda: far.texts("availability")[-1:] == ["online"], 15, f"online: {rig.words()}")
+    first = make_stops(rig, 2)
+    until(lambda: numbers(far) == list(range(1, first + 1)), 15, "the first")
+    cluster.servers[leader].signal(9)
+    killed = time.monotonic()
+    last = make_stops(rig, 3)
+    until(lambda: numbers(far) == list(range(1, last + 1)), 60, "all of them")
+    print(f"        leader killed: the last of {last} stops {time.monotonic() - killed:.1f} s later", flush=True)
+    far.tell("leader of three nats-servers killed, the bridge connected to it")
+    assert f"connected to the broker at {leader}" in rig.words()
+    until(lambda: (told := cluster.stream("info"))[0] == 0 and told[1]["messages"] > 0, 30, "the stream has a leader again, and events")
+
+
+def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
+    """What docs/fleet.md says of nats-server: a stream that takes nothing keeps no confirmation back, so a stream alone is no proof."""
+    if not shutil.which("nats-server"):
+        raise Skip("nats-server is missing (scripts/install_tools check brings it)")
+    port, mqtt = free_port(), free_port()
+    Path(rig.path("one.conf")).write_text(
+        f'server_name: one\nlisten: 127.0.0.1:{port}\njetstream {{ store_dir: "{rig.path("one")}" }}\nmqtt {{ listen: 127.0.0.1:{mqtt} }}\n', encoding="ascii"
+    )
+    rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
+    until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
+
+    def ask(subject, body):
+        with socket.create_connection(("127.0.0.1", port), timeout=5) as link, link.makefile("rb") as lines:
+            link.sendall(b'CONNECT {"verbose":false}\r\nSUB _INBOX.x 1\r\nPUB %s _INBOX.x %d\r\n%s\r\n' % (subject, len(body), body))
+            for line in lines:
+                if line.startswith(b"MSG "):
+                    return json.loads(lines.read(int(line.split()[-1])))
+        return {}
+
+    full = {"name": "full", "subjects": ["iwheel.*.event.>"], "max_msgs": 1, "discard": "new", "storage": "file"}
+    assert "error" not in ask(b"$JS.API.STREAM.CREATE.full", json.dumps(full).encode())
+    far = Far(mqtt, "w1")
+    rig.fars.append(far)
+    confirmed = [far.client.publish("iwheel/w1/event/stop", str(number), qos=1) for number in range(3)]
+    for one in confirmed:
+        one.wait_for_publish(5)
+    assert all(one.is_published() for one in confirmed) and ask(b"$JS.API.STREAM.INFO.full", b"")["state"]["messages"] == 1
+
+
+def start_fleet_broker(rig):
+    """share/fleet/mosquitto.conf with its paths in our folder; its port."""
+    make_certificates(rig)
+    port = free_port()
+    text = (FLEET / "mosquitto.conf").read_text(encoding="utf-8").replace("/etc/mosquitto/certs", rig.path("certs")).replace("8883", str(port))
+    text = text.replace("/etc/mosquitto/iwheel.acl", str(FLEET / "mosquitto.acl")).replace("/var/lib/mosquitto/", rig.path("") + "/")
+    Path(rig.path("fleet.conf")).write_text(text + rig.broker_lines[-1] + "\n", encoding="utf-8")
+    rig.processes.append(Process(["mosquitto", "-c", rig.path("fleet.conf")], rig.path("fleet.out")))
+    until(lambda: socket.socket().connect_ex(("127.0.0.1", port)) == 0, what="it listens")
+    return port
+
+
+def fleet_far(rig, port, name, **options):
+    far = Far(port, name, setup=with_certificate(rig, name), **options)
+    rig.fars.append(far)
+    return far
+
+
+def test_machine_reaches_nothing_of_another_machine(rig):
+    port = start_fleet_broker(rig)
+    console, first, second = (fleet_far(rig, port, name) for name in ("console", ID, "w2"))
+    first.client.publish("iwheel/w2/cmd/estop", "{}", qos=1).wait_for_publish(3)
+    first.client.publish("iwheel/w2/event/stop", "{}", qos=1).wait_for_publish(3)
+    first.client.publish("iwheel/w1/event/stop", '{"id":"1","event":"stop"}', qos=1).wait_for_publish(3)
+    console.client.publish("iwheel/w1/event/stop", "forged", qos=1).wait_for_publish(3)
+    console.client.publish("iwheel/w2/cmd/stop", "asked", qos=1).wait_for_publish(3)
+    until(lambda: console.all and second.all, what="what is allowed arrives")
+    time.sleep(0.3)
+    assert [topic for topic, *_ in second.all] == ["iwheel/w2/cmd/stop"], second.all
+    assert [(topic, payload) for topic, payload, *_ in console.all if "/cmd/" not in topic] == [("iwheel/w1/event/stop", b'{"id":"1","event":"stop"}')], (
+        console.all
+    )
+
+
+def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
+    port = start_fleet_broker(rig)
+    central = rig.processes[-1]
+    text = (
+        (FLEET / "mosquitto-forward.conf")
+        .read_text(encoding="utf-8")
+        .replace("/etc/mosquitto/certs", rig.path("certs"))
+        .replace("listener 1883", f"listener {rig.port}")
+    )
+    text = text.replace("broker.example:8883", f"localhost:{port}").replace("/var/lib/mosquitto/", rig.path("spool") + "/")
+    Path(rig.path("forward.conf")).write_text(text + rig.broker_lines[-1] + "\n", encoding="utf-8")
+    rig.start_gateway()
+    rig.processes.append(Process(["mosquitto", "-c", rig.path("forward.conf")], rig.path("forward.out")))
+    until(lambda: socket.socket().connect_ex(("127.0.0.1", rig.port)) == 0, what="it listens")
+    rig.start_bridge()
+    console = fleet_far(rig, port, "console", clean=False)
+    until(lambda: console.texts("availability")[-1:] == ["online"], 15, "online, forwarded")
+    assert console.ask("stop")["ok"], "commands and answers are forwarded, and young enough"
+    first = make_stops(rig, 1)
+    until(lambda: numbers(console) == [first], 10, "a stop, forwarded")
+    central.signal(15)
+    central.wait(5)
+    last = make_stops(rig, 3)
+    rig.processes.append(Process(["mosquitto", "-c", rig.path("fleet.conf")], rig.path("fleet.out")))
+    until(lambda: numbers(console) == list(range(first, last + 1)), 40, "all of them")
+
+
+def test_console_shows_who_is_there_and_who_stopped(rig):
+    rig.start()
+    rig.online()
+    config = Path(rig.path("fleet.conf"))
+    config.write_text(f"[broker]\nport = {rig.port}\n", encoding="ascii")
+    rig.far().client.publish("iwheel/w9/availability", "offline", qos=1, retain=True).wait_for_publish(3)
+    with subprocess.Popen([rig.program("iwheel-fleet"), "-c", str(config), "--for", "3", "--json"], stdout=subprocess.PIPE, text=True) as console:
+        time.sleep(0.7)
+        make_stops(rig, 1)
+        rows = [json.loads(line) for line in console.communicate(timeout=10)[0].splitlines()]
+    assert console.returncode == 0 and [(row["machine"], row["online"], row["cause"]) for row in rows] == [(ID, True, "estop_line"), ("w9", False, None)], rows
+    assert "emergency" in rows[0]["sentence"] or "e-stop" in rows[0]["sentence"], rows[0]
+    rig.end_broker()
+    done = subprocess.run([rig.program("iwheel-fleet"), "-c", str(config), "--for", "1"], capture_output=True, text=True, timeout=10, check=False)
+    assert done.returncode == 69 and "no broker" in done.stderr, done

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: MIT
+"""Many machines at a broker and a console: each stop of each reaches the console."""
+
+import pytest
+from scale import run_load
+
+
+def test_twenty_machines_at_ten_hertz_each_stop_reaches_the_console(rig):
+    run_load(rig, 4, kind="mosquitto", machines=20, every_ms=100)
+
+
+@pytest.mark.full
+def test_three_hundred_machines_at_three_servers_each_stop_reaches_the_console(rig):
+    run_load(rig, 20, kind="nats3", machines=300, every_ms=5000)

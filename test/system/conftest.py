@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""System tests: the real gateway and simulator, judged from the bus log."""
+
+import verdict
+from harness import SERVICE_NICE
+from judge_log import percentile
+
+ESTOP_AROUND_US = 20_000
+
+
+def pytest_configure(config):
+    config.witness_nice = SERVICE_NICE
+
+
+def presses(run):
+    """[(microseconds from the e-stop to zero, whether the machine stalled right then)] of row 11."""
+    found = []
+    for name, attempt in run.passed.items():
+        told = [report.data for report in attempt.data if report.when == "call"] if "::row11" in name else []
+        for at_us, latency_us in (pair for data in told for pair in data.get("latencies", ())):
+            stalled = run.measured(attempt, at_us - ESTOP_AROUND_US, at_us + latency_us + ESTOP_AROUND_US)
+            found.append((latency_us, bool(stalled)))
+    return found
+
+
+def pytest_verdict_end(run):
+    """Invariant 2 speaks of the 99th percentile: over all presses of row 11 together. If most of them are not timed, it is skipped."""
+    every = presses(run)
+    values = [latency_us for latency_us, stalled in every if not stalled]
+    if not every:
+        return
+    figures, failures = [f"{len(every)} presses, {len(every) - len(values)} of them not timed (stalled)"], []
+    if values:
+        p99_ms = percentile(values, 99) / 1000
+        figures += [f"median {percentile(values, 50) / 1000:.2f} ms", f"p99 {p99_ms:.2f} ms", f"worst {max(values) / 1000:.2f} ms"]
+        failures = [] if p99_ms <= 5 else [verdict.Failure(f"p99 {p99_ms:.2f} ms, 5 ms allowed", verdict.TIMING)]
+    run.add("row11_all_presses", verdict.Attempt(failures, None if failures or len(values) * 2 > len(every) else ", ".join(figures)), figures)

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: MIT
+"""The judge finds every planted fault."""
+
+import selftest
+from verdict import hold
+
+
+def test_judge_selftest():
+    count, failures = selftest.run()
+    hold(count and not failures, "\n".join(failures))

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: MIT
+"""The web bridge on simulated wheels: what it answers, to whom, what it costs the gateway (test_bridge.py), and its page in a real browser (test_browser.py).
+
+The browser is Debian's chromium by PyPI's playwright; the judge of accessibility axe-core (scripts/web_assets --test). What is missing is skipped, and
+said so.
+"""
+
+import pytest
+from web_rig import WebRig
+
+
+@pytest.fixture
+def rig(make_rig):
+    return make_rig(WebRig)
