@@ -76,7 +76,7 @@ test(idle house.pins check lint "" py:pip 2 ${PY} scripts/house.py pins)
 # Without "/// @file" at its head Doxygen leaves out a header's functions and macros without a warning.
 test(idle api check lint "" doxygen 2 sh -c "headers=\$(sed -n 's/^INPUT *= *//p' docs/Doxyfile) && ! grep -rL --include=*.h --include=*.hpp '^/// @file$' \$headers | grep . && mkdir -p build/api && IWHEEL_VERSION=\$(scripts/version) doxygen docs/Doxyfile")
 test(idle gates ci faults "default;arm" py:pytest 154 ${PYTEST} test/gates --jobs ${JOBS})
-test(idle target ci+full target sanitize "" 189 test/target/run --sanitized ${S} host timing options emulate image faults uart unit)
+test(idle target ci+full target default "py:pytest py:unicorn" 189 ${PYTEST} test/target --build ${B} --jobs ${JOBS})
 test(idle portability ci+full portability "" "" 166 test/portability/run)
 test(idle dbc check unit default "py:cantools py:pytest" 3 ${PYTEST} test/dbc --build ${B})
 test(idle sim check+full safety default "" 47 test/sim/run --build ${B} --jobs ${JOBS} --hours ${sim_hours} --first ${first})
