@@ -238,7 +238,8 @@ def units_of(items):
     """{name: the tests that are one attempt}"""
     units = {}
     for item in items:
-        shared, mark = item.cls and "setUpClass" in vars(item.cls), item.get_closest_marker("together")
+        shared = item.cls and "setUpClass" in vars(item.cls)
+        mark = item.get_closest_marker("together")
         name = f"{item.path.name}: {mark.args[0]}" if mark else item.parent.nodeid if shared else item.nodeid
         units.setdefault(name, []).append(item)
     return units

@@ -2,7 +2,7 @@
 // The sum of what wheels count under hands: a stall of ours is no gap of theirs.
 #include "bringup/bringup.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <math.h>
 
@@ -18,8 +18,6 @@ void setUp(void) {
     now_us = 5000000;
     hand_begin(&hand, &look, now_us);
 }
-
-void tearDown(void) {}
 
 /// The wheels turn for that time, the left one backwards; then an answer comes.
 static void turn_until_an_answer(int ms) {
@@ -37,7 +35,7 @@ static void turn(int ms) {
     }
 }
 
-static void test_hand_adds_what_both_wheels_count(void) {
+TEST(test_hand_adds_what_both_wheels_count) {
     turn(3000);
     TEST_ASSERT_EQUAL_INT64(-300, hand.ticks[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT64(300, hand.ticks[IW_RIGHT]);
@@ -48,7 +46,7 @@ static void test_hand_adds_what_both_wheels_count(void) {
 }
 
 /// What the machine under test did when it failed: it did not run for longer than the wheels may be offline.
-static void test_hand_stall_of_ours_loses_nothing(void) {
+TEST(test_hand_stall_of_ours_loses_nothing) {
     turn(1000);
     turn_until_an_answer(HAND_OFFLINE_US / 1000 + 100);
     look.heard = false; // What waited meanwhile has not been read yet.
@@ -60,7 +58,7 @@ static void test_hand_stall_of_ours_loses_nothing(void) {
     TEST_ASSERT_EQUAL_INT64(-100 - 60 - 2 - 100 - 200, hand.ticks[IW_LEFT]);
 }
 
-static void test_hand_stall_of_ours_does_not_change_the_rpm(void) {
+TEST(test_hand_stall_of_ours_does_not_change_the_rpm) {
     turn(2000);
     now_us += 1000000; // It turned, and stands when the next answer comes.
     look.ticks[IW_RIGHT] += RPM;
@@ -73,11 +71,11 @@ static void test_hand_stall_of_ours_does_not_change_the_rpm(void) {
     TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT))); // 200 of 500 ticks are too few.
 }
 
-static void test_hand_without_ticks_shows_no_rpm(void) {
+TEST(test_hand_without_ticks_shows_no_rpm) {
     TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
 }
 
-static void test_hand_wheel_that_is_offline_is_a_gap(void) {
+TEST(test_hand_wheel_that_is_offline_is_a_gap) {
     turn(100);
     look.heard = false;
     turn(HAND_OFFLINE_US / 1000);
@@ -94,7 +92,7 @@ static void test_hand_wheel_that_is_offline_is_a_gap(void) {
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-static void test_hand_stall_while_a_wheel_is_offline_counts_little(void) {
+TEST(test_hand_stall_while_a_wheel_is_offline_counts_little) {
     look.heard = false;
     turn_until_an_answer(1000);
     turn_until_an_answer(1000);
@@ -103,7 +101,7 @@ static void test_hand_stall_while_a_wheel_is_offline_counts_little(void) {
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
 }
 
-static void test_hand_wheel_that_restarts_is_a_gap(void) {
+TEST(test_hand_wheel_that_restarts_is_a_gap) {
     turn(100);
     look.reboots = 1;
     turn(LOOK_MS);
@@ -112,29 +110,15 @@ static void test_hand_wheel_that_restarts_is_a_gap(void) {
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-static void test_hand_that_nobody_watched_is_a_gap(void) {
+TEST(test_hand_that_nobody_watched_is_a_gap) {
     turn(100);
     turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1);
     TEST_ASSERT_EQUAL_INT(HAND_UNSEEN, hand.gap);
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-static void test_hand_that_begins_offline_is_a_gap(void) {
+TEST(test_hand_that_begins_offline_is_a_gap) {
     look.heard = false;
     hand_begin(&hand, &look, now_us);
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_hand_adds_what_both_wheels_count);
-    RUN_TEST(test_hand_stall_of_ours_loses_nothing);
-    RUN_TEST(test_hand_stall_of_ours_does_not_change_the_rpm);
-    RUN_TEST(test_hand_without_ticks_shows_no_rpm);
-    RUN_TEST(test_hand_wheel_that_is_offline_is_a_gap);
-    RUN_TEST(test_hand_stall_while_a_wheel_is_offline_counts_little);
-    RUN_TEST(test_hand_wheel_that_restarts_is_a_gap);
-    RUN_TEST(test_hand_that_nobody_watched_is_a_gap);
-    RUN_TEST(test_hand_that_begins_offline_is_a_gap);
-    return UNITY_END();
 }
