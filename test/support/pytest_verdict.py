@@ -101,7 +101,7 @@ def pytest_runtest_makereport(item, call):
     report.failures, report.claims = [], []
     if report.when == "call":
         rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type, which has said nothing.
-    report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
+        report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)

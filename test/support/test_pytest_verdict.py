@@ -248,7 +248,7 @@ class Conclusive(Made):
 
             def test_one(rig_type):
                 note("tried")
-                assert False, "the reason"
+                assert False, "Segmentation fault, the reason"
             """)
         self.assertIn("the reason", said)
 
