@@ -110,7 +110,8 @@ def pytest_runtest_makereport(item, call):
     report = yield
     report.failures, report.claims = [], []
     if report.when == "call":
-        report.sections += [("its programs said", one.said()) for one in (item.funcargs or {}).values() if report.failed and hasattr(one, "said")]
+        rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type, which has said nothing.
+        report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)

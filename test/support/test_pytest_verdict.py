@@ -36,6 +36,7 @@ FAULTS = (
     ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
     ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
     ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("a fixture that is a type hides the failure", "if not isinstance(one, type)]", "]", "test_fixture_that_is_a_type_hides_no_failure"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
     ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
     (
@@ -259,6 +260,22 @@ class Conclusive(Made):
                 assert False
             """)
         self.assertIn("Segmentation fault", said)
+
+    def test_fixture_that_is_a_type_hides_no_failure(self):
+        said = self.final("""
+            class Rig:
+                def said(self):
+                    return "nothing"
+
+            @pytest.fixture
+            def rig_type():
+                return Rig
+
+            def test_one(rig_type):
+                note("tried")
+                assert False, "Segmentation fault, the reason"
+            """)
+        self.assertIn("the reason", said)
 
     def test_crash_is_final(self):
         for crash in ("os.abort()", "os._exit(0)", "os.kill(os.getpid(), 9)"):
