@@ -104,6 +104,7 @@ FAULTS = (
         "pass",
         "test_what_needs_real_time_is_left_out_of_virtual_time",
     ),
+    ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
 LATE = "[(verdict.now_us(), 500_000)]"
@@ -552,6 +553,14 @@ class Chosen(Made):
         ran = self.run_made(self.TWO, "--collect-only", "-q", "-q")
         self.assertEqual(["test_it.py::test_long", "test_it.py::test_short"], [line for line in ran.lines if "::" in line])
         self.assertFalse(re.search(r"\d+ passed", "\n".join(ran.lines)))
+
+    def test_sample_is_of_the_commit(self):
+        many = 'import pytest\n@pytest.mark.parametrize("number", range(40))\ndef test_it(number):\n    pass\n'
+        git = "import pytest_verdict\npytest_verdict.commit = lambda _: {!r}\n".format
+        first, again, other = (self.run_made(many, "--sample", "4", conftest=git(key)) for key in ("abc", "abc", "def"))
+        self.assertEqual("4 passed, 0 failed, 0 skipped", first.last, first.lines)
+        self.assertEqual(first.cases, again.cases)
+        self.assertNotEqual(first.cases, other.cases)
 
     def test_nothing_that_ran_is_no_success(self):
         for tests, options, last in (
