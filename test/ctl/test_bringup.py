@@ -716,7 +716,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Distance in m", "")
         for gateway in (False, True):  # The wheels count on, and nothing of it is lost.
             self.begin_to_turn(operator)
-            self.freeze(self.child_of(operator, "iwheel-gateway") if gateway else operator.process.pid, 0.8)
+            self.freeze(children(operator.process.pid)["iwheel-gateway"] if gateway else operator.process.pid, 0.8)
             self.wait_until_stands()
             operator.type("\n")
             self.assertRegex(operator.expect("None was configured"), r"in 3\s+turns: the\s+track\s+is 5[34]\d\s+mm")

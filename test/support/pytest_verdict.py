@@ -321,7 +321,9 @@ class Run(verdict.Session):
                     report.outcome, report.longrepr = "skipped", (*report.location[:2], attempt.skip)
                 if report.skipped:
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
-                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
+                more = [f"attempt {tries}, alone"] if tries > 1 else []
+                more += [f"longest stall {self.stall_ms(attempt):.0f} ms"] if report.failed else []
+                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)

@@ -129,6 +129,13 @@ def stall(late_us=200_000, at_us=AT_US):
 
 
 class Conclusive(unittest.TestCase):
+    def test_failure_names_the_longest_stall_that_was_measured(self):
+        for late, words in (((), "meanwhile: 0 ms"), ((stall(7_000), stall(19_000)), "meanwhile: 19 ms")):
+            made, told = Made({"one": [bad(verdict.CHECK)]}, late), []
+            made.session.report = lambda name, kind, attempt, tries, told=told: told.extend(attempt.failures)
+            made.run()
+            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", told[0].text)
+
     def final(self, first, late=()):
         """One attempt, and a failure although the next one would pass."""
         status, lines, made = Made({"one": [first, ok(), ok(), ok()], "two": [ok()]}, late).run()
