@@ -31,10 +31,10 @@ void web_call_resume(web_call_t *self) {
     }
 }
 
-/// Nothing is loaded from elsewhere, nothing frames the page, nothing is kept, and nobody is told where a reader came from.
-static void add_headers(struct MHD_Response *response, const char *type) {
+/// Nothing is loaded from elsewhere, nothing frames the page, and nobody is told where a reader came from. Of what the machine does
+/// nothing is kept; the page's files may be, but are asked for each time.
+static void add_headers(struct MHD_Response *response, const char *type, bool is_file) {
     static const char *const headers[][2] = {
-        {"Cache-Control", "no-store"},
         {"Content-Security-Policy",
          "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
          "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
@@ -44,6 +44,7 @@ static void add_headers(struct MHD_Response *response, const char *type) {
         {"X-Content-Type-Options", "nosniff"},
     };
     (void)MHD_add_response_header(response, "Content-Type", type);
+    (void)MHD_add_response_header(response, "Cache-Control", is_file ? "no-cache" : "no-store");
     for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
         (void)MHD_add_response_header(response, headers[i][0], headers[i][1]);
     }
@@ -54,7 +55,7 @@ static enum MHD_Result send_response(const web_call_t *self, unsigned status, st
     if (response == NULL) {
         return MHD_NO;
     }
-    add_headers(response, type);
+    add_headers(response, type, self->verdict.route != NULL && self->verdict.route->verb == WEB_FILE);
     if (status == 401U) {
         (void)MHD_add_response_header(response, "WWW-Authenticate", "IWheel");
     }
@@ -86,11 +87,22 @@ enum MHD_Result web_call_refuse(web_call_t *self, unsigned status, const char *e
 }
 
 static enum MHD_Result send_file(web_call_t *self) {
-    const web_file_t *file = &self->server->files[self->verdict.route - web_routes()];
-    if (file->text == NULL) {
+    const page_file_t *file = &self->server->files[self->verdict.route - web_routes()];
+    const page_body_t *body = page_file_choose(file, header(self->connection, "Accept-Encoding"));
+    const bool known = page_body_is_known(body, header(self->connection, "If-None-Match"));
+    if (body->text == NULL) {
         return web_call_refuse(self, 404, "not_there", "this file is not installed");
     }
-    return send_text(self, file->text, file->length, MHD_RESPMEM_PERSISTENT);
+    struct MHD_Response *response =
+        MHD_create_response_from_buffer(known ? 0U : body->length, body->text, MHD_RESPMEM_PERSISTENT);
+    if (response != NULL) {
+        (void)MHD_add_response_header(response, "Vary", "Accept-Encoding");
+        (void)MHD_add_response_header(response, "ETag", body->tag);
+        if (body == &file->packed && !known) {
+            (void)MHD_add_response_header(response, "Content-Encoding", "gzip");
+        }
+    }
+    return send_response(self, known ? 304U : 200U, response, self->verdict.route->type);
 }
 
 static enum MHD_Result send_challenge(web_call_t *self) {

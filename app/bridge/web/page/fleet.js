@@ -19,9 +19,6 @@ function pair(left, right, digits) {
   return left === null && right === null ? null : words.join(" / ");
 }
 
-// A machine without a clock tells none.
-const when = (wall_us) => (wall_us === null ? STRINGS.unknown : new Date(wall_us / 1000).toLocaleString());
-
 function row(machine) {
   const made = document.createElement("tr"), name = document.createElement("th"), online = machine.online;
   name.scope = "row";

@@ -1,19 +1,58 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Every word of the page. Texts with {names} are filled in; cures and sentences are those of `iwheelctl status` (a test compares them).
-const STRINGS = {
+// Every word of the page in English. Texts with {names} are filled in. `cures` and `next` are those of `iwheelctl status` (a test compares them).
+// Another language is one file more: the same names, a line in CMakeLists.txt. language.js selects it.
+(globalThis.LANGUAGES ??= {}).en = {
+  language_name: "English",
+  locale: "en-GB",
   title: "iWheel",
   token: "Token of this page",
-  token_help: "It is in the address that `iwheelctl web` prints on the machine. It changed, or it was never given here.",
+  token_help: "The token is in the address that `iwheelctl web` prints on the machine.",
+  token_missing: "This page has no token yet.",
+  token_wrong: "The token is not valid: it was replaced, or it is mistyped.",
   open: "Open",
   state: "State",
+  figures: "Figures",
+  figures_of: "{side}: all figures",
+  settings: "Settings",
+  language: "Language",
+  units: "Speed in",
+  forget: "Forget the token on this device",
+  more: "Details: bus, lease, stop budget, warnings",
+  more_warnings: "Details: bus, lease, stop budget; warnings: {n}",
+  big_speed: "Speed",
+  big_force: "Net force",
+  big_battery: "Battery",
+  big_estop: "E-stop",
+  word: {
+    unknown: "Unknown", ready: "Ready", not_ready: "Not ready", watching: "Watching", arming: "Arming", armed: "Driving", stopping: "Stopping", holding: "Holding",
+    latched: "Latched",
+  },
+  here: {
+    ready: "nothing is sent to the wheels",
+    ready_drive: "nothing is sent to the wheels; to drive, switch the pad on",
+    armed: "{name} drives; STOP ends that",
+    armed_here: "this page drives; STOP ends that",
+    latched: "{cure}; then press Reset",
+  },
+  estop_words: { released: "released", pressed: "PRESSED", unreadable: "UNREADABLE", disagrees: "CONTACTS DISAGREE", none: "NONE" },
+  estop_simulated: "simulated",
+  causes: {
+    estop_line: "e-stop pressed", estop_disagrees: "e-stop contacts disagree", estop_software: "stop without ramp, by a person", wheel_lost: "wheel offline",
+    wheel_rebooted: "wheel restarted", send_stalled: "no echo of our frames", bus_down: "bus down", second_master: "another program sends setpoints",
+    feedback_sign: "wheel turns the wrong way", overspeed: "wheel too fast", loop_hung: "gateway was hung", internal: "fault of the gateway",
+    loop_late: "gateway was late", wheel_blocked: "wheel blocked", pair_diverges: "one wheel deviates", lease_lost: "commands came too late",
+    client_gone: "driver disconnected", client_stop: "stopped by a person", shutdown: "gateway ended", restart: "gateway restarted",
+  },
+  sides: { left: "left", right: "right", both: "both" },
   estop_line: "E-stop line",
   bus: "Bus",
   lease: "Who drives",
   budget: "Stop budget",
   drive: "Drive",
-  drive_help: "Hold the pad to drive; let go to stop. Hidden page, lost focus or a slow connection stop the wheels too. With keys: hold an arrow key while the pad has the focus.",
-  pad_on: "Switch the pad on",
+  drive_help: "Hold the pad to drive; let go to stop. A hidden page, lost focus, a second finger or a slow connection also stop the wheels. Keys: hold arrow keys while the pad has the focus; two of them drive a curve.",
+  pad_on: "Switch the pad on …",
+  pad_off: "Switch the pad off",
   plots: "Plots",
   freeze: "Freeze",
   unfreeze: "Go on",
@@ -21,6 +60,8 @@ const STRINGS = {
   play: "Play",
   pause: "Pause",
   left: "Left wheel",
+  side_left: "Left",
+  side_right: "Right",
   right: "Right wheel",
   pose: "Pose",
   pose_clear: "Clear the path",
@@ -35,10 +76,11 @@ const STRINGS = {
   stop: "STOP",
   stop_hint: "ramps the wheels to zero",
   stop_key: "; key: S",
-  halt: "Zero without ramp, and latch …",
+  halt: "Zero, no ramp, latch …",
   no_safety: "A software stop over the network. No safety function: to be safe, use the device that cuts the wheels' power.",
+  no_safety_short: "Over the network. No safety function.",
   cancel: "Cancel",
-  reset: "Reset the latch …",
+  reset: "Reset …",
   fleet: "Fleet",
   fleet_title: "iWheel fleet",
   fleet_this: "This machine",
@@ -76,20 +118,24 @@ const STRINGS = {
   ask_arm_yes: "Switch it on",
   pad: "Pad to drive: hold to move, let go to stop",
   pad_ready: "Hold the pad to drive.",
-  pad_drives: "Driving: {v} mm/s, turning {yaw} mrad/s.",
-  pad_no_hand: "Driving: {v} mm/s, turning {yaw} mrad/s. Nothing moves on the pad for 1 s: move, or the wheels stop.",
+  pad_drives: "Driving.",
+  pad_limited: "Driving; the gateway limits this command.",
+  pad_no_hand: "Nothing moves on the pad for 1 s: move, or the wheels stop.",
+  pad_command: "Command", pad_measured: "Measured", pad_turn: "{deg} °/s", pad_limit: "Limit",
   pad_stopped: "Stopped: {why}.",
   why_let_go: "you let go",
   why_hidden: "the page was hidden or lost the focus",
   why_no_hand: "no movement and no key for 2 s; let go, then hold the pad again",
   why_slow: "the connection is too slow",
+  why_second: "a second finger touched the screen",
+  why_off: "the pad was switched off",
   news_live: "live",
   news_none: "No news for {s} s: what is shown is old.",
   news_away: "The gateway is not there. Nothing of the wheels is known.",
   news_bridge: "No connection to the bridge. Nothing of the wheels is known.",
   state_arming: "arming",
   state_unknown: "unknown",
-  last_stop: "Last stop: {sentence}",
+  last_stop: "Last stop {when}: {cause}",
   estop_says: "{state}{simulated}, line {line}{second}{tried}",
   second_says: ", line2 {line2}; pressed at {pressed_at}",
   tried_says: "; button tried: {when}",
@@ -171,14 +217,3 @@ const STRINGS = {
     lease_lost: "the client must send drive commands more often, or raise lease_ms",
   },
 };
-
-// The text of that name with its {gaps} filled.
-function say(name, values = {}) {
-  return STRINGS[name].replace(/\{(\w+)\}/g, (_, key) => values[key] ?? STRINGS.unknown);
-}
-
-function fill(text, values) {
-  return text.replace(/\{(\w+)\}/g, (_, key) => values[key] ?? STRINGS.unknown);
-}
-
-for (const element of document.querySelectorAll("[data-s]")) element.textContent = STRINGS[element.dataset.s];
