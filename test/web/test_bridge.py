@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
@@ -993,6 +994,45 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
             until(lambda web=web: "its address with the token" in web.text(), what="it starts")
         else:
             assert code == web.wait(5) == 78 and about in words and about in web.text(), (code, words, web.text())
+
+
+def start_lan(rig):
+    """The bridge by `--lan`, and the address that it prints."""
+    rig.write_web()
+    rig.web = Process([rig.program("iwheel-web"), "-c", rig.path("web.conf"), "--lan"], rig.path("web.out"))
+    rig.processes.append(rig.web)
+    found = until(lambda: re.search(r"https://([\d.]+):(\d+)/#token=([0-9a-f]{32})", rig.web.text()), what="the address is printed")
+    assert int(found[2]) == rig.port and found[3] == rig.token
+    return found[0], found[1]
+
+
+def test_lan_serves_by_https_with_its_own_certificate_and_never_drives(rig):
+    rig.start_gateway()
+    _, address = start_lan(rig)
+    files = {name: Path(rig.path(name)) for name in ("lan-certificate.pem", "lan-key.pem", "token")}
+    assert all(path.stat().st_mode & 0o077 == 0 for path in files.values())
+    made = files["lan-certificate.pem"].read_bytes()
+    trust = ssl.create_default_context(cafile=str(files["lan-certificate.pem"]))
+    for host in (address, "localhost", socket.gethostname()):
+        with socket.create_connection((address, rig.port), timeout=5) as one, trust.wrap_socket(one, server_hostname=host) as tls:
+            tls.sendall(f"POST /api/stop HTTP/1.1\r\nHost: {host}:{rig.port}\r\nConnection: close\r\n\r\n".encode())
+            assert tls.recv(100).startswith(b"HTTP/1.1 200"), host
+    secret = urllib.request.Request(f"https://{address}:{rig.port}/health", headers={"Authorization": f"Bearer {rig.read_secret}"})
+
+    def health():
+        with contextlib.suppress(urllib.error.HTTPError):  # 503: it does not know the gateway's state yet.
+            return json.loads(urllib.request.urlopen(secret, context=trust).read())
+
+    assert until(health, what="the gateway's state is known")["may_drive"] is False
+    rig.web.signal(15)
+    assert rig.web.wait(5) == 0
+    start_lan(rig)
+    assert files["lan-certificate.pem"].read_bytes() == made, "made once"
+    rig.web.signal(15)
+    rig.web.wait(5)
+    files["lan-certificate.pem"].write_text("no certificate")
+    start_lan(rig)
+    assert files["lan-certificate.pem"].read_bytes() not in (made, b"no certificate")
 
 
 def test_tls_is_new_and_authenticated_only(rig):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from bus import now_us
 from judge_log import LEFT, RIGHT
+from test_bridge import start_lan
 from test_browser import SIZES, live, page_of, press_stop, seen, turns
 from trials import Driver, braking_ms, until
 
@@ -124,7 +125,7 @@ def test_two_fingers_do_not_zoom_the_page(rig):
         for selector in ("#word", "#figures", "#stop", "#left .plot [role=img]"):
             page.locator(selector).first.scroll_into_view_if_needed()
             box = page.locator(selector).first.bounding_box()
-            session.send("Input.synthesizePinchGesture", {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2, "scaleFactor": 3.3})
+            session.send("Input.synthesizePinchGesture", {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2, "scaleFactor": 3.3, "gestureSourceType": "touch"})
             assert page.evaluate("visualViewport.scale") == 1, selector
 
 
@@ -233,9 +234,10 @@ def test_pad_two_keys_are_a_curve_and_one_released_leaves_the_other(rig):
         assert braking_ms(rig, since) < 500
 
 
-def fingers(page, kind, *places):
+def fingers(session, kind, *places):
+    """Fingers that touch, move or leave: a touch belongs to the session that began it."""
     points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(places)]
-    page.context.new_cdp_session(page).send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
 @pytest.mark.rig(driving=True)
@@ -244,19 +246,20 @@ def test_pad_by_touch_drives_and_a_second_finger_stops(rig):
     with page_of(rig, "portrait", **touch("portrait")) as page:
         live(page)
         switch_on(page)
+        session = page.context.new_cdp_session(page)
         box = page.locator("#pad").bounding_box()
         one = (box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.25)
         for second, begins in (((one[0] + 60, one[1] + 60), "on the pad"), ((20, 20), "elsewhere")):
-            fingers(page, "touchStart", one)
+            fingers(session, "touchStart", one)
             turns(rig)
             since = now_us()
-            fingers(page, "touchStart", one, second)
+            fingers(session, "touchStart", one, second)
             assert braking_ms(rig, since) < 500, begins
             seen(page, "document.querySelector('#pad-says').textContent.includes('second finger')")
-            fingers(page, "touchMove", (one[0] + 5, one[1]), second)
+            fingers(session, "touchMove", (one[0] + 5, one[1]), second)
             until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
             assert not page.evaluate("drive.held"), "a finger that stayed does not drive again"
-            fingers(page, "touchEnd")
+            fingers(session, "touchEnd")
             time.sleep(0.6)
 
 
@@ -290,3 +293,144 @@ def test_token_is_kept_and_can_be_forgotten(rig):
         page.fill("#token", "0" * 32)
         page.keyboard.press("Enter")
         seen(page, "document.querySelector('#login-says').textContent.includes('not valid')")
+
+
+# ---- languages ------------------------------------------------------------------------------------------------------
+
+# Name and {gaps} of each text, of one language.
+SHAPE = """(language) => { const walk = (value, name) => typeof value === 'object' ? Object.entries(value).flatMap(([key, one]) => walk(one, `${name}.${key}`))
+  : [name + ' ' + (value.match(/\\{\\w+\\}/g) ?? []).sort().join()]; return walk(LANGUAGES[language], ''); }"""
+
+
+def test_languages_have_the_same_texts_with_the_same_gaps(rig):
+    rig.start()
+    with page_of(rig) as page:
+        languages = page.evaluate("Object.keys(LANGUAGES)")
+        english = page.evaluate(SHAPE, "en")
+        assert len(languages) >= 2 and len(english) > 200
+        for one in languages:
+            assert sorted(page.evaluate(SHAPE, one)) == sorted(english), one
+
+
+@pytest.mark.rig(driving=True)
+def test_page_speaks_german_to_a_german_browser_and_english_when_asked(rig):
+    rig.start().connected()
+    rig.sim.ask("estop press")
+    until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="the stop is known")
+    for size in VIEWS:
+        with page_of(rig, size, locale="de-AT", **touch(size)) as page:
+            live(page)
+            seen(page, "document.querySelector('#last-stop').textContent.includes('Not-Halt')")
+            all_seen(page, ["word", "sentence", "reset", "last-stop", *FIGURES, "stop"], size)
+            assert page.inner_text("#word") == "Gesperrt" and page.evaluate("document.documentElement.lang") == "de"
+            assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0, size
+            shot(page, f"german-{size}")
+    with page_of(rig, locale="fr-FR") as page:
+        live(page)
+        assert page.inner_text("#word") == "Latched"
+        page.select_option("#language", "de")
+        seen(page, "document.querySelector('#word')?.textContent === 'Gesperrt'")
+        page.select_option("#language", "en")
+        seen(page, "document.querySelector('#word')?.textContent === 'Latched'")
+
+
+# ---- plots ----------------------------------------------------------------------------------------------------------
+
+
+def scale(page, side, what, axis="x"):
+    return page.evaluate(f"[plots.{side}.{what}.uplot.scales.{axis}.min, plots.{side}.{what}.uplot.scales.{axis}.max]")
+
+
+def test_plots_have_common_axes_spans_and_marks(rig):
+    rig.start().connected()
+    driver = Driver(rig, 200)
+    with page_of(rig) as page:
+        live(page)
+        page.evaluate("document.querySelector('#tools').scrollIntoView()")
+        rig.sim.ask("load left 30")
+        time.sleep(1.5)
+        rig.ask("POST", "/api/stop")
+        seen(
+            page,
+            "view.live_marks.some((one) => one.words === STRINGS.causes.client_stop) && view.live_marks.some((one) => one.words === STRINGS.states.listening)",
+        )
+        driver.end()
+        page.click("#freeze")
+        time.sleep(0.5)
+        for what in ("speed", "force"):
+            assert scale(page, "left", what, "y") == scale(page, "right", what, "y"), what
+        assert scale(page, "left", "speed", "y")[1] > 150
+        assert page.evaluate("plots.left.force.lines.map((line) => plots.left.force.shows(line))") == [False, False, True]
+        page.click("#forces")
+        assert page.evaluate("plots.right.force.lines.every((line) => plots.right.force.shows(line))")
+        page.click("#freeze")
+        for seconds in (10, 600, 60):
+            page.click(f"#spans [data-seconds='{seconds}']")
+            seen(page, f"Math.abs(plots.right.force.uplot.scales.x.max - plots.right.force.uplot.scales.x.min - {seconds}) < 0.01")
+            assert page.get_attribute(f"#spans [data-seconds='{seconds}']", "aria-pressed") == "true"
+        assert page.inner_text("#left .plot .measured b").lstrip("-").isdigit()
+
+
+def test_plots_are_dragged_and_pinched_by_touch(rig):
+    rig.start().connected()
+    with page_of(rig, "portrait", **touch("portrait")) as page:
+        live(page)
+        page.click("#freeze")
+        page.locator("#left .plot .canvas").first.scroll_into_view_if_needed()
+        time.sleep(0.5)
+        box = page.locator("#left .plot .canvas").first.bounding_box()
+        session = page.context.new_cdp_session(page)
+        y, middle = box["y"] + box["height"] / 2, box["x"] + box["width"] / 2
+        before = scale(page, "left", "speed")
+        fingers(session, "touchStart", (middle, y))
+        for step in range(1, 6):
+            fingers(session, "touchMove", (middle + step * 20, y))
+        fingers(session, "touchEnd")
+        seen(page, f"plots.right.speed.uplot.scales.x.max < {before[1] - 5}")
+        moved = scale(page, "left", "speed")
+        assert abs((moved[1] - moved[0]) - (before[1] - before[0])) < 0.01, "dragged, not zoomed"
+        fingers(session, "touchStart", (middle - 30, y), (middle + 30, y))
+        for step in range(1, 6):
+            fingers(session, "touchMove", (middle - 30 - step * 10, y), (middle + 30 + step * 10, y))
+        fingers(session, "touchEnd")
+        seen(page, f"plots.left.speed.uplot.scales.x.max - plots.left.speed.uplot.scales.x.min < {(moved[1] - moved[0]) / 2}")
+        assert page.evaluate("visualViewport.scale") == 1
+
+
+def test_recording_has_its_cursor_at_0_and_no_live_figure_under_its_headings(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
+    rig.sim.ask("estop press")
+    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
+    time.sleep(2.5)  # It grows for two seconds.
+    driver.end()
+    with page_of(rig) as page:
+        live(page)
+        assert page.locator("#left > details").is_visible()
+        page.click("#recordings button:text-is('Open')")
+        page.wait_for_selector("#player:not([hidden])")
+        seen(page, "!document.querySelector('#left .at').hidden")
+        at, zero = page.evaluate("[parseFloat(document.querySelector('#left .at').style.left), plots.left.speed.uplot.valToPos(0, 'x')]")
+        assert abs(float(page.input_value("#at"))) <= 0.01 and abs(at - zero) < 1, (at, zero)
+        assert page.evaluate("view.marks.some((one) => one.words === STRINGS.causes.estop_line)")
+        assert not page.locator("#left > details").is_visible() and not page.locator("#right > details").is_visible()
+        page.evaluate("goTo(-0.03)")
+        assert int(page.inner_text("#left .plot .measured b")) > 150, "the value at the cursor"
+        shot(page, "recording")
+        page.click("#live")
+        assert page.locator("#left > details").is_visible() and page.evaluate("document.querySelector('#left .at').hidden")
+
+
+def test_page_of_the_lan_is_live_and_an_app(rig):
+    """As a phone opens it from the QR code, past the browser's warning."""
+    rig.start_gateway()
+    url, _ = start_lan(rig)
+    with page_of(rig, "portrait", url=url, ignore_https_errors=True, **touch("portrait")) as page:
+        live(page)
+        assert page.evaluate("isSecureContext") and "token" not in page.url
+        manifest = page.evaluate("fetch(document.querySelector('link[rel=manifest]').href).then((answer) => answer.json())")
+        assert manifest["display"] == "standalone" and manifest["start_url"] == "/"
+        assert page.evaluate("fetch('/icon.svg').then((answer) => answer.headers.get('Content-Type'))") == "image/svg+xml"
+        page.goto(page.url)  # Opened again without the token in its address, as the app is.
+        live(page)

@@ -37,6 +37,7 @@ static void add_headers(struct MHD_Response *response, const char *type, bool is
     static const char *const headers[][2] = {
         {"Content-Security-Policy",
          "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
+         "manifest-src 'self'; "
          "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
         {"Cross-Origin-Opener-Policy", "same-origin"},
         {"Cross-Origin-Resource-Policy", "same-origin"},
@@ -127,17 +128,18 @@ static enum MHD_Result send_status(web_call_t *self) {
 static enum MHD_Result send_health(web_call_t *self) {
     const web_server_t *server = self->server;
     const web_settings_t *settings = server->settings;
-    char text[384];
+    char text[640];
     iwc_message_t state;
     const bool good = web_link_state(&server->link, server->now_us, &state);
-    const int length = snprintf(
-        text, sizeof text,
-        "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
-        "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s}\n",
-        good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
-        settings->drive.enabled ? "true" : "false",
-        (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false", settings->drive.max_speed_mm_s,
-        settings->drive.ttl_ms, settings->gateway.rate_hz, web_settings_has_fleet(settings) ? "true" : "false");
+    const int length =
+        snprintf(text, sizeof text,
+                 "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
+                 "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s,\"machine_page\":\"%s\"}\n",
+                 good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
+                 settings->drive.enabled ? "true" : "false",
+                 (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false",
+                 settings->drive.max_speed_mm_s, settings->drive.ttl_ms, settings->gateway.rate_hz,
+                 web_settings_has_fleet(settings) ? "true" : "false", web_settings_machine_page(settings));
     self->status = good ? 200U : 503U;
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }

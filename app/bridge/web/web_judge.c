@@ -27,6 +27,8 @@ static const web_route_t routes[] = {
     {"GET", "/page.js", WEB_FILE, "page.js", JS},
     {"GET", "/fleet", WEB_FILE, "fleet.html", "text/html; charset=utf-8"},
     {"GET", "/fleet.js", WEB_FILE, "fleet.js", JS},
+    {"GET", "/manifest.webmanifest", WEB_FILE, "manifest.webmanifest", "application/manifest+json"},
+    {"GET", "/icon.svg", WEB_FILE, "icon.svg", "image/svg+xml"},
     {"GET", "/uPlot.iife.min.js", WEB_FILE, "uPlot.iife.min.js", JS},
     {"GET", "/uPlot.min.css", WEB_FILE, "uPlot.min.css", "text/css; charset=utf-8"},
     {"GET", "/uPlot.LICENSE", WEB_FILE, "uPlot.LICENSE", TEXT},

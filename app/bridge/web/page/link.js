@@ -89,7 +89,15 @@ function takeEvent(event) {
   }
 }
 
+// What changes in the machine is marked in the plots.
+function markChange(before, state) {
+  if (!before || before.state === state.state) return;
+  const cause = state.cause !== before.cause ? state.cause : null;
+  markLive(state.t_us / 1e6, cause ? causeInWords({ cause }) : STRINGS.states[state.state] ?? state.state, toneOf(state.state));
+}
+
 function takeState(state) {
+  markChange(page.state, state);
   page.state = state;
   forgetDelivered(state);
   page.t_us = state.t_us;

@@ -5,10 +5,6 @@
 const plots = {};
 let path;
 
-function allPlots() {
-  return Object.values(plots).flatMap((pair) => Object.values(pair));
-}
-
 function setUpWheel(side) {
   const card = $(side), label = (name) => fill(STRINGS[name], { side: STRINGS[side] });
   plots[side] = {
@@ -16,8 +12,9 @@ function setUpWheel(side) {
       { name: "wanted", label: STRINGS.wanted, column: "wanted_mm_s", dash: [2, 4] }, { name: "told", label: STRINGS.told, column: "told_mm_s", dash: [8, 4] },
       { name: "measured", label: STRINGS.measured, column: "measured_mm_s" }], `${side}-speed`),
     force: new Plot(card, STRINGS.force_plot, label("force_label"), [
-      { name: "wanted", label: STRINGS.raw, column: "raw_N", dash: [2, 4] }, { name: "offset", label: STRINGS.offset, column: "offset_N", dash: [8, 4] },
-      { name: "measured", label: STRINGS.net, column: "net_N" }], `${side}-force`),
+      { name: "wanted", label: STRINGS.raw, column: "raw_N", dash: [2, 4], digits: 2, more: true },
+      { name: "offset", label: STRINGS.offset, column: "offset_N", dash: [8, 4], digits: 2, more: true },
+      { name: "measured", label: STRINGS.net, column: "net_N", digits: 2 }], `${side}-force`),
   };
   card.append(element("details", {}, element("summary", { text: say("figures_of", { side: STRINGS[side] }) }), element("dl", { class: "facts" }, ...figures.map(([name]) =>
     element("div", {}, element("dt", { text: STRINGS[name] }), element("dd", { id: `${side}-${name}` }))))));
@@ -39,6 +36,8 @@ function setUp() {
   $("last-stop").addEventListener("click", () => { document.querySelector("#stops details")?.setAttribute("open", ""); });
   $("freeze").addEventListener("click", freeze);
   $("live").addEventListener("click", goLive);
+  $("forces").addEventListener("click", showAllForces);
+  for (const one of $("spans").children) one.addEventListener("click", () => showSpan(Number(one.dataset.seconds)));
   $("play").addEventListener("click", playOn);
   $("at").addEventListener("input", () => goTo(Number($("at").value)));
   $("pose-clear").addEventListener("click", () => path.clear());
@@ -54,14 +53,15 @@ function setUp() {
     letGo("why_hidden");
     if (document.hidden) page.stream?.abort(); else { page.wait = 100; listen(); }
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { allPlots().forEach((plot) => plot.build()); path.dirty = true; });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { view.plots.forEach((plot) => plot.build()); path.dirty = true; });
   if (!proof.token) askToken();
   listen();
   setInterval(show, 200);
   const paint = () => {
-    if (performance.now() - paint.last >= 50) {
+    // Ten minutes are many points, and nobody sees a fiftieth of a second in them.
+    if (performance.now() - paint.last >= (view.span_s > 60 ? 500 : 50) || view.plots.some((plot) => plot.forced)) {
       paint.last = performance.now();
-      allPlots().forEach((plot) => plot.draw());
+      view.plots.forEach((plot) => plot.draw());
       path.draw();
     }
     requestAnimationFrame(paint);

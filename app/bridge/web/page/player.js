@@ -45,22 +45,30 @@ async function loadRecordings() {
     return;
   }
   $("recordings-says").textContent = found.length ? "" : STRINGS.recordings_none;
-  const endings = [["log", "log_bytes"], ["jsonl", "jsonl_bytes"], ["conf", "conf_bytes"]];
-  $("recordings").replaceChildren(
-    element("thead", {}, element("tr", {}, ...STRINGS.recording_head.map((cell) => element(cell ? "th" : "td", cell ? { text: cell, scope: "col" } : {})))),
-    element("tbody", {}, ...[...found].reverse().map((one) => {
-      const there = endings.filter(([, size]) => one[size] !== null).map(([ending]) => ending);
-      const open = element("button", { type: "button", class: "small", text: STRINGS.recording_open, "aria-label": fill(STRINGS.recording_open_of, one) });
-      open.addEventListener("click", () => openRecording(one.name, there));
-      const saves = there.map((ending) => {
-        const name = `${one.name}.${ending}`;
-        const made = element("button", { type: "button", class: "small", text: `.${ending}`, "aria-label": fill(STRINGS.recording_save_of, { name }) });
-        made.addEventListener("click", async () => { const blob = await load(name); if (blob) save(blob, name); });
-        return made;
-      });
-      return element("tr", {}, element("th", { text: one.name, scope: "row" }), element("td", { text: one.cause }), element("td", { text: when(one.wall_us) }),
-        element("td", { text: one.log_bytes === null ? STRINGS.unknown : String(one.log_bytes) }), element("td", {}, element("div", { class: "row" }, open, ...saves)));
-    })));
+  $("recordings").replaceChildren(...[...found].reverse().map(recordingCard));
+}
+
+// What it is, when it was made, and a button for each thing that can be done with it.
+function recordingCard(one) {
+  const there = ["log", "jsonl", "conf"].filter((ending) => one[`${ending}_bytes`] !== null);
+  const button = (text, label, action, kind = "") => {
+    const made = element("button", { type: "button", text, "aria-label": label, ...(kind ? { "data-ending": kind } : {}) });
+    made.addEventListener("click", action);
+    return made;
+  };
+  const saved = (name) => fill(STRINGS.recording_save_of, { name });
+  const saves = there.map((ending) => {
+    const name = `${one.name}.${ending}`;
+    const text = ending === "log" ? STRINGS.log_recording : `.${ending}`;
+    return button(text, `${text}: ${saved(name)}`, async () => { const blob = await load(name); if (blob) save(blob, name); }, ending);
+  });
+  const csv = button(STRINGS.csv_recording, saved(`${one.name}.csv`), async () => {
+    const recording = decodeRecording(await loadAll(one.name, there));
+    if (recording) save(new Blob([recordingCsv(recording)], { type: "text/csv" }), `${one.name}.csv`);
+  }, "csv");
+  const size = one.log_bytes === null ? STRINGS.unknown : `${(one.log_bytes / 1000).toFixed(0)} kB`, cause = STRINGS.recording_causes[one.cause] ?? causeInWords({ cause: one.cause });
+  return element("li", {}, element("h3", { text: capital(cause) }), element("p", { class: "quiet", text: fill(STRINGS.recording_facts, { when: when(one.wall_us), size, name: one.name }) }),
+    element("div", { class: "row" }, button(STRINGS.recording_open, fill(STRINGS.recording_open_of, one), () => openRecording(one.name, there)), ...saves, csv));
 }
 
 async function load(name) {
@@ -74,14 +82,19 @@ async function load(name) {
   }
 }
 
-async function openRecording(name, endings) {
+// Its files as texts; what cannot be read is left out, and said.
+async function loadAll(name, endings) {
   const files = {};
   for (const ending of endings) {
     const blob = await load(`${name}.${ending}`);
-    if (!blob) return;
-    files[ending] = await blob.text();
+    if (blob) files[ending] = await blob.text();
   }
-  showRecording(name, files);
+  return files;
+}
+
+async function openRecording(name, endings) {
+  const files = await loadAll(name, endings);
+  if (endings.every((ending) => ending in files)) showRecording(name, files);
 }
 
 async function openFiles(list) {
@@ -105,10 +118,12 @@ function showRecording(name, files) {
     plots[side].speed.show(recording.wheels[i].speed);
     plots[side].force.show(recording.wheels[i].force);
   });
-  Object.assign($("at"), { min: recording.first, max: recording.last, value: recording.first });
+  view.marks = recording.happened.map(({ t, state, cause }) => ({ t, words: cause ? causeInWords({ cause }) : STRINGS.states[state] ?? state, tone: toneOf(state) }));
+  Object.assign($("at"), { min: recording.first, max: recording.last, value: 0 });
   $("source").textContent = fill(STRINGS.recording_shown, { name });
   $("happened").replaceChildren(...recording.happened.slice(-40).map((one) => element("li", { text: `${one.t.toFixed(3)} s: ${one.text}` })));
   $("player").hidden = false;
+  document.body.classList.add("recorded"); // The figures of now are not shown under its headings.
   goTo(0);
   $("tools").scrollIntoView();
 }
@@ -116,11 +131,9 @@ function showRecording(name, files) {
 function goTo(t) {
   const state = page.recording.states.findLast((one) => one.t <= t)?.state;
   $("at").value = t;
+  view.at = Number(t);
   $("at-says").textContent = fill(STRINGS.player_at, { s: Number(t).toFixed(2), state: state ?? STRINGS.unknown });
-  for (const plot of allPlots()) {
-    plot.draw();
-    plot.uplot.setCursor({ left: plot.uplot.valToPos(t, "x"), top: 0 });
-  }
+  for (const plot of view.plots) plot.showAt();
 }
 
 function playOn() {
@@ -142,15 +155,28 @@ function playOn() {
 function goLive() {
   page.recording = null;
   page.frozen = false;
+  view.at = view.marks = null;
+  document.body.classList.remove("recorded");
   $("player").hidden = true;
   $("play").dataset.on = "";
   $("source").textContent = STRINGS.source_live;
   $("freeze").setAttribute("aria-pressed", "false");
   $("freeze").textContent = STRINGS.freeze;
-  for (const plot of allPlots()) {
-    plot.freeze(false);
-    plot.show(null);
-  }
+  freezeView(false);
+  for (const plot of view.plots) plot.show(null);
+}
+
+// How much of the time up to now is shown.
+function showSpan(seconds) {
+  view.span_s = seconds;
+  for (const one of $("spans").children) one.setAttribute("aria-pressed", String(Number(one.dataset.seconds) === seconds));
+  resetView();
+}
+
+function showAllForces() {
+  const all = $("forces").getAttribute("aria-pressed") !== "true";
+  $("forces").setAttribute("aria-pressed", String(all));
+  for (const side of ["left", "right"]) plots[side].force.showAll(all);
 }
 
 function freeze() {
@@ -158,5 +184,5 @@ function freeze() {
   $("freeze").setAttribute("aria-pressed", String(page.frozen));
   $("freeze").textContent = page.frozen ? STRINGS.unfreeze : STRINGS.freeze;
   $("source").textContent = page.frozen ? fill(STRINGS.source_frozen, { when: new Date().toLocaleTimeString() }) : STRINGS.source_live;
-  for (const plot of allPlots()) plot.freeze(page.frozen);
+  freezeView(page.frozen);
 }

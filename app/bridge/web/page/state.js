@@ -72,6 +72,8 @@ function showWheel(side, wheel) {
   for (const [name, read] of figures) text(`${side}-${name}`, wheel ? read(wheel) : null, name === "heard" && wheel && !wheel.heard ? "bad" : "");
 }
 
+const toneOf = (state) => ({ latched: "bad", stopping: "care", stopped: "care", died: "bad" })[state] ?? "accent";
+
 const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 // The state in one word, its tone, and one sentence: what to do now.
