@@ -125,7 +125,10 @@ def test_two_fingers_do_not_zoom_the_page(rig):
         for selector in ("#word", "#figures", "#stop", "#left .plot [role=img]"):
             page.locator(selector).first.scroll_into_view_if_needed()
             box = page.locator(selector).first.bounding_box()
-            session.send("Input.synthesizePinchGesture", {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2, "scaleFactor": 3.3, "gestureSourceType": "touch"})
+            session.send(
+                "Input.synthesizePinchGesture",
+                {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2, "scaleFactor": 3.3, "gestureSourceType": "touch"},
+            )
             assert page.evaluate("visualViewport.scale") == 1, selector
 
 
