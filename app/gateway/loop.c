@@ -23,7 +23,7 @@
 #define ECHO_LOOK_US 1000U
 /// The same interval while nothing is sent, if frames wait.
 #define REST_LOOK_US 6000U
-/// After this time without frames the bus wakes the loop again, so that the loop does not poll in vain.
+/// After this time without frames the bus wakes the loop again, so that the loop does not poll without need.
 #define FRAMES_GONE_US 20000U
 #define BOX_LOOK_US    100000U
 /// After a lateness of this size the machine may have been suspended.
