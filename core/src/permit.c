@@ -159,7 +159,9 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
 /// more than it can have left there means a second master that drives, to whom the hold gives way (fault 25).
 static void count_stranger(iw_permit_t *self) {
     self->strangers++;
-    self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
+    if (self->strangers > LEFT_BEHIND_MAX) {
+        self->phase = IW_PHASE_LISTENING;
+    }
 }
 
 /// A cause that neither latches nor stops a holder: it ends arming.
