@@ -79,7 +79,7 @@ typedef struct gw_assumptions {
     bool changed;                            ///< Since the last write.
     char reason[GW_ASSUMPTIONS_REASON_SIZE]; ///< Why the file found at the start is ignored; empty: it is not.
     char path[SOCK_PATH_SIZE + 128U];
-    char kept[GW_ASSUMPTIONS_FILE_SIZE]; ///< The text handed over last.
+    char stored_text[GW_ASSUMPTIONS_FILE_SIZE]; ///< The text handed over last.
 } gw_assumptions_t;
 
 /// Starts the keeper of what is known of the wheels at `bus`, in `directory`; the members before are set already and must
