@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The table of pins in docs/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
+"""The table of pins in docs/user/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
 
 usage: board_page.py
 
@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 STM32 = ROOT / "port/stm32_stub"
-PAGE = ROOT / "docs/stm32.md"
+PAGE = ROOT / "docs/user/stm32.md"
 PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
 PINS = {
     "e-stop": "BRD_ESTOP",
@@ -73,7 +73,7 @@ def main():
         return 77
     page = PAGE.read_text()
     missing = [text for text in (*rows(), *commands()) if text not in page]
-    print(*(f"failed: docs/stm32.md lacks: {text.rstrip()}" for text in missing), sep="\n")
+    print(*(f"failed: docs/user/stm32.md lacks: {text.rstrip()}" for text in missing), sep="\n")
     return 1 if missing else 0
 
 

@@ -1,32 +1,28 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass.
-
-usage: planted_faults.py [GATE...]      only the cases of these gates: the names of the functions below
-
-Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
-"""
+"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass. -k GATE: one gate's cases."""
 
 import argparse
 import collections
-import atexit
 import contextlib
-import functools
 import hashlib
 import importlib.machinery
 import importlib.util
 import io
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 
+import pytest
+
+pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPTS = ROOT / "scripts"
+os.environ["PATH"] = f"{ROOT}/.venv/bin:{os.environ['PATH']}"
 ARM = [
     "arm-none-eabi-gcc",
     "-mcpu=cortex-m4",
@@ -153,7 +149,7 @@ def cppcheck_behind(folder, begin):
 def deviations(folder, fault):
     """A tree whose page is true, and one change of it: file, what stands there, what stands there then."""
     for name, text in DEVIATING.items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text.replace(*fault[1:]) if name == fault[0] else text)
     return run(SCRIPTS / "deviations.py", folder)
 
@@ -171,7 +167,7 @@ def northbound(folder, fault):
         "test/northbound/described.py",
         "test/northbound/test_description.py",
         "share/northbound.json",
-        "docs/northbound.md",
+        "docs/user/northbound.md",
         "python/src/iwheel/_protocol.py",
         *sources,
     ):
@@ -314,8 +310,8 @@ def api(folder, fault):
     """The reference of small copies of the headers' folders, of which one is `fault`."""
     for name in ("core", "lib/northbound/protocol", "lib/client", "port/linux"):
         (folder / name / "include").mkdir(parents=True)
-    (folder / "docs").mkdir()
-    shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
+    (folder / "docs/developer").mkdir(parents=True)
+    shutil.copy(ROOT / "docs/developer/Doxyfile", folder / "docs/developer")
     (folder / "core/include/planted.h").write_text(fault)
     command = re.search(r'^test\(idle api .* sh -c "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)[1]
     return run("sh", "-c", command.replace("\\$", "$"), cwd=folder)
@@ -330,8 +326,8 @@ def pages(folder, fault):
         "test/run": "x\n",
         "scripts/README.md": "| `one.py` | x |\n",
         "scripts/one.py": "x\n",
-        "docs/README.md": "| `how-to-add.md` | x |\n",
-        "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
+        "docs/README.md": "| `developer/how-to-add.md` | x |\n",
+        "docs/developer/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
     }
     name, old, new = fault
     tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
@@ -370,16 +366,8 @@ def python_pins(folder, fault):
     return run(ROOT / ".venv/bin/python", SCRIPTS / "house.py", "pins", folder)
 
 
-@functools.cache
-def an_environment():
-    folder = tempfile.mkdtemp()
-    atexit.register(shutil.rmtree, folder)
-    run(sys.executable, "-m", "venv", folder)
-    return Path(folder)
-
-
 def python_wheels(folder, lines):
-    """Two wheels, pinned; what is brought into an environment of its own is what has its checksum, and nothing else."""
+    """Two wheels, pinned; what is brought into an environment is what has its checksum, and nothing else."""
     sums = {}
     for name in ("one", "two"):
         with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as wheel:
@@ -389,12 +377,8 @@ def python_wheels(folder, lines):
             wheel.writestr(f"{name}-1.dist-info/RECORD", "")
         sums[name] = hashlib.sha256((folder / f"{name}-1-py3-none-any.whl").read_bytes()).hexdigest()
     (folder / "list.txt").write_text(lines.format(**sums, other="0" * 64))
-    venv = an_environment()
-    for path in venv.glob("lib/python*/site-packages/*"):
-        if path.name.startswith(("one", "two")):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", SCRIPTS / "python_packages", venv, folder / "list.txt")
-    there = sorted(path.stem for path in venv.glob("lib/python*/site-packages/*.py") if path.stem in sums)
+    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", SCRIPTS / "python_packages", folder / "venv", folder / "list.txt")
+    there = sorted(path.stem for path in folder.glob("venv/lib/python*/site-packages/*.py") if path.stem in sums)
     if there != ([] if status else ["one", "two"]):
         raise RuntimeError(f"installed: {there}\n{said}")
     return status, said
@@ -467,6 +451,15 @@ def nested(depth):
     return "".join(f"    if (a > {n}) {{\n" for n in range(depth)) + "    a++;\n" + "    }\n" * depth + "    return a;\n"
 
 
+def null(folder, device):
+    """A test of ./check in a copy of the mounts where that is /dev/null."""
+    (folder / "file").touch()
+    mounts = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount --bind "$0" /dev/null && exec "$@"', folder / device]
+    if run(*mounts, "true")[0] != 0:
+        return 77, "nothing can be mounted here"
+    return run(*mounts, ROOT / "test/all/start", "idle", "lint", "planted", "", "true", cwd=folder)
+
+
 def junit(status, output):
     return f'<testcase name="t" status="{status}"><system-out>{output}</system-out></testcase>'
 
@@ -478,7 +471,7 @@ SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0
 SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
 
 DEVIATING = {
-    "docs/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
+    "docs/developer/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
     ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
     "core/a.c": CLEAN,
     ".cppcheck-suppressions": "# Words.\nzero:core/*\n",
@@ -546,8 +539,8 @@ CASES = [
     (deviations, "python3", "a comment that silences ruff", ("core/a.c", "a + 1;", "a + 1; # noqa"), True),
     (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
     (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
-    (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
-    (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
+    (deviations, "python3", "a number given twice", ("docs/developer/static.md", "D2", "D1"), True),
+    (deviations, "python3", "no reason", ("docs/developer/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
     (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("lib/northbound/server/src/observe.c", '"still_moving", true', '"still_rolling", true'), True),
@@ -575,10 +568,10 @@ CASES = [
         ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"),
         True,
     ),
-    (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
-    (northbound, "python3", "a field that is only documented", ("docs/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
-    (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
-    (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
+    (northbound, "python3", "a field that is not documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
+    (northbound, "python3", "a field that is only documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
+    (northbound, "python3", "an example of another type", ("docs/user/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
+    (northbound, "python3", "an error that means something else", ("docs/user/northbound.md", "a wheel turns |", "a wheel stands |"), True),
     (
         northbound,
         "python3",
@@ -729,8 +722,8 @@ CASES = [
         ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'),
         True,
     ),
-    (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
-    (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch, "python3", "a permission that nobody needs", ("docs/developer/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
+    (arch, "python3", "a library that is not in the table", ("docs/developer/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
     (arch_of_names, "python3", "clean", "app/ctl/text/a_name_of_its_own.c", False),
     (arch_of_names, "python3", "a source of a program with the name of another's", "app/ctl/text/host.c", True),
     (arch_of_names, "python3", "a header of a library with the name of the port's", "lib/config/frame_ring.h", True),
@@ -742,9 +735,13 @@ CASES = [
     (pages, "python3", "clean", ("app/b.c", "other", "another"), False),
     (pages, "python3", "a file more has the example", ("app/b.c", "other", "follow_ms"), True),
     (pages, "python3", "a listed file has it no more", ("app/a.c", "follow_ms", "other"), True),
-    (pages, "python3", "a listed file is not there", ("docs/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
-    (pages, "python3", "a list without its pattern", ("docs/how-to-add.md", "pattern", "patern"), True),
+    (pages, "python3", "a listed file is not there", ("docs/developer/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
+    (pages, "python3", "a list without its pattern", ("docs/developer/how-to-add.md", "pattern", "patern"), True),
     (pages, "python3", "an entry that the index lacks", ("test/more", "", "x\n"), True),
+    (pages, "python3", "a page for users that the index lacks", ("docs/user/more.md", "", "x\n"), True),
+    (pages, "python3", "a source that names a page that is not there", ("app/b.c", "int other;", "int other; // docs/user/gone.md"), True),
+    (pages, "python3", "a link that leads nowhere", ("docs/developer/how-to-add.md", "there.", "[there](../gone.md)."), True),
+    (pages, "python3", "a link and a name that lead somewhere", ("docs/developer/how-to-add.md", "there.", "[docs/README.md](../README.md)."), False),
     (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
     (python_pins, "python3", "clean", ("tool", "sh", "sh"), False),
     (python_pins, "python3", "a pin without a checksum", ("requirements/check.txt", r"^(pyte==[^\\\n]+) \\\n(?:    --hash.*\n)+", r"\1\n"), True),
@@ -782,41 +779,17 @@ CASES = [
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
     (counting, "python3", "a crash before the sum", junit("fail", "test.c:1:test_a:PASS"), True),
+    (null, "unshare", "clean", "/dev/null", False),
+    (null, "unshare", "a file in the place of /dev/null", "file", True),
     (counting, "python3", "a crash after the sum", junit("fail", "3 Tests 0 Failures 0 Ignored"), True),
 ]
 
 
-def has(tool):
-    if tool == "lizard":
-        return importlib.util.find_spec("lizard") is not None
-    return shutil.which(tool) is not None
-
-
-def main(gates):
-    unknown = set(gates) - {gate.__name__ for gate, *_ in CASES}
-    if unknown:
-        sys.exit(f"there is no gate {', '.join(sorted(unknown))}")
-    passed = failed = skipped = 0
-    for gate, tool, name, argument, must_catch in CASES:
-        if gates and gate.__name__ not in gates:
-            continue
-        if not has(tool):
-            skipped += 1
-            print(f"skip: {gate.__name__}: {name}: {tool} is missing")
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            status, said = gate(Path(folder), argument)
-        if status == 77:
-            skipped += 1
-            print(f"skip: {gate.__name__}: {name}: {said.strip().removeprefix('skip: ')}")
-        elif (status != 0) == must_catch and "Traceback" not in said:
-            passed += 1
-        else:
-            failed += 1
-            print(f"failed: {gate.__name__}: {name}: {'not caught' if must_catch else 'caught although clean'}\n{said}")
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+@pytest.mark.parametrize(("gate", "tool", "name", "argument", "must_catch"), CASES, ids=[f"{case[0].__name__}: {case[2]}" for case in CASES])
+def test_gate(tmp_path, gate, tool, name, argument, must_catch):
+    if not (importlib.util.find_spec(tool) if tool == "lizard" else shutil.which(tool)):
+        pytest.skip(f"{tool} is missing")
+    status, said = gate(tmp_path, argument)
+    if status == 77:
+        pytest.skip(said.strip().removeprefix("skip: "))
+    assert "Traceback" not in said and (status != 0) == must_catch, f"{'not caught' if must_catch else 'caught although clean'}\n{said}"
