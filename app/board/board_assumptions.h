@@ -47,7 +47,7 @@ void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t
                              brd_assumptions_zero_t out_zero[IW_SIDES]);
 
 /// Whether there is more in `now` than in `kept`, or something else.
-bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *kept);
+bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *stored);
 
 /// Where an item is configured; NULL: nowhere, and its value is "yes".
 const char *brd_assumptions_key(iw_assumption_item_t item);

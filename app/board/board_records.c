@@ -62,8 +62,9 @@ void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent) {
     record.is.power_ons += power_on ? 1U : 0U;
     self->power_ons = record.is.power_ons;
     const bool is_short = brd_store_blank(&self->store) < ROOM_LEAST;
-    if ((power_on || (is_short && !is_urgent)) && !brd_store_write(&self->store, record.words, !is_urgent)) {
-        self->power_ons = power_on ? 0U : self->power_ons;
+    const bool is_due = power_on || (is_short && !is_urgent);
+    if (is_due && !brd_store_write(&self->store, record.words, !is_urgent) && power_on) {
+        self->power_ons = 0;
     }
 }
 

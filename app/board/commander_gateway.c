@@ -20,7 +20,7 @@ static_assert(BRD_APB1_HZ >= 16U * BRD_SERIAL_BAUD,
     ((BRD_SERIAL_BAUD / 25U / BRD_HOST_LINE_BYTES > 0U) ? BRD_SERIAL_BAUD / 25U / BRD_HOST_LINE_BYTES : 1U)
 
 static brd_host_t host;
-static brd_records_t kept;
+static brd_records_t records;
 static bool is_begun;
 static bool is_complete; // It is configured well enough to send.
 
@@ -36,27 +36,27 @@ bool brd_commander_sends(void) {
 /// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
 /// number of starts since then is kept in RAM.
 void brd_commander_open(bool power_on, bool in_motion) {
-    brd_records_open(&kept, power_on, in_motion);
+    brd_records_open(&records, power_on, in_motion);
 }
 
 void brd_commander_configure(iw_config_t *config) {
     brd_settings_t settings;
-    if (brd_records_settings(&kept, &settings)) {
+    if (brd_records_settings(&records, &settings)) {
         brd_settings_to(&settings, config);
     }
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
 bool brd_host_keep(const brd_settings_t *settings) {
-    return brd_records_commit(&kept, settings);
+    return brd_records_commit(&records, settings);
 }
 
 bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
-    return brd_records_assumptions(&kept, out_learned);
+    return brd_records_assumptions(&records, out_learned);
 }
 
 bool brd_host_write_assumptions(const brd_assumptions_t *learned) {
-    return brd_records_write_assumptions(&kept, learned);
+    return brd_records_write_assumptions(&records, learned);
 }
 
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
@@ -72,7 +72,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .sample_point_permille = (1U + BRD_BIT_BS1) * 1000U / BRD_BIT_QUANTA,
         .settings = brd_settings_from(brd_report_room()->config),
         .rate_max_hz = RATE_MAX_HZ,
-        .boot = brd_boot_id(kept.power_ons),
+        .boot = brd_boot_id(records.power_ons),
     };
     brd_host_init(&host, &place, now_us);
     is_begun = true;

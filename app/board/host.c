@@ -136,7 +136,7 @@ static void recall(brd_host_t *self) {
     brd_assumptions_t learned;
     if (brd_host_read_assumptions(&learned)) {
         brd_assumptions_restore(&learned, &self->settings, self->server.core, self->zero);
-        self->memory = BRD_RECORDS_STORED;
+        self->records = BRD_RECORDS_STORED;
     }
 }
 
@@ -148,7 +148,7 @@ bool brd_host_is_silent(const brd_host_t *self) {
 /// Looks now and then, in the silence, whether there is anything that flash has not.
 static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
     brd_assumptions_t now;
-    brd_assumptions_t kept;
+    brd_assumptions_t stored;
     if (!brd_host_is_silent(self) || self->learn_us == 0U || self->restart_us != 0U) {
         self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
         return;
@@ -157,11 +157,11 @@ static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
         return;
     }
     self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
-    memset(&kept, 0, sizeof kept);
-    (void)brd_host_read_assumptions(&kept);
+    memset(&stored, 0, sizeof stored);
+    (void)brd_host_read_assumptions(&stored);
     brd_assumptions_note(&now, seen, &self->settings, self->zero);
-    if (brd_assumptions_differs(&now, &kept)) {
-        self->memory = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
+    if (brd_assumptions_differs(&now, &stored)) {
+        self->records = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
     }
 }
 

@@ -97,7 +97,7 @@ typedef struct {
     iwn_line_verdict_t fault; ///< Of the last bad line.
     uint8_t next_owed;        ///< Whose turn it is to have the long line, so that nobody keeps it.
     bool has_staged;          ///< `staged` is something.
-    brd_records_state_t memory;
+    brd_records_state_t records;
     brd_assumptions_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
     brd_host_reported_t told;
     iwn_server_t server;

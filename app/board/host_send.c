@@ -88,15 +88,15 @@ void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client) {
     }
 }
 
-static void write_memory(const brd_host_t *self, iwn_out_t *json) {
+static void write_records(const brd_host_t *self, iwn_out_t *json) {
     static const char *const states[] = {
         [BRD_RECORDS_NEW] = "new", [BRD_RECORDS_STORED] = "kept", [BRD_RECORDS_FAILED] = "failed"};
     iwn_out_open(json, "memory", '{');
     iwn_out_text(json, "file", "flash");
-    iwn_out_text(json, "state", states[self->memory]);
+    iwn_out_text(json, "state", states[self->records]);
     iwn_out_text(json, "reason",
-                 (self->memory == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
-                                                      : NULL);
+                 (self->records == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
+                                                       : NULL);
     iwn_out_close(json, '}');
 }
 
@@ -114,7 +114,7 @@ static void write_assumptions(const iw_snapshot_t *seen, iwn_out_t *json) {
 
 void iwn_target_write_assumptions(iwn_server_t *server, const iw_snapshot_t *seen, iwn_out_t *json) {
     write_assumptions(seen, json);
-    write_memory(brd_host_of(server), json);
+    write_records(brd_host_of(server), json);
     iwn_out_null(json, "gaps");
 }
 

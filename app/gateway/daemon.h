@@ -14,6 +14,9 @@
 /// judges the command, and it is sent after one reading instead of two. That saves two system calls before the command
 /// is on the bus (2.16 instead of 2.23 per frame of docs/developer/speed.md, with 20 commands/s). The work per cycle is
 /// limited in each of these places.
+///
+/// A board has one order, because a request takes milliseconds there: step -> request -> step
+/// (port/stm32_stub/main.c).
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
 

@@ -108,10 +108,10 @@ static int serve(gw_daemon_t *daemon) {
 static char *print_config(const gateway_config_t *config) {
     char *text = NULL;
     size_t size;
-    FILE *memory = open_memstream(&text, &size);
-    if (memory != NULL) {
-        gateway_config_print(config, memory);
-        (void)fclose(memory);
+    FILE *stream = open_memstream(&text, &size);
+    if (stream != NULL) {
+        gateway_config_print(config, stream);
+        (void)fclose(stream);
     }
     return text;
 }

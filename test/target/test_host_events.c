@@ -139,22 +139,22 @@ TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_
     pass(2500);
     const uint32_t writes = flash_writes;
     TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.records);
     pass(5000);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
     start();
     state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, state);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.records);
     has_flash = false;
     start();
     state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, state);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.records);
     flash_fails = true;
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
     pass(5000);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.records);
 }
 
 TEST(test_host_turn_is_refused_when_the_track_is_contradicted) {

@@ -125,7 +125,7 @@ TEST(test_pair_that_is_old_already_sends_no_offset_but_knows_it) {
     rig_run(START_US, START_US + 5U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(1251U, seen[256].count);
     TEST_ASSERT_EQUAL_UINT32(0U, seen[513].count + seen[545].count);
-    TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learnt_dN);
+    TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learned_dN);
 }
 
 TEST(test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only) {

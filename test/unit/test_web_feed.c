@@ -67,11 +67,11 @@ TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest) {
 }
 
 TEST(test_reader_that_falls_behind_is_told_how_many_it_missed) {
-    for (unsigned i = 0; i < WEB_FEED_KEPT + 7U; i++) {
+    for (unsigned i = 0; i < WEB_FEED_STORED + 7U; i++) {
         add("bus", "{}");
     }
     TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", take(1000));
-    for (unsigned i = 0; i < WEB_FEED_KEPT; i++) {
+    for (unsigned i = 0; i < WEB_FEED_STORED; i++) {
         TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", take(1000));
     }
     TEST_ASSERT_EQUAL_STRING("", take(1000));

@@ -174,7 +174,7 @@ static enum MHD_Result send_stops(web_call_t *self) {
     FILE *out = open_memstream(&text, &length);
     if (out != NULL) {
         (void)fputs("{\"ok\":true,\"stops\":[", out);
-        for (size_t i = 0; i < WEB_STOPS_KEPT && self->server->link.stops[i] != NULL; i++) {
+        for (size_t i = 0; i < WEB_STOPS_STORED && self->server->link.stops[i] != NULL; i++) {
             (void)fprintf(out, "%s%s", (i > 0) ? "," : "", self->server->link.stops[i]);
         }
         (void)fputs("]}\n", out);

@@ -31,9 +31,9 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
     }
     // The same stop again, now with its frames, or its recording: in place of the first.
     const bool same = self->stops[0] != NULL && (uint64_t)number.value == self->stop_number;
-    free(self->stops[same ? 0 : WEB_STOPS_KEPT - 1U]);
+    free(self->stops[same ? 0 : WEB_STOPS_STORED - 1U]);
     if (!same) {
-        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_KEPT - 1U) * sizeof self->stops[0]);
+        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_STORED - 1U) * sizeof self->stops[0]);
     }
     self->stops[0] = copy;
     self->stop_number = (uint64_t)number.value;
@@ -110,7 +110,7 @@ void web_link_close(web_link_t *self) {
     bridge_link_close(&self->gateway);
     forget_state(self);
     web_feed_free(&self->feed);
-    for (size_t i = 0; i < WEB_STOPS_KEPT; i++) {
+    for (size_t i = 0; i < WEB_STOPS_STORED; i++) {
         free(self->stops[i]);
     }
 }

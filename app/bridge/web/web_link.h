@@ -8,7 +8,7 @@
 #include "feed.h"
 #include "tally.h"
 
-#define WEB_STOPS_KEPT 16U
+#define WEB_STOPS_STORED 16U
 
 typedef struct {
     bridge_link_t gateway;
@@ -18,7 +18,7 @@ typedef struct {
     uint64_t state_us;    ///< When the newest state came.
     char *state;          ///< The newest, as it came; NULL: not known.
     size_t state_length;
-    char *stops[WEB_STOPS_KEPT]; ///< Replies to `why`, the newest first.
+    char *stops[WEB_STOPS_STORED]; ///< Replies to `why`, the newest first.
     web_feed_t feed;
     web_tally_t tally;
 } web_link_t;

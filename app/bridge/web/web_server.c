@@ -19,7 +19,7 @@
 /// Of a fleet's table: a thousand machines are some 500 kB.
 #define FLEET_BYTES_MAX 1048576
 /// Of a request with its headers, and of what is answered at a time.
-#define MEMORY_PER_CONNECTION 16384U
+#define BYTES_PER_CONNECTION 16384U
 
 static int complain(int code, const char *what, const char *cure) {
     (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, cure);
@@ -139,7 +139,7 @@ static struct MHD_Daemon *start(web_server_t *self) {
     return MHD_start_daemon(
         flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL, MHD_OPTION_ARRAY,
         (self->certificate != NULL) ? tls : plain, MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
-        MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_PER_CONNECTION,
+        MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)BYTES_PER_CONNECTION,
         MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self, MHD_OPTION_NOTIFY_CONNECTION, take_peer, self,
         MHD_OPTION_URI_LOG_CALLBACK, web_call_new, self, MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL,
         MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);

@@ -82,12 +82,12 @@ int source_open(ctl_t *ctl, const char *path, int64_t most) {
     if (fd >= 0 || ctl == NULL || !absent || !is_ours(path) || !connected(ctl)) {
         return fd;
     }
-    const int memory = memfd_create("recording", MFD_CLOEXEC);
-    if (memory >= 0 && fetch(ctl, last_part(path), most, memory)) {
-        return memory;
+    const int file = memfd_create("recording", MFD_CLOEXEC);
+    if (file >= 0 && fetch(ctl, last_part(path), most, file)) {
+        return file;
     }
-    if (memory >= 0) {
-        (void)close(memory);
+    if (file >= 0) {
+        (void)close(file);
     }
     errno = error;
     return -1;

@@ -36,7 +36,7 @@ NAMES(bus, iwn_bus_state_name, iw_bus_state_t)
 NAMES(state, iwn_state_name, iw_state_t)
 NAMES(cause, iwn_cause_name, iw_cause_t)
 NAMES(item, iwn_assumption_item_name, iw_assumption_item_t)
-NAMES(ledger_state, iwn_assumption_state_name, iw_assumption_state_t)
+NAMES(assumption_state, iwn_assumption_state_name, iw_assumption_state_t)
 NAMES(source, iwn_source_name, iw_source_t)
 
 static const char *refusal_name(unsigned refusal) {
@@ -106,7 +106,7 @@ static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
     out->number = source;
     out->as.value = limited(integer(line, "figure"), INT32_MAX);
     return source <= IW_SOURCE_OPERATOR && take_word(line, "item", item_name, IW_ASSUMPTION_ITEMS, &out->a) &&
-           take_word(line, "state", ledger_state_name, states, &out->b);
+           take_word(line, "state", assumption_state_name, states, &out->b);
 }
 
 static bool take_fields(const json_t *line, blackbox_entry_t *out) {

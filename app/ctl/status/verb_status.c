@@ -247,11 +247,11 @@ static void draw_contradictions(const paper_t *paper, json_t *assumptions) {
 }
 
 /// Nothing, as long as what is learnt is kept.
-static void draw_memory(const paper_t *paper, const json_t *memory) {
+static void draw_store(const paper_t *paper, const json_t *store) {
     char text[512];
-    const char *state = text_word(memory, "state");
+    const char *state = text_word(store, "state");
     if (is(state, "ignored") || is(state, "failed")) {
-        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
+        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(store, "file"), text_word(store, "reason"));
         paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
     }
 }
@@ -310,7 +310,7 @@ static void draw(const json_t *status, const json_t *why) {
     draw_contradictions(&paper, json_object_get(status, "ledger"));
     draw_assumptions(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
     draw_assumptions(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
-    draw_memory(&paper, get(status, "memory"));
+    draw_store(&paper, get(status, "memory"));
     draw_warnings(&paper, get(status, "warnings"));
 }
 

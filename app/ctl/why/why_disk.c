@@ -162,7 +162,7 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
     static recording_t recording;
     static candump_t before[WHY_FRAMES_MAX];
     candump_t frame;
-    size_t kept = 0;
+    size_t earlier = 0;
     size_t after = 0;
     const int code = recording_open(&recording, ctl, path);
     if (code != CTL_OK) {
@@ -171,11 +171,11 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
     (void)putchar('\n');
     while (after < most && recording_next(&recording, &frame)) {
         if (frame.time_us <= stop_us) {
-            before[kept % most] = frame;
-            kept++;
+            before[earlier % most] = frame;
+            earlier++;
             continue;
         }
-        for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
+        for (size_t i = (earlier > most) ? earlier - most : 0U; after == 0U && i < earlier; i++) {
             why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
         }
         if (after == 0U) {
@@ -184,7 +184,7 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
         why_print_frame(&frame, frame.time_us - stop_us);
         after++;
     }
-    for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
+    for (size_t i = (earlier > most) ? earlier - most : 0U; after == 0U && i < earlier; i++) {
         why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
     }
     return recording_close(&recording);

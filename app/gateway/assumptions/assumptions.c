@@ -174,8 +174,8 @@ static void take_file(gw_assumptions_t *self, gw_file_store_news_t news, const c
         self->state = GW_ASSUMPTIONS_NEW;
     } else if (news == GW_FILE_STORE_READ && gw_assumptions_file_read(text, length, self->bus, &stored, self->reason)) {
         self->state = GW_ASSUMPTIONS_STORED;
-        self->stored_length = (length <= sizeof self->kept) ? length : 0U;
-        memcpy(self->kept, text, self->stored_length);
+        self->stored_length = (length <= sizeof self->stored_text) ? length : 0U;
+        memcpy(self->stored_text, text, self->stored_length);
         merge(self, &stored);
     } else {
         self->state = GW_ASSUMPTIONS_IGNORED;
@@ -225,9 +225,9 @@ static void receive_store(gw_assumptions_t *self) {
 static void hand_over(gw_assumptions_t *self) {
     static char text[GW_ASSUMPTIONS_FILE_SIZE]; // Too large for a stack.
     const size_t length = gw_assumptions_file_write(&self->known, self->bus, text, sizeof text);
-    const bool same = length == self->stored_length && memcmp(text, self->kept, length) == 0;
+    const bool same = length == self->stored_length && memcmp(text, self->stored_text, length) == 0;
     if (same || gw_file_store_write(&self->store, text, length)) {
-        memcpy(self->kept, text, length);
+        memcpy(self->stored_text, text, length);
         self->stored_length = length;
         self->changed = false;
     }

@@ -78,10 +78,9 @@ typedef struct gw_assumptions {
     bool observed;             ///< Changes up to `observed_changes` have been recorded.
     uint32_t observed_changes; ///< Value of `iw_snapshot_t::assumed_changes`.
     bool changed;              ///< There was a change since the last write.
-    char
-        reason[GW_ASSUMPTIONS_REASON_SIZE]; ///< Reason why the file found at the start is ignored; empty if it is used.
+    char reason[GW_ASSUMPTIONS_REASON_SIZE]; ///< Reason to ignore the file found at the start; empty if it is used.
     char path[SOCK_PATH_SIZE + 128U];
-    char kept[GW_ASSUMPTIONS_FILE_SIZE]; ///< Last text that was passed to the store process.
+    char stored_text[GW_ASSUMPTIONS_FILE_SIZE]; ///< Last text that was passed to the store process.
 } gw_assumptions_t;
 
 /// Starts the store process for the wheels on `bus`, in `directory`. The members before are set and must exist as long

@@ -81,7 +81,7 @@ static void write_assumptions(gw_assumptions_written_t *written, const source_t 
     keep(written, source, json, begin);
 }
 
-static void write_memory(const gw_assumptions_t *self, iwn_out_t *json) {
+static void write_store(const gw_assumptions_t *self, iwn_out_t *json) {
     static const char *const names[] = {
         [GW_ASSUMPTIONS_LOADING] = "loading", [GW_ASSUMPTIONS_NEW] = "new",       [GW_ASSUMPTIONS_STORED] = "kept",
         [GW_ASSUMPTIONS_IGNORED] = "ignored", [GW_ASSUMPTIONS_FAILED] = "failed",
@@ -99,5 +99,5 @@ static void write_memory(const gw_assumptions_t *self, iwn_out_t *json) {
 void gw_assumptions_write(gw_assumptions_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
     const source_t source = {&self->configured, seen->assumed, self->known.item};
     write_assumptions(&self->written, &source, json);
-    write_memory(self, json);
+    write_store(self, json);
 }

@@ -122,17 +122,17 @@ static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_
 /// `text`: message that the start would print.
 static int judge_place(const sock_listener_config_t *wanted, char *text, size_t size, int *out_error) {
     static sock_listener_t listener;
-    FILE *const memory = fmemopen(text, size, "w");
-    if (memory == NULL) {
+    FILE *const stream = fmemopen(text, size, "w");
+    if (stream == NULL) {
         return 0;
     }
-    int result = sock_listener_prepare(&listener, wanted, memory);
+    int result = sock_listener_prepare(&listener, wanted, stream);
     if (result == 0) {
         *out_error = write_error(listener.folder.fd);
-        rewind(memory); // A warning about the directory remains if there is nothing worse.
-        result = sock_listener_judge(&listener, memory);
+        rewind(stream); // A warning about the directory remains if there is nothing worse.
+        result = sock_listener_judge(&listener, stream);
     }
-    (void)fclose(memory);
+    (void)fclose(stream);
     sock_folder_close(&listener.folder);
     return result;
 }

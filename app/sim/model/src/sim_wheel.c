@@ -200,7 +200,7 @@ static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, s
         out->told.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
         out->told.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
     } else if (kind == SIM_TELEMETRY_OFFSET) {
-        out->told.offset.offset_dN = self->force.learnt_dN;
+        out->told.offset.offset_dN = self->force.learned_dN;
     }
 }
 

@@ -9,7 +9,7 @@ static const char *wheels(uint8_t sides) {
     return names[sides & IW_SIDES_BOTH];
 }
 
-static const char *reboot_evidence(uint32_t detail) {
+static const char *reboot_sign(uint32_t detail) {
     return (detail == IW_REBOOT_SILENCE)    ? "it was silent for a second"
            : (detail == IW_REBOOT_ODOMETRY) ? "its odometry jumped"
                                             : "its start-up offset frames came back";
@@ -79,7 +79,7 @@ static const char *detail_words(const iw_stop_t *stop) {
     if (stop->cause == IW_CAUSE_BUS_DOWN) {
         return (stop->detail == IW_BUS_OFF) ? "bus-off" : "down or gone";
     }
-    return reboot_evidence(stop->detail);
+    return reboot_sign(stop->detail);
 }
 
 static const char *word_for(char part, const iw_stop_t *stop, const iwn_why_context_t *context) {

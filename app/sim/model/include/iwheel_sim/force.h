@@ -22,7 +22,7 @@ typedef struct {
     int32_t load_mN;
     int32_t noise_mN;     ///< Amplitude.
     int32_t forced_raw;   ///< Fault: the frame carries this; SIM_FORCE_AUTO: no.
-    int16_t learnt_dN;    ///< The wheel's offset, as its frame tells; meaningless before two seconds are over.
+    int16_t learned_dN;   ///< The wheel's offset, as its frame tells; meaningless before two seconds are over.
     iw_force_unit_t unit; ///< Of the frame's raw value. The offset is always in dN.
     bool zero_removed;    ///< Fault: the raw value has the sensor's zero taken out already.
 } sim_force_t;
