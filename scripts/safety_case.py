@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
+"""Is docs/developer/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
 And the threat model in docs/developer/threat-model.md: each interface has tests, and they exist.
 
 usage: safety_case.py [--update]
@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "docs/developer/threat-model.md"
+PAGE, THREATS = ROOT / "docs/developer/safety-case.md", ROOT / "docs/developer/threat-model.md"
 sys.path.insert(0, str(ROOT / "test/faults"))
 import table
 
@@ -102,7 +102,7 @@ def findings(text, tests, bugs, rules):
     for rule, entry in found.items():
         yield from rule_findings(rule, entry, tests, bugs)
     for bug in bugs:
-        if bug.rule not in found and not (ROOT / f"docs/{bug.rule}.md").exists():
+        if bug.rule not in found and not any(ROOT.glob(f"docs/*/{bug.rule}.md")):
             yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither here nor a page of docs/"
     told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
     yield from (f"rule {number} of the oracle belongs to no rule here" for number in sorted(rules - told))

@@ -149,7 +149,7 @@ def cppcheck_behind(folder, begin):
 def deviations(folder, fault):
     """A tree whose page is true, and one change of it: file, what stands there, what stands there then."""
     for name, text in DEVIATING.items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text.replace(*fault[1:]) if name == fault[0] else text)
     return run(SCRIPTS / "deviations.py", folder)
 
@@ -167,7 +167,7 @@ def northbound(folder, fault):
         "test/northbound/described.py",
         "test/northbound/test_description.py",
         "share/northbound.json",
-        "docs/northbound.md",
+        "docs/user/northbound.md",
         "python/src/iwheel/_protocol.py",
         *sources,
     ):
@@ -286,6 +286,14 @@ def arch(folder, fault):
     return run(SCRIPTS / "house.py", "layers", folder)
 
 
+def arch_of_names(folder, more):
+    """The same with one file more."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    (folder / more).write_text("// SPDX-License-Identifier: MIT\n")
+    return run(SCRIPTS / "house.py", "layers", folder)
+
+
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
     for part in ("core", "port", "lib", "app", "python", "test/faults"):
@@ -302,8 +310,8 @@ def api(folder, fault):
     """The reference of small copies of the headers' folders, of which one is `fault`."""
     for name in ("core", "lib/northbound/protocol", "lib/client", "port/linux"):
         (folder / name / "include").mkdir(parents=True)
-    (folder / "docs").mkdir()
-    shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
+    (folder / "docs/developer").mkdir(parents=True)
+    shutil.copy(ROOT / "docs/developer/Doxyfile", folder / "docs/developer")
     (folder / "core/include/planted.h").write_text(fault)
     command = re.search(r'^test\(idle api .* sh -c "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)[1]
     return run("sh", "-c", command.replace("\\$", "$"), cwd=folder)
@@ -318,8 +326,8 @@ def pages(folder, fault):
         "test/run": "x\n",
         "scripts/README.md": "| `one.py` | x |\n",
         "scripts/one.py": "x\n",
-        "docs/README.md": "| `how-to-add.md` | x |\n",
-        "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
+        "docs/README.md": "| `developer/how-to-add.md` | x |\n",
+        "docs/developer/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
     }
     name, old, new = fault
     tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
@@ -463,7 +471,7 @@ SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0
 SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
 
 DEVIATING = {
-    "docs/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
+    "docs/developer/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
     ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
     "core/a.c": CLEAN,
     ".cppcheck-suppressions": "# Words.\nzero:core/*\n",
@@ -531,8 +539,8 @@ CASES = [
     (deviations, "python3", "a comment that silences ruff", ("core/a.c", "a + 1;", "a + 1; # noqa"), True),
     (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
     (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
-    (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
-    (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
+    (deviations, "python3", "a number given twice", ("docs/developer/static.md", "D2", "D1"), True),
+    (deviations, "python3", "no reason", ("docs/developer/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
     (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("lib/northbound/server/src/observe.c", '"still_moving", true', '"still_rolling", true'), True),
@@ -560,10 +568,10 @@ CASES = [
         ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"),
         True,
     ),
-    (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
-    (northbound, "python3", "a field that is only documented", ("docs/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
-    (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
-    (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
+    (northbound, "python3", "a field that is not documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
+    (northbound, "python3", "a field that is only documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
+    (northbound, "python3", "an example of another type", ("docs/user/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
+    (northbound, "python3", "an error that means something else", ("docs/user/northbound.md", "a wheel turns |", "a wheel stands |"), True),
     (
         northbound,
         "python3",
@@ -714,8 +722,11 @@ CASES = [
         ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'),
         True,
     ),
-    (arch, "python3", "a permission that nobody needs", ("docs/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
-    (arch, "python3", "a library that is not in the table", ("docs/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch, "python3", "a permission that nobody needs", ("docs/developer/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
+    (arch, "python3", "a library that is not in the table", ("docs/developer/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch_of_names, "python3", "clean", "app/ctl/text/a_name_of_its_own.c", False),
+    (arch_of_names, "python3", "a source of a program with the name of another's", "app/ctl/text/host.c", True),
+    (arch_of_names, "python3", "a header of a library with the name of the port's", "lib/config/frame_ring.h", True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
     (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
     (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
@@ -724,9 +735,13 @@ CASES = [
     (pages, "python3", "clean", ("app/b.c", "other", "another"), False),
     (pages, "python3", "a file more has the example", ("app/b.c", "other", "follow_ms"), True),
     (pages, "python3", "a listed file has it no more", ("app/a.c", "follow_ms", "other"), True),
-    (pages, "python3", "a listed file is not there", ("docs/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
-    (pages, "python3", "a list without its pattern", ("docs/how-to-add.md", "pattern", "patern"), True),
+    (pages, "python3", "a listed file is not there", ("docs/developer/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
+    (pages, "python3", "a list without its pattern", ("docs/developer/how-to-add.md", "pattern", "patern"), True),
     (pages, "python3", "an entry that the index lacks", ("test/more", "", "x\n"), True),
+    (pages, "python3", "a page for users that the index lacks", ("docs/user/more.md", "", "x\n"), True),
+    (pages, "python3", "a source that names a page that is not there", ("app/b.c", "int other;", "int other; // docs/user/gone.md"), True),
+    (pages, "python3", "a link that leads nowhere", ("docs/developer/how-to-add.md", "there.", "[there](../gone.md)."), True),
+    (pages, "python3", "a link and a name that lead somewhere", ("docs/developer/how-to-add.md", "there.", "[docs/README.md](../README.md)."), False),
     (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
     (python_pins, "python3", "clean", ("tool", "sh", "sh"), False),
     (python_pins, "python3", "a pin without a checksum", ("requirements/check.txt", r"^(pyte==[^\\\n]+) \\\n(?:    --hash.*\n)+", r"\1\n"), True),

@@ -10,7 +10,7 @@ shifted against the others'; where the recorded gateway was late with a state, t
 process (stamps.c, preloaded). Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
 
 Processor time is what the kernel counted for each process, so others on the machine change it little; latencies they do change.
---update puts the rows into docs/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
+--update puts the rows into docs/user/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
 """
 
 import argparse
@@ -44,7 +44,7 @@ from judge_log import percentile
 from mqtt_rig import MqttRig, free_port, put_table
 from trials import ROOT, Skip, until
 
-PAGE = ROOT / "docs/mqtt.md"
+PAGE = ROOT / "docs/user/mqtt.md"
 STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
 HEAD = [
     "broker",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The table of pins in docs/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
+"""The table of pins in docs/user/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
 
 The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A row that is not true is printed as it must be.
 """
@@ -11,7 +11,7 @@ import tempfile
 import pytest
 from images import ROOT, STM32
 
-PAGE = ROOT / "docs/stm32.md"
+PAGE = ROOT / "docs/user/stm32.md"
 PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
 PINS = {
     "e-stop": "BRD_ESTOP",

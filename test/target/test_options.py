@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Clocks and crystals that can give the bus 1 Mbit/s at 62.5 % do, exactly; the others do not compile, and the message names those that can. Wrong build
-options are refused with a reason. The code of docs/porting.md compiles and runs.
+options are refused with a reason. The code of docs/developer/porting.md compiles and runs.
 """
 
 import re
@@ -31,7 +31,7 @@ REFUSALS = {  # Options, and what the message must say.
     "-DIWHEEL_BOARD=stm32f407": "has no cortex-m3",
     "-DIWHEEL_SETPOINT_TYPE=1 -DIWHEEL_CURRENT_ROLE=setpoint -DIWHEEL_DEMO=ON": "IWHEEL_DEMO needs",
 }
-PAGE = re.findall(r"^```c\n(?:// (\w+\.[ch])\n)?(.*?)^```", (ROOT / "docs/porting.md").read_text(), re.MULTILINE | re.DOTALL)
+PAGE = re.findall(r"^```c\n(?:// (\w+\.[ch])\n)?(.*?)^```", (ROOT / "docs/developer/porting.md").read_text(), re.MULTILINE | re.DOTALL)
 
 
 def compile_probe(clock_mhz, out):
@@ -97,7 +97,7 @@ def test_refused(options, tmp_path):
 
 @pytest.fixture
 def port(tmp_path):
-    """Made by somebody who has read docs/porting.md only, for a controller that exists nowhere: how its files are compiled."""
+    """Made by somebody who has read docs/developer/porting.md only, for a controller that exists nowhere: how its files are compiled."""
     for name, text in PAGE:
         (tmp_path / (name or "without_a_name.c")).write_text(text)
     return ["gcc", "-Wall", "-Wextra", "-Wpedantic", "-Wmissing-prototypes", "-Werror", f"-I{ROOT / 'core/include'}", f"-I{tmp_path}"]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the pictures of docs/web.md, with a machine that drives.
+"""Makes the pictures of docs/user/web.md, with a machine that drives.
 
 usage: test/web/pictures.py BUILD FOLDER
 """

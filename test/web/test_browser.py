@@ -64,7 +64,7 @@ def decimal(value, digits, unit):
 
 
 def wheel_words(wheel):
-    """Written here once more, from docs/northbound.md, not from the page."""
+    """Written here once more, from docs/user/northbound.md, not from the page."""
     words = {
         "heard": "NOT HEARD" if not wheel["heard"] else "at rest" if wheel["at_rest"] else "turning",
         "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"),
@@ -622,7 +622,7 @@ def test_page_stays_smooth_at_50_hz(rig):
             session.send("HeapProfiler.collectGarbage")
             heap.append(page.evaluate("performance.memory.usedJSHeapSize") / 1e6)
         times = sorted(page.evaluate("frames_ms.splice(0)"))
-        # A sentence for docs/web.md.
+        # A sentence for docs/user/web.md.
         print(
             f"{minutes:g} minutes at 50 Hz, 390 x 844: a frame every {times[len(times) // 2]:.1f} ms (median; 99 %: {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms, "
             f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.",

@@ -187,11 +187,11 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
                    ? refuse(401, "bad_session", "the session is not known; begin another one: GET /api/challenge")
                    : refuse(401, "bad_token",
                             "no valid proof of the token; open the address that `iwheelctl web` prints. Programs: see "
-                            "docs/web.md");
+                            "docs/user/web.md");
     }
     if (route == NULL) {
-        return other_method ? refuse(405, "bad_method", "another method: see docs/web.md")
-                            : refuse(404, "not_there", "there is nothing here: see docs/web.md");
+        return other_method ? refuse(405, "bad_method", "another method: see docs/user/web.md")
+                            : refuse(404, "not_there", "there is nothing here: see docs/user/web.md");
     }
     if ((route->verb == WEB_ARM || route->verb == WEB_DRIVE) && !rules->may_drive) {
         return refuse(403, "denied", "driving is not configured: set enabled = yes under [drive] in web.conf");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Recordings: read by pieces with their checksums, decoded (docs/protocol.md), and the frames around a stop on a time axis.
+// Recordings: read by pieces with their checksums, decoded (docs/developer/protocol.md), and the frames around a stop on a time axis.
 
 const SETPOINTS = { 266: 0, 298: 1 }, SPEEDS = { 256: 0, 288: 1 }, FORCES = { 512: 0, 544: 1 };
 
