@@ -292,7 +292,7 @@ def judge_index(folder, deep=()):
 
 PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
 LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
-PLANTS = "test/gates/planted_faults.py"  # Names pages that must not exist.
+PLANTS = "test/gates/test_planted_faults.py"  # Names pages that must not exist.
 
 
 def judge_names():
