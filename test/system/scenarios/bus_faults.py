@@ -41,10 +41,7 @@ def power_cut(t, seconds, speed):
     back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(back_us, "alive", now_us()))
-    t.check(
-        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10),
-        "the wheels are heard again",
-    )
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are heard again")
     time.sleep(0.5)
     late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
     moving = [entry for entry in late if entry[2]]
@@ -87,15 +84,9 @@ def row19_second_master_driving(t):
     ms = t.first_after(rig, foreign_us, lambda speed: speed == 0, "zero after the foreign frame", 30)
     t.figure(f"zero after {ms or 0:.1f} ms")
     why = t.stopped_by(client, "second_master")
-    t.check(
-        why["detail"] == RIGHT and "298" in why["sentence"] and "0x12A" in why["sentence"],
-        f"why names the id: {why['sentence']}",
-    )
+    t.check(why["detail"] == RIGHT and "298" in why["sentence"] and "0x12A" in why["sentence"], f"why names the id: {why['sentence']}")
     reasons = wait_reset(t, client)
-    t.check(
-        "cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons,
-        f"reset waits: {set(reasons)}",
-    )
+    t.check("cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons, f"reset waits: {set(reasons)}")
     t.judge(rig)
 
 
@@ -175,14 +166,8 @@ def row20_odd_frames(t):
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "wheel_lost")
     after = client.request("status")["counters"]
-    t.check(
-        after["bad_format"] - before["bad_format"] >= 50,
-        f"counted as bad format: {after['bad_format'] - before['bad_format']}",
-    )
-    t.check(
-        after["bad_length"] - before["bad_length"] >= 25,
-        f"counted as bad length: {after['bad_length'] - before['bad_length']}",
-    )
+    t.check(after["bad_format"] - before["bad_format"] >= 50, f"counted as bad format: {after['bad_format'] - before['bad_format']}")
+    t.check(after["bad_length"] - before["bad_length"] >= 25, f"counted as bad length: {after['bad_length'] - before['bad_length']}")
     feed(rig, 0.3, 256, bytes(8))
     t.check(client.request("status")["left"]["heard"], "a longer frame is accepted")
     rig.sim.ask("unmute left")
@@ -203,18 +188,12 @@ def row15_bus_gone(t):
     time.sleep(0.3)
     stream.stop()
     status = client.request("status")
-    t.check(
-        status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"),
-        f"{status['state']}, {status['cause']}",
-    )
+    t.check(status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"), f"{status['state']}, {status['cause']}")
     first_bus.close()
     rig.restart_sim(first_bus.frames)
     back_us = now_us()
     rig.note("alive")
-    t.check(
-        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6),
-        "found again",
-    )
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6), "found again")
     wait_reset(t, client)
     time.sleep(0.3)
     late = rig.bus.setpoints(back_us)
