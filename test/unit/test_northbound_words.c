@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The words of the protocol: the sentence of `why`, the names of the closed lists, and texts put together without stdio.
+#include "iwheel_northbound/refuse.h"
 #include "iwheel_northbound/text.h"
 #include "iwheel_northbound/why.h"
 #include "iwheel_northbound/words.h"
@@ -171,5 +172,43 @@ TEST(test_text_of_every_code_point_reads_as_it_was_written) {
         const size_t length = iwn_utf8(code_point, bytes);
         TEST_ASSERT_EQUAL_HEX32(code_point, iwn_plain_read(bytes, &read));
         TEST_ASSERT_EQUAL_UINT(length, read);
+    }
+}
+
+// ---- refusals ---------------------------------------------------------------------------------------------------------
+
+static iw_codec_wheel_t told[IW_SIDES];
+static iw_config_t config = {.rest_rpm = 2, .rest_ms = 200};
+static iw_snapshot_t seen;
+static iwn_refusal_t refusal;
+
+static const char *not_at_rest(void) {
+    const iwn_refuse_context_t moment = {.seen = &seen};
+    const iwn_request_t request = {.cmd = IWN_CMD_ARM};
+    seen.config = &config;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        seen.wheel[side].told = &told[side];
+        seen.wheel[side].heard = true;
+    }
+    iwn_refuse_describe(&moment, &request, IW_REFUSE_NOT_AT_REST, &refusal);
+    return refusal.message;
+}
+
+TEST(test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros) {
+    static const char turning[] = "the wheels turn or are told to: left ";
+    TEST_ASSERT_EQUAL_STRING("the wheels are not at standstill for 200 ms yet; wait, then try again", not_at_rest());
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        static const int16_t still[] = {-2, 2};
+        static const int16_t moving[] = {-3, 3};
+        for (size_t i = 0; i < 2U; i++) {
+            told[side].speed.speed_rpm = still[i];
+            TEST_ASSERT_NULL(strstr(not_at_rest(), turning));
+            told[side].speed.speed_rpm = moving[i];
+            TEST_ASSERT_NOT_NULL(strstr(not_at_rest(), turning));
+        }
+        told[side].speed.speed_rpm = 0;
+        seen.applied.wheel[side].speed_mm_s = 1;
+        TEST_ASSERT_NOT_NULL(strstr(not_at_rest(), turning));
+        seen.applied.wheel[side].speed_mm_s = 0;
     }
 }
