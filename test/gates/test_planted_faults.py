@@ -766,7 +766,7 @@ CASES = [
     (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
     (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
     (proofs, "python3", "clean", str, False),
-    (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
+    (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.functions,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
     (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),
     (man, "python3", "clean", ("iwheelctl.1.scd", "", ""), False),
     (man, "python3", "a verb whose page is not what it prints", ("iwheelctl.1.scd", "REASON appears", "REASON is shown"), True),
