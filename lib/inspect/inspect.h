@@ -121,10 +121,9 @@ void inspect_bus(const iwl_bus_link_t *link, const inspect_heard_t *heard, const
 
 /// State of the e-stop.
 typedef struct {
-    const char *line; ///< Configured name.
-    const char
-        *pressed_at; ///< With two contacts: the pressed or unreadable one, from `inspect_pressed_at`; otherwise NULL.
-    bool present;    ///< False if there is no e-stop.
+    const char *line;       ///< Configured name.
+    const char *pressed_at; ///< Pressed or unreadable contact of two, by `inspect_pressed_at`; NULL with one contact.
+    bool present;           ///< False if there is no e-stop.
     bool simulated;
     int level;           ///< As in iw_hal_t: 0 released, > 0 pressed, < 0 unreadable.
     const char *trouble; ///< Reason why it is unreadable, and the fix; may be empty.
