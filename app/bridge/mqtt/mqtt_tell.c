@@ -235,7 +235,7 @@ static const char *state_class_of(const sensor_t *sensor) {
     if (sensor->unit == NULL) {
         return NULL;
     }
-    return (strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
+    return (sensor->class != NULL && strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
 }
 
 static void tell_origin(iwn_out_t *out) {

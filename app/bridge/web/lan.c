@@ -149,7 +149,7 @@ static bool is_good(const web_settings_t *settings) {
 /// `names` of the configuration stay; the machine's own is one more.
 static void add_host(web_settings_t *settings) {
     char name[NAME_SIZE];
-    char all[sizeof settings->web.hosts + 2U * NAME_SIZE + 16U];
+    char all[sizeof settings->web.hosts + 2U * (size_t)NAME_SIZE + 16U];
     host_name(name);
     (void)snprintf(all, sizeof all, "%s %s %s.local", web_settings_hosts(settings), name, name);
     if (strlen(all) < sizeof settings->web.hosts) {
