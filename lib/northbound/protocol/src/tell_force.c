@@ -46,9 +46,7 @@ static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t 
         zero.measured = true;
         zero.judged = true;
         zero.contaminated = false;
-    } else if (
-        force->provenance ==
-        IW_OFFSET_WHEEL) { // The judgement is that of the core: of the wheel's first two seconds, or of its present rest.
+    } else if (force->provenance == IW_OFFSET_WHEEL) { // Judged by the core: its first two seconds, or its rest now.
         const bool doubted = force->observation == IW_UNIT_UNCLEAR;
         zero.judged = doubted || force->observation != IW_UNIT_UNKNOWN || (force->boot_seen && window);
         zero.contaminated = doubted;
