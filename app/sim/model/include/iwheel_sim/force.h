@@ -22,7 +22,7 @@ typedef struct {
     int32_t load_mN;
     int32_t noise_mN;     ///< Amplitude.
     int32_t forced_raw;   ///< Fault: the force frame carries this value; SIM_FORCE_AUTO: no fault.
-    int16_t learned_dN;    ///< Offset in the wheel's offset frame; not valid during the first two seconds.
+    int16_t learned_dN;   ///< Offset in the wheel's offset frame; not valid during the first two seconds.
     iw_force_unit_t unit; ///< Unit of the raw value in the frame. The offset is always in dN.
     bool zero_removed;    ///< Fault: the sensor's zero is already subtracted from the raw value.
 } sim_force_t;
