@@ -5,7 +5,7 @@
 
 #define STATE(item)  ((iw_assumption_state_t)((item)&15U))
 #define SOURCE(item) ((iw_source_t)((item) >> 4))
-/// The furthest raw force in cN that is not saturated: no wheel's zero lies beyond.
+/// Largest raw force that is not saturated (32766 cN), in mN: no zero of a wheel exceeds it.
 #define ZERO_MAX_mN 327660
 
 const char *brd_assumptions_key(iw_assumption_item_t item) {
@@ -25,7 +25,7 @@ static bool has_value(const char *key, const brd_settings_t *one, const brd_sett
     return brd_settings_value(one, key, value) && brd_settings_value(other, key, wanted) && strcmp(value, wanted) == 0;
 }
 
-/// Evidence for another value than the one in force is worth nothing.
+/// Returns true if both settings have the same value of the item. Facts that were found for another value do not apply.
 static bool is_for(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *now) {
     const char *const key = brd_assumptions_key(item);
     return (key == NULL || has_value(key, found, now)) &&
@@ -38,7 +38,7 @@ static iw_assumption_item_t unit_of(unsigned side) {
 
 brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window) {
     return (brd_assumptions_zero_t){.offset_mN = force->offset_mN,
-                                    .drift_mN = (int16_t)window->drift_mN, // A window that gives a zero is a quiet one.
+                                    .drift_mN = (int16_t)window->drift_mN, // It fits: a zero's window has little drift.
                                     .deviation_mN = (uint16_t)window->deviation_mN,
                                     .from = (uint8_t)force->provenance};
 }
