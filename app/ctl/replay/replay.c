@@ -205,7 +205,7 @@ static void compare(replay_t *self, const blackbox_entry_t *entry) {
                                : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
                                      (int64_t)stop->detail == entry->as.value;
     if (is_state && entry->a == entry->b && same) {
-        return; // Only noted again.
+        return; // The state is only noted again.
     }
     count(is_state ? &self->states : &self->stops, same);
     if (!same) {
