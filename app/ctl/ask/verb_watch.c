@@ -126,7 +126,7 @@ static output_t write_lost(client_t *client) {
     return (count > 0U) ? write_text(client, line, (size_t)length) : OUTPUT_OPEN;
 }
 
-/// Writes the line as it came, without characters that control a terminal.
+/// Writes the line as it came, but escapes characters that control a terminal.
 static output_t write_line(const client_t *client) {
     char piece[PIPE_BUF];
     size_t length;

@@ -142,7 +142,8 @@ static bool has_gateway(const doctor_t *self) {
     return self->gateway.result == NEAR_FOUND;
 }
 
-/// Returns true if a gateway runs, even one that does not answer: it holds the e-stop's line and may send.
+/// Returns true if a gateway runs, even one that denies access or does not answer: it holds the e-stop's line and may
+/// send.
 static bool is_occupied(const doctor_t *self) {
     const near_t result = self->gateway.result;
     return result == NEAR_FOUND || result == NEAR_DENIED || result == NEAR_MUTE;

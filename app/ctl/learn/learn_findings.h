@@ -32,7 +32,7 @@ typedef struct {
     unsigned count;
 } learn_findings_t;
 
-/// Writes all findings about the wheels and setpoints.
+/// Replaces the findings by all those about `self`.
 void learn_weigh(const learn_t *self, learn_findings_t *out_findings);
 
 /// Adds a finding. Returns it, so that the caller can set its value.
