@@ -105,7 +105,7 @@ static void client_ready(sim_watch_t *watch) {
     }
 }
 
-/// Gives the connection a free port of the world. Returns false if the hub cannot accept it.
+/// Connects the new client to a free port of the world. Returns false if the hub cannot accept it.
 static bool admit(void *owner, int fd) {
     sim_hub_t *const self = owner;
     uint8_t const port = self->down ? SIM_BUS_NONE : sim_world_connect(self->world);

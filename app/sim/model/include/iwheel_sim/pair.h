@@ -68,8 +68,7 @@ void sim_pair_receive(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_
 /// Returns true if a running wheel can acknowledge frames.
 bool sim_pair_acknowledges(const sim_pair_t *self);
 
-/// Switches the power of both wheels off, or on; then they boot. Wheels without power coast, and their ticks start at
-/// 0.
+/// Switches the power of both wheels off (they coast), or on (they boot, and their ticks start at 0).
 void sim_pair_power(sim_pair_t *self, iw_time_us_t now_us, bool on);
 
 /// Starts the firmware of one wheel again: no telemetry for its boot time, ticks 0, the offset is learned again. Does
