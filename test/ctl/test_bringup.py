@@ -364,6 +364,16 @@ class Bringup(unittest.TestCase):
         self.assertEqual(1, operator.wait())
         self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
 
+    def test_recording_without_a_speed_leaves_the_types_to_try(self):
+        recording = os.path.join(self.folder.name, "zeros.log")
+        with open(recording, "w", encoding="utf-8") as file:
+            file.writelines(f"({at * 0.02:.6f}) can0 10A#0300000000\n" for at in range(50))
+        operator = self.begin("--learn", recording)
+        operator.expect("there is no setpoint with a speed")
+        operator.expect("types to try [0-7] ")
+        operator.type("q\n")
+        self.assertEqual(1, operator.wait())
+
     def test_any_key_stops_the_wheels_at_once(self):
         operator = self.begin()
         operator.answer("types to try", "1")

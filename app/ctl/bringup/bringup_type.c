@@ -144,7 +144,7 @@ static bool try_types(bringup_t *self, const bool *wanted) {
 }
 
 /// Lists the types that were sent with a speed, most frequent first, as many as fit and at most four: "3" or "3,1".
-/// Returns the number of their frames.
+/// Returns the number of their frames; if it is 0, `out_list` is unchanged.
 static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
     uint64_t left[TYPES];
     uint64_t frames = 0;
@@ -153,7 +153,9 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
         left[type] = learn->setpoint[IW_LEFT].type_moving[type] + learn->setpoint[IW_RIGHT].type_moving[type];
         frames += left[type];
     }
-    out_list[0] = '\0';
+    if (frames > 0U) {
+        out_list[0] = '\0';
+    }
     for (unsigned rank = 0; rank < 4U; rank++) {
         unsigned best = 0;
         for (unsigned type = 1; type < TYPES; type++) {
