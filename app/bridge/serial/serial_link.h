@@ -60,7 +60,7 @@ typedef enum {
     SERIAL_NEWS_NONE = 0,
     SERIAL_NEWS_LINE,   ///< For a client: `out_line`.
     SERIAL_NEWS_LINKED, ///< A board has appeared, or has restarted: all former clients are gone.
-    SERIAL_NEWS_LOST, ///< The board has restarted without a boot id yet: ask for it. All former clients are gone.
+    SERIAL_NEWS_LOST,   ///< The board has restarted without a boot id yet: ask for it. All former clients are gone.
 } serial_news_t;
 
 /// Initializes the link after the port was opened.
