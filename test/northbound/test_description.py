@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""docs/northbound.md, and the words and limits of the C sources, agree with share/northbound.json, the description of the protocol.
+"""docs/user/northbound.md, and the words and limits of the C sources, agree with share/northbound.json, the description of the protocol.
 
 usage: test_description.py [unittest's arguments]
 
@@ -31,14 +31,14 @@ SOURCES = {
     "ledger_state": ("lib/northbound/protocol/src/words.c", "iwn_assumption_state_name", set()),
     "evidence": ("lib/northbound/protocol/src/words.c", "iwn_source_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
-    "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_store", {"memory", "file", "state", "reason"}),
     "fault_alone": [
         ("lib/northbound/server/src/observe.c", "observe_faults", set()),
         ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),
         ("app/gateway/answers/answers_events.c", "observe_health", set()),
     ],
 }
-DOCUMENT = os.path.join("docs", "northbound.md")
+DOCUMENT = os.path.join("docs", "user", "northbound.md")
 
 
 def read(path):
@@ -76,7 +76,7 @@ def examples(text):
 
 
 class Document:
-    """docs/northbound.md beside the description: what disagrees, as sentences."""
+    """docs/user/northbound.md beside the description: what disagrees, as sentences."""
 
     def __init__(self, description):
         self.description = description

@@ -5,7 +5,7 @@
 #include "token.h"
 #include "web_settings.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void add(const char *name, const char *json) {
     TEST_ASSERT_TRUE(web_feed_add(&feed, name, json, strlen(json), strcmp(name, "state") == 0));
 }
 
-static void test_reader_gets_events_in_order_and_then_the_state(void) {
+TEST(test_reader_gets_events_in_order_and_then_the_state) {
     add("state", "{\"a\":1}");
     add("stop", "{\"b\":2}");
     add("fault", "{\"c\":3}");
@@ -48,7 +48,7 @@ static void test_reader_gets_events_in_order_and_then_the_state(void) {
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
 }
 
-static void test_slow_reader_gets_the_newest_state_only(void) {
+TEST(test_slow_reader_gets_the_newest_state_only) {
     for (char i = '0'; i <= '9'; i++) {
         const char json[] = {'{', '"', i, '"', ':', i, '}', '\0'};
         add("state", json);
@@ -57,7 +57,7 @@ static void test_slow_reader_gets_the_newest_state_only(void) {
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest(void) {
+TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest) {
     add("state", "{\"a\":1}");
     TEST_ASSERT_EQUAL_STRING("event", take(5));
     add("state", "{\"a\":2}");
@@ -66,18 +66,18 @@ static void test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newes
     TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", take(1000));
 }
 
-static void test_reader_that_falls_behind_is_told_how_many_it_missed(void) {
-    for (unsigned i = 0; i < WEB_FEED_KEPT + 7U; i++) {
+TEST(test_reader_that_falls_behind_is_told_how_many_it_missed) {
+    for (unsigned i = 0; i < WEB_FEED_STORED + 7U; i++) {
         add("bus", "{}");
     }
     TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", take(1000));
-    for (unsigned i = 0; i < WEB_FEED_KEPT; i++) {
+    for (unsigned i = 0; i < WEB_FEED_STORED; i++) {
         TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", take(1000));
     }
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_new_reader_begins_with_the_newest_state_and_no_old_event(void) {
+TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event) {
     add("stop", "{}");
     add("state", "{\"a\":1}");
     web_reader_begin(&reader, &feed);
@@ -85,7 +85,7 @@ static void test_new_reader_begins_with_the_newest_state_and_no_old_event(void) 
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_state_that_is_forgotten_is_told_to_nobody(void) {
+TEST(test_state_that_is_forgotten_is_told_to_nobody) {
     add("state", "{\"a\":1}");
     web_feed_forget(&feed);
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
@@ -94,18 +94,20 @@ static void test_state_that_is_forgotten_is_told_to_nobody(void) {
 
 // ---- metrics --------------------------------------------------------------------------------------------------------
 
+static web_tally_t tally;
+
 static char *metrics_of(const char *json) {
     char *text = NULL;
     size_t length = 0;
     const iwc_message_t message = {.text = json, .length = (json != NULL) ? strlen(json) : 0U};
     const web_own_t own = {3, 4, 5, 6, 7};
     FILE *file = open_memstream(&text, &length);
-    web_metrics_write((json != NULL) ? &message : NULL, &own, file);
+    web_metrics_write((json != NULL) ? &message : NULL, &own, &tally, file);
     (void)fclose(file);
     return text;
 }
 
-static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
+TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown) {
     char *text = metrics_of("{\"state\":\"armed\",\"left\":{\"heard\":true,\"speed_mm_s\":-1234,\"battery_dV\":251,"
                             "\"temperature_degC\":null},"
                             "\"right\":{\"heard\":false,\"speed_mm_s\":null},\"counters\":{\"pairs\":7},"
@@ -133,11 +135,55 @@ static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
     free(text);
 }
 
-static void test_metrics_without_a_gateway_say_so_and_nothing_of_wheels(void) {
+TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels) {
     char *text = metrics_of(NULL);
     TEST_ASSERT_NOT_NULL(strstr(text, "\niwheel_up 0\n"));
     TEST_ASSERT_NULL(strstr(text, "iwheel_wheel"));
     free(text);
+}
+
+static void stopped(const char *json, bool is_event) {
+    const iwc_message_t message = {.text = json, .length = strlen(json), .is_event = is_event};
+    web_tally_take(&tally, &message, is_event);
+}
+
+static void expect_line(const char *line) {
+    char *text = metrics_of(NULL);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, line), line);
+    free(text);
+}
+
+TEST(test_metrics_count_stops_by_cause_once_and_from_the_connection) {
+    memset(&tally, 0, sizeof tally);
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 0\n");
+    stopped("{\"number\":4,\"cause\":\"overspeed\",\"at_us\":9,\"wall_us\":1760000000000007}", false);
+    expect_line("\niwheel_stops_total{cause=\"overspeed\"} 0\n"); // Before our time.
+    expect_line("\niwheel_last_stop_number 4\n");
+    expect_line("\niwheel_last_stop_timestamp_seconds 1760000000.000007\n");
+    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", true);
+    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", false); // The same, from `why`.
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 1\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 0\n");
+    stopped("{\"number\":8,\"cause\":\"lease_lost\",\"at_us\":30}", false); // Two were missed.
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 2\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
+}
+
+TEST(test_metrics_count_on_when_the_gateway_begins_anew) {
+    memset(&tally, 0, sizeof tally);
+    stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
+    expect_line("\niwheel_last_stop_number 0\n");
+    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":5}", true);
+    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":7}", true); // Of its next run.
+    stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
+    stopped("{\"number\":2,\"cause\":\"of the future\",\"at_us\":8}", true);
+    expect_line("\niwheel_stops_total{cause=\"client_stop\"} 2\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
+    expect_line("\niwheel_last_stop_number 2\n");
+}
+
+TEST(test_metrics_name_the_version) {
+    expect_line("\niwheel_build_info{version=\"" IWHEEL_VERSION "\"} 1\n");
 }
 
 // ---- settings -------------------------------------------------------------------------------------------------------
@@ -154,7 +200,7 @@ static int read_settings(const char *text, web_settings_t *settings) {
     return result;
 }
 
-static void test_settings_that_are_wrong_are_told_with_line_and_cure(void) {
+TEST(test_settings_that_are_wrong_are_told_with_line_and_cure) {
     static const char *const cases[][2] = {
         {"[web]\nport = 0", "f:2: "},
         {"[web]\nlisten = walker\n", "f:2: listen = walker is no address"},
@@ -173,7 +219,7 @@ static void test_settings_that_are_wrong_are_told_with_line_and_cure(void) {
     }
 }
 
-static void test_settings_that_leave_the_machine_are_taken_with_tls(void) {
+TEST(test_settings_that_leave_the_machine_are_taken_with_tls) {
     web_settings_t settings;
     TEST_ASSERT_EQUAL_INT(
         0, read_settings("[web]\nlisten = 0.0.0.0\ncertificate = /a\nkey = /b\nhosts = a b\n", &settings));
@@ -206,7 +252,7 @@ static void end_token(void) {
     (void)fclose(silent);
 }
 
-static void test_token_is_made_for_the_bridge_alone_and_stays(void) {
+TEST(test_token_is_made_for_the_bridge_alone_and_stays) {
     web_token_t token;
     web_token_t other;
     struct stat status;
@@ -225,7 +271,7 @@ static void test_token_is_made_for_the_bridge_alone_and_stays(void) {
     end_token();
 }
 
-static void test_token_that_is_deleted_or_over_is_replaced(void) {
+TEST(test_token_that_is_deleted_or_over_is_replaced) {
     web_token_t token;
     char before[WEB_TOKEN_SIZE];
     bool changed = false;
@@ -243,7 +289,7 @@ static void test_token_that_is_deleted_or_over_is_replaced(void) {
     end_token();
 }
 
-static void test_token_that_others_can_read_is_refused(void) {
+TEST(test_token_that_others_can_read_is_refused) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 0);
@@ -253,7 +299,7 @@ static void test_token_that_others_can_read_is_refused(void) {
     end_token();
 }
 
-static void test_token_that_is_only_read_is_never_made(void) {
+TEST(test_token_that_is_only_read_is_never_made) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 1);
@@ -268,23 +314,4 @@ static void test_token_that_is_only_read_is_never_made(void) {
     TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
     TEST_ASSERT_FALSE(changed);
     end_token();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_reader_gets_events_in_order_and_then_the_state);
-    RUN_TEST(test_slow_reader_gets_the_newest_state_only);
-    RUN_TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest);
-    RUN_TEST(test_reader_that_falls_behind_is_told_how_many_it_missed);
-    RUN_TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event);
-    RUN_TEST(test_state_that_is_forgotten_is_told_to_nobody);
-    RUN_TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown);
-    RUN_TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels);
-    RUN_TEST(test_settings_that_are_wrong_are_told_with_line_and_cure);
-    RUN_TEST(test_settings_that_leave_the_machine_are_taken_with_tls);
-    RUN_TEST(test_token_is_made_for_the_bridge_alone_and_stays);
-    RUN_TEST(test_token_that_is_deleted_or_over_is_replaced);
-    RUN_TEST(test_token_that_others_can_read_is_refused);
-    RUN_TEST(test_token_that_is_only_read_is_never_made);
-    return UNITY_END();
 }

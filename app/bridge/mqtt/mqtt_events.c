@@ -153,7 +153,7 @@ void mqtt_events_sent(void *context, int message) {
 void mqtt_events_refused(void *context, int message, const char *why) {
     mqtt_bridge_t *self = context;
     mqtt_inflight_t *event = inflight_of(self, message);
-    mqtt_spool_event_t kept;
+    mqtt_spool_event_t stored;
     char topic[MQTT_TOPIC_SIZE] = "a message";
     self->refusals.works = self->refusals.works || message == self->refusals.proof;
     if (event == NULL) {
@@ -168,8 +168,8 @@ void mqtt_events_refused(void *context, int message, const char *why) {
         self->info_due = due || strcmp(topic + strlen(topic) - 5U, "/info") != 0; // Which would be refused again.
         return;
     }
-    if (!event->aside && mqtt_spool_after(&self->spool, event->number - 1U, &kept)) {
-        mqtt_topic(self->settings->machine.id, "event", kept.name, topic);
+    if (!event->aside && mqtt_spool_after(&self->spool, event->number - 1U, &stored)) {
+        mqtt_topic(self->settings->machine.id, "event", stored.name, topic);
         count_refusal(self, topic, why, true);
     }
     event->fate = MQTT_REFUSED;

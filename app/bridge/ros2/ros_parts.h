@@ -10,13 +10,17 @@
 
 /// The longest name of a DDS topic with its terminator.
 #define ROS_NAME_SIZE 200U
+/// A namespace and a node.
+#define ROS_ROBOT_SIZE 132U
+/// The prefix of a frame and the name of a handle.
+#define ROS_FRAME_SIZE 80U
 
 /// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
 typedef struct {
     const char *name; ///< With a leading / outside of the namespace.
     const dds_topic_descriptor_t *type;
     const char *hash;
-    bool kept; ///< Late readers get the last one: transient local.
+    bool retained; ///< Late readers get the last one: transient local.
 } ros_topic_t;
 
 typedef enum {
@@ -30,6 +34,7 @@ typedef enum {
     WRITES_DIAGNOSTICS,
     WRITES_STATE,
     WRITES_ANSWER,
+    WRITES_ESTOP,
     WRITERS
 } writer_t;
 
@@ -49,8 +54,8 @@ struct ros {
     ros_settings_t settings;
     dds_entity_t domain; ///< 0: not ours.
     dds_entity_t participant;
-    dds_entity_t writers[WRITERS]; ///< 0: not offered.
-    dds_entity_t commands;         ///< 0: not driving.
+    dds_entity_t writers[WRITERS];              ///< 0: not offered.
+    dds_entity_t commands[ROS_COMMAND_READERS]; ///< 0: not driving, or not this type.
     dds_entity_t asks;
     dds_entity_t requests[ROS_VERBS];
     dds_entity_t replies[ROS_VERBS];
@@ -58,7 +63,9 @@ struct ros {
     dds_entity_t graph;
     int fd; ///< An eventfd: DDS has something for us.
     ros_came_t came;
-    void *context; ///< Of `came`.
+    void *context;                   ///< Of `came`.
+    char robot[ROS_ROBOT_SIZE];      ///< Namespace and node, by which /diagnostics tells two machines apart.
+    char handles[2][ROS_FRAME_SIZE]; ///< Frames of the forces, left and right.
     char text[2048];
 };
 
@@ -66,7 +73,7 @@ struct ros {
 void ros_name(const ros_t *self, const char *name, const char *prefix, const char *suffix, char out[ROS_NAME_SIZE]);
 
 /// The caller, or who makes the entity with it, deletes it.
-dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept);
+dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool retained);
 dds_entity_t ros_reader(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react);
 dds_entity_t ros_writer(ros_t *self, dds_entity_t topic, dds_qos_t *qos);
 

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// Its stamps are worth nothing any more.
+/// The stamps are void.
 static void fall_silent(serial_link_t *self) {
     self->state = SERIAL_SILENT;
     self->stamps = 0;
@@ -14,7 +14,7 @@ void serial_link_init(serial_link_t *self, uint64_t now_us) {
     self->boot[0] = '\0';
     self->version[0] = '\0';
     self->received_us = now_us;
-    self->noise = (serial_noise_t){.bytes = 0};
+    serial_link_forget_noise(self);
     iwn_receiver_init(&self->receiver, self->buffer, sizeof self->buffer, true);
 }
 
@@ -22,7 +22,8 @@ static serial_stamp_t *newest(serial_link_t *self) {
     return &self->stamp[(self->stamps - 1U) % SERIAL_STAMPS];
 }
 
-/// Of stamps that come close together the newest is kept only once another is far enough away: the ring reaches back.
+/// Of stamps that arrive close together, stores the newest one only when another is far enough away, so that the ring
+/// covers more time.
 static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
     const bool close =
         self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].received_us < SERIAL_STAMP_US;
@@ -45,7 +46,7 @@ static bool is_boot(const char *text) {
     return strlen(text) == IWN_LINE_BOOT && strspn(text, "0123456789abcdef") == IWN_LINE_BOOT;
 }
 
-/// The event `link`. A boot that differs is another board, or the same after a reset.
+/// Handles the event `link`. Another boot id is another board, or the same after a reset.
 static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_json_t value;
@@ -72,7 +73,7 @@ static void take_complaint(serial_link_t *self, iwn_json_t event) {
     }
 }
 
-/// Channel 0.
+/// Handles channel 0.
 static serial_news_t take_event(serial_link_t *self, iwn_json_t event) {
     iwn_json_t name;
     if (!iwn_json_find(event, "event", &name)) {
@@ -99,8 +100,8 @@ static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t n
         return SERIAL_NEWS_NONE;
     }
     self->received_us = now_us;
-    self->noise = (serial_noise_t){.bytes = 0};
-    // A board's time falls when it starts anew, whatever it says of itself.
+    serial_link_forget_noise(self);
+    // The time of a board decreases when it restarts, whatever it reports.
     const bool fell = self->state == SERIAL_LINKED && self->stamps > 0U && line->t_us < newest(self)->t_us;
     if (fell) {
         fall_silent(self);
@@ -147,33 +148,6 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us) {
     return true;
 }
 
-void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size) {
-    const serial_noise_t *noise = &self->noise;
-    const uint64_t unchecked = noise->lines[IWN_LINE_UNCHECKED];
-    if (noise->bytes == 0U) {
-        (void)snprintf(out, size,
-                       "nothing comes from %s: is the board powered, is it running the image `gateway`, and are "
-                       "both lines (TX, RX) and ground connected?",
-                       port);
-    } else if (noise->odd * 8U > noise->bytes) {
-        (void)snprintf(out, size,
-                       "%llu bytes came from %s that are no text: the baud rate is another than %u; set baud to "
-                       "that of the image, or the lines are disturbed",
-                       (unsigned long long)noise->bytes, port, baud);
-    } else if (noise->lines[IWN_LINE_CORRUPT] > 0U || noise->lines[IWN_LINE_LOST] > 0U) {
-        (void)snprintf(out, size,
-                       "lines come damaged from %s (%llu with a wrong CRC): a bad cable, ground, or two programs "
-                       "reading the port",
-                       port, (unsigned long long)noise->lines[IWN_LINE_CORRUPT]);
-    } else if (unchecked + noise->lines[IWN_LINE_MISFORMED] > 0U) {
-        (void)snprintf(out, size,
-                       "another protocol is spoken on %s (such as \"%s\"): it is another device, or the board runs "
-                       "another image than `gateway`",
-                       port, noise->sample);
-    } else {
-        (void)snprintf(out, size,
-                       "%llu bytes came from %s and no whole line: another protocol or baud rate, or a board that "
-                       "hangs",
-                       (unsigned long long)noise->bytes, port);
-    }
+void serial_link_forget_noise(serial_link_t *self) {
+    self->noise = (serial_noise_t){.bytes = 0};
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// One stream of events for any number of readers: what happened in order, and of the state only the newest.
 ///
-/// Pure: no socket, no clock. Bounded: WEB_FEED_KEPT events, one state, and what readers are in the middle of. A reader that falls behind is
+/// Pure: no socket, no clock. Bounded: WEB_FEED_STORED events, one state, and what readers are in the middle of. A reader that falls behind is
 /// told how many it missed (event `lost`, as the gateway tells it), never waited for. One thread.
 #ifndef WEB_FEED_H
 #define WEB_FEED_H
@@ -10,15 +10,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define WEB_FEED_KEPT 64U
+#define WEB_FEED_STORED 64U
 
 typedef struct web_message web_message_t;
 
 typedef struct {
-    web_message_t *events[WEB_FEED_KEPT]; ///< Number n is at n % WEB_FEED_KEPT.
-    uint64_t count;                       ///< Events ever.
-    web_message_t *state;                 ///< NULL: none.
-    uint64_t states;                      ///< States ever.
+    web_message_t *events[WEB_FEED_STORED]; ///< Number n is at n % WEB_FEED_STORED.
+    uint64_t count;                         ///< Events ever.
+    web_message_t *state;                   ///< NULL: none.
+    uint64_t states;                        ///< States ever.
 } web_feed_t;
 
 typedef struct {

@@ -35,9 +35,9 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
     }
     // The same stop again, now with its frames, or its recording: in place of the first.
     const bool same = self->stops[0] != NULL && (uint64_t)number.value == self->stop_number;
-    free(self->stops[same ? 0 : WEB_STOPS_KEPT - 1U]);
+    free(self->stops[same ? 0 : WEB_STOPS_STORED - 1U]);
     if (!same) {
-        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_KEPT - 1U) * sizeof self->stops[0]);
+        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_STORED - 1U) * sizeof self->stops[0]);
     }
     self->stops[0] = copy;
     self->stop_number = (uint64_t)number.value;
@@ -46,7 +46,9 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
 
 static void take_why(void *context, const iwc_message_t *reply) {
     if (reply != NULL) {
-        keep_stop(context, reply);
+        web_link_t *self = context;
+        web_tally_take(&self->tally, reply, false);
+        keep_stop(self, reply);
     }
 }
 
@@ -71,6 +73,7 @@ static void take_event(void *context, const iwc_message_t *message, uint64_t now
     }
     if (strcmp(name, "stop") == 0) {
         bridge_lease_end(&self->lease, now_us);
+        web_tally_take(&self->tally, message, true);
         keep_stop(self, message); // Another one may come before its frames do.
         (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = now_us + WHY_US;
@@ -112,7 +115,7 @@ void web_link_close(web_link_t *self) {
     bridge_link_close(&self->gateway);
     forget_state(self);
     web_feed_free(&self->feed);
-    for (size_t i = 0; i < WEB_STOPS_KEPT; i++) {
+    for (size_t i = 0; i < WEB_STOPS_STORED; i++) {
         free(self->stops[i]);
     }
 }

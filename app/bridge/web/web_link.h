@@ -6,8 +6,9 @@
 #include "common/bridge_link.h"
 #include "common/lease.h"
 #include "feed.h"
+#include "tally.h"
 
-#define WEB_STOPS_KEPT 16U
+#define WEB_STOPS_STORED 16U
 
 typedef struct {
     bridge_link_t gateway;
@@ -19,8 +20,9 @@ typedef struct {
     uint64_t state_us;    ///< When the newest state came.
     char *state;          ///< The newest, as it came; NULL: not known.
     size_t state_length;
-    char *stops[WEB_STOPS_KEPT]; ///< Replies to `why`, the newest first.
+    char *stops[WEB_STOPS_STORED]; ///< Replies to `why`, the newest first.
     web_feed_t feed;
+    web_tally_t tally;
 } web_link_t;
 
 /// False: no memory. It must not be moved afterwards.

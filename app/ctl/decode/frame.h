@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A frame as one line for people, on stdout, and as the gateway tells it: the event `frame`, and in the reply to `why`.
+/// A frame as one line of text on stdout, and as the gateway sends it: in the event `frame`, and in the reply to `why`.
 #ifndef FRAME_H
 #define FRAME_H
 
@@ -8,22 +8,22 @@
 
 #include <jansson.h>
 
-/// "T", "R", or "" if the recording does not tell.
+/// Returns "T" (sent), "R" (received), or "" if the recording has no direction.
 const char *frame_direction(const candump_t *frame);
 
-/// Room for every line of a frame, with its newline and terminator.
+/// Size of the longest line of a frame, with newline and terminator.
 #define FRAME_LINE_SIZE 1024U
 
-/// The id in hexadecimal: 3 digits, or 8 of an extended one.
+/// Appends the id in hexadecimal, with at least 3 digits; 8 if it is extended.
 void frame_add_id(const candump_t *frame, iwn_text_t *line);
 
-/// The data in hexadecimal, with `gap` between the bytes.
+/// Appends the data in hexadecimal, with `gap` between the bytes.
 void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line);
 
-/// Time (of any form, 12 columns), id, who sent it, and the values; of a frame without any, its bytes.
+/// Prints time (12 columns, any form), id, direction and values; the bytes if the frame has no values.
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded);
 
-/// The frame that the gateway tells, with `time_us` 0; and when it came, on the monotonic clock.
+/// Reads a frame that the gateway sent. Its `time_us` is 0; `*out_at_us` is its time on the monotonic clock.
 candump_t frame_from_json(const json_t *told, int64_t *out_at_us);
 
 #endif

@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A time before this is not one since 1970.
+/// An earlier time is not counted from 1970.
 #define CALENDAR_US 1000000000000000
 /// Decimals of a time.
 #define SECOND_DIGITS 6U
@@ -21,11 +21,11 @@ typedef struct {
     const char *path;
     bool csv;
     iw_config_t config;
-    int64_t begin_us; ///< Of the first frame.
+    int64_t begin_us; ///< Time of the first frame.
     recording_t recording;
 } decode_t;
 
-/// An exit code.
+/// Reads the words. Returns an exit code.
 static int parse_words(decode_t *self, int count, char **words) {
     const option_t options[] = {
         {OPTION("--csv", NULL, &self->csv)},
@@ -73,7 +73,7 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     char text[FRAME_LINE_SIZE];
     char name[CANDUMP_INTERFACE_SIZE];
     iwn_text_t line = iwn_text_begin(text, sizeof text);
-    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would be another column.
+    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would begin another column.
         const char c = frame->interface[i];
         name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
@@ -101,13 +101,13 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     (void)fwrite(text, 1, line.length, stdout);
 }
 
-/// Null if there is none.
+/// Returns the text, or NULL (written as null) if it is empty.
 static const char *or_null(const char *text) {
     return (text[0] != '\0') ? text : NULL;
 }
 
-/// One object: when and where, id and bytes, whose message it is, and under `values` what it carries, named as in the CSV.
-/// What is not known is null. False if it does not fit: nothing is written.
+/// Writes one object: time and interface, id and bytes, wheel and message, and under `values` the values with the names
+/// of the CSV. An unknown value is null. Returns false if the line is too long; then nothing is written.
 static bool write_json(const candump_t *frame, const decoded_t *decoded) {
     char line[2U * FRAME_LINE_SIZE];
     char data[2U * CANDUMP_DATA_MAX + 1U];
@@ -141,7 +141,7 @@ static bool write_json(const candump_t *frame, const decoded_t *decoded) {
     return length > 0U;
 }
 
-/// An exit code.
+/// Writes one frame. Returns an exit code.
 static int write_frame(decode_t *self, const candump_t *frame, bool json) {
     decoded_t decoded;
     const iw_can_frame_t core = candump_to_core(frame);
@@ -178,7 +178,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     while (code == CTL_OK && ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
         code = write_frame(&decode, &frame, self->json);
         if (recording_is_drained(&decode.recording)) {
-            (void)fflush(stdout); // Live: nobody waits for the next line to see this one.
+            (void)fflush(stdout); // Live: each line must be visible before the next one comes.
         }
     }
     const int read = recording_close(&decode.recording);

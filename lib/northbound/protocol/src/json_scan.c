@@ -250,8 +250,8 @@ static int32_t read_exponent(const char *c, const char *end) {
     return negative ? -exponent : exponent;
 }
 
-/// Whether the digits from `c` on, whose first is not zero, are at least those of what is no double any more: halfway between
-/// the largest one and the power of two behind it. Nobody writes more of its 309 digits than these.
+/// Whether the digits from `c` on, whose first is not zero, are at least those of what is no double any more: halfway
+/// between the largest one and the power of two behind it. Nobody writes more of its 309 digits than these.
 static bool is_beyond(const char *c, const char *end) {
     static const char limit[] = "179769313486231580793728";
     for (const char *wanted = limit; *wanted != '\0'; wanted++) {
@@ -362,8 +362,12 @@ int iwn_scan(iwn_scan_t *self) {
     if (iwn_scan_is_letter(c)) {
         return scan_word(self);
     }
-    self->at += (c < 0x80) ? 1U : character_length(self);
-    return is_mark(c) ? c : IWN_TOKEN_INVALID;
+    if (is_mark(c)) {
+        self->at++;
+        return c;
+    }
+    self->at += character_length(self);
+    return IWN_TOKEN_INVALID;
 }
 
 /// What the escape means that begins at the backslash there.
