@@ -7,9 +7,9 @@ usage: house.py facts|layers|pages|pins [ROOT]
 facts    the table of facts in docs/developer/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
          with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
 layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md.
-pages    the lists of docs/developer/how-to-add.md, the indexes of test/, scripts/ and docs/, links of Markdown and names of pages in every file. A list stands below a comment
-         `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have the pattern are those whose names stand in the list, each
-         after its number. A file of test/ may be named too, and must have it then.
+pages    the indexes of test/, scripts/ and docs/; links of Markdown, and names of pages in every file: each must exist; and the lists of
+         docs/developer/how-to-add.md. A list stands below a comment `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have
+         the pattern are those whose names stand in the list, each after its number. A file of test/ may be named too, and must have it then.
 pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
          of the tree calls pip without checksums.
 
