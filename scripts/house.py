@@ -6,7 +6,8 @@ usage: house.py facts|layers|pages|pins [ROOT]
 
 facts    the table of facts in docs/developer/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
          with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
-layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md.
+layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md. And the name
+         of a source or header file belongs to one file of core, lib, port and app.
 pages    the indexes of test/, scripts/ and docs/; links of Markdown, and names of pages in every file: each must exist; and the lists of
          docs/developer/how-to-add.md. A list stands below a comment `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have
          the pattern are those whose names stand in the list, each after its number. A file of test/ may be named too, and must have it then.
@@ -34,6 +35,8 @@ TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "lib", "port", "app")
 DEPTH = {"core": 4, "app/bridge/ros2": 6}  # Of any other: 5.
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
+# Names that several files may have. CMakeLists.txt, help.txt and README.md are neither source nor header, and are found by their folder.
+SEVERAL = {"main.c": "one for each program", "board.h": "one for each board; the build chooses the folder"}
 
 
 def sources(*folders):
@@ -200,20 +203,22 @@ def layers():
     table = permitted()
     files = [path.relative_to(ROOT) for path in sources(*PRODUCTION)]
     owners = {path: owner(path, table) for path in files}
-    headers = {}
+    named = {}
     for path in files:
-        headers.setdefault(path.name, []).append(path)
+        named.setdefault(path.name, []).append(path)
     wrong, used = [], set()
     for path in files:
         for included in INCLUDE.findall((ROOT / path).read_text()):
             plain = re.sub(r"^(?:.*/)?\.\./", "", included)  # However it gets there, it ends in the name of a file.
-            there = {owners[other] for other in headers.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
+            there = {owners[other] for other in named.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
             if there and owners[path] not in there:
-                there = there & table.get(owners[path], set()) or there  # Of several headers of that name it is the one in reach.
+                there = there & table.get(owners[path], set()) or there  # Of several files of that name it is the one in reach.
                 used |= {(owners[path], other) for other in there}
                 wrong += [f"{path} includes {included} of {other}" for other in sorted(there - table.get(owners[path], set()))]
     unused = sorted(f"{who} -> {whom}" for who, all_of in table.items() for whom in all_of if (who, whom) not in used)
     strangers = sorted(set(owners.values()) - set(table))
+    wrong += [f"rename one of these: {', '.join(map(str, same))}" for one, same in named.items() if len(same) > 1 and one not in SEVERAL]
+    wrong += [f"take {one} out of SEVERAL: no two files have this name" for one in SEVERAL if len(named.get(one, ())) < 2]
     wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [
         f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused
     ]

@@ -158,7 +158,14 @@ def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
         for part in config["value_template"].split("value_json.")[1].split(" ")[0].split("."):
             assert part in value, (part, config)
             value = value[part]
+        assert config["origin"]["name"] == "iwheel-mqtt" and config["origin"]["sw_version"], config
+        measured = config.get("unit_of_measurement") is not None
+        assert (config.get("state_class") in ("measurement", "total")) == measured, f"a number has statistics, a word has none: {config}"
     assert len({config["unique_id"] for _, config, _ in told}) == 10
+    (template,) = [config["value_template"] for topic, config, _ in told if topic.endswith("/estop/config")]
+    jinja = pytest.importorskip("jinja2").Template(template)
+    for line, shown in (("released", "OFF"), ("pressed", "ON"), ("unreadable", "ON"), ("disagrees", "ON"), ("none", "None")):
+        assert jinja.render(value_json={"estop": {"state": line}}) == shown, f"{line}: Home Assistant takes None for unknown"
     assert rig.far("later", topics=("homeassistant/#",)) and until(
         lambda: len(rig.fars[-1].all) == 10 and all(retain for _, _, retain, _ in rig.fars[-1].all), what="retained"
     )

@@ -19,6 +19,8 @@ static ros_request_t request;
 static bool has_request;
 static bool answered;
 static bool success;
+static int estop_shown;
+static unsigned estop_count;
 
 // ---- instead of DDS -------------------------------------------------------------------------------------------------
 
@@ -38,12 +40,23 @@ void ros_woken(ros_t *self) {
     (void)self;
 }
 
-bool ros_take_command(ros_t *self, ros_command_t *out_command) {
-    const bool was = has_command;
+bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) {
+    const bool was = has_command && reader == 0U;
     (void)self;
     *out_command = command;
-    has_command = false;
+    has_command = has_command && !was;
     return was;
+}
+
+void ros_find_unmatched(ros_t *self, ros_unmatched_t *out) {
+    (void)self;
+    memset(out, 0, sizeof *out);
+}
+
+void ros_publish_estop(ros_t *self, bool pressed) {
+    (void)self;
+    estop_shown = pressed ? 1 : 0;
+    estop_count++;
 }
 
 unsigned ros_publishers(const ros_t *self) {
@@ -127,6 +140,8 @@ static void arm(void) {
 
 void setUp(void) {
     has_command = has_request = answered = success = false;
+    estop_shown = -1;
+    estop_count = 0;
     daemon_rig_begin();
     settings = ros_settings_standard;
     settings.drive.enabled = true;
@@ -215,6 +230,24 @@ static void test_ros_command_with_an_old_header_is_not_passed(void) {
     pass(20);
     TEST_ASSERT_EQUAL_UINT64(1, bridge.facts.commands.late);
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
+}
+
+static void test_ros_estop_topic_shows_the_line_once_for_each_change(void) {
+    TEST_ASSERT_EQUAL_INT(0, estop_shown);
+    daemon_rig.estop = 1;
+    pass(300);
+    TEST_ASSERT_EQUAL_INT(1, estop_shown);
+    daemon_rig.estop = 0;
+    pass(300);
+    TEST_ASSERT_EQUAL_INT(0, estop_shown);
+    daemon_rig.estop = -1;
+    pass(300);
+    TEST_ASSERT_EQUAL_INT(1, estop_shown);
+    TEST_ASSERT_EQUAL_UINT(4, estop_count);
+    (void)snprintf(bridge.facts.machine.estop, sizeof bridge.facts.machine.estop, "none");
+    bridge.facts.link = ROS_LINK_SILENT;
+    bridge_step(&bridge);
+    TEST_ASSERT_EQUAL_INT(1, estop_shown); // A line that was there and is gone is one that cannot be read.
 }
 
 static void test_ros_arm_takes_no_lease_from_another_client(void) {
@@ -508,6 +541,7 @@ int main(void) {
     RUN_TEST(test_ros_command_that_was_late_is_not_passed);
     RUN_TEST(test_ros_estop_latches_and_reset_is_not_for_the_network);
     RUN_TEST(test_ros_command_with_an_old_header_is_not_passed);
+    RUN_TEST(test_ros_estop_topic_shows_the_line_once_for_each_change);
     RUN_TEST(test_ros_arm_takes_no_lease_from_another_client);
     RUN_TEST(test_ros_arm_that_was_late_is_refused);
     RUN_TEST(test_ros_first_command_of_a_minute_ago_moves_nothing);

@@ -523,7 +523,7 @@ def names(t):
         if t.check(info, f"{release}: no node in the graph"):
             node = info.node_entities_info_seq[0]
             t.check((node.node_namespace, node.node_name) == ("/w1", "base"), f"{node.node_namespace} {node.node_name}")
-            t.check(len(node.reader_gid_seq) == 6 and len(node.writer_gid_seq) == 13, f"{len(node.reader_gid_seq)} readers, {len(node.writer_gid_seq)} writers")
+            t.check(len(node.reader_gid_seq) == 6 and len(node.writer_gid_seq) == 14, f"{len(node.reader_gid_seq)} readers, {len(node.writer_gid_seq)} writers")
             t.check(len(info.gid.data) == size, f"{release}: ids of {len(info.gid.data)} bytes")
             raw = graph.all[-1][0]
             again = bytes(ride.peer.store.serialize_cdr(info, graph.name))

@@ -254,44 +254,7 @@ class Words(unittest.TestCase):
 
 
 class Processes(unittest.TestCase):
-    """A runner with tests in processes, and the sleepers themselves."""
-
-    RUNNER = """
-        import sys, time, unittest, os
-        sys.path[:0] = [{ctl!r}]
-        import several
-        several.LIMIT_S = {limit}
-        several.verdict.Witness.stalls = lambda *_: [(several.verdict.now_us(), 500_000)]  # This machine is always late.
-        several.verdict.Session.await_quiet = lambda *_: None
-
-        class Fake(unittest.TestCase):
-            def test_{kind}(self):
-                with open({count!r}, "a") as file:
-                    file.write("x")
-                {body}
-
-        if __name__ == "__main__":
-            sys.argv.pop(1)
-            several.main("build")
-        """
-
-    def several(self, kind, body, limit=30):
-        """(exit status, last line, attempts)"""
-        with tempfile.TemporaryDirectory() as folder:
-            count, path = os.path.join(folder, "count"), os.path.join(folder, "fake.py")
-            with open(path, "w", encoding="ascii") as file:
-                file.write(textwrap.dedent(self.RUNNER).format(ctl=os.path.join(HERE, "..", "ctl"), count=count, kind=kind, body=body, limit=limit))
-            done = subprocess.run([sys.executable, path, "build"], capture_output=True, text=True, timeout=60, check=False)
-            return done.returncode, done.stdout.splitlines()[-1], os.path.getsize(count)
-
-    def test_broken_rule_crash_and_hang_are_final_on_a_late_machine(self):
-        final = (1, "0 passed, 1 failed, 0 skipped", 1)
-        self.assertEqual(final, self.several("rule", "raise several.verdict.RuleBroken('nonzero after e-stop')"))
-        self.assertEqual(final, self.several("crash", "os.abort()"))
-        self.assertEqual(final, self.several("hang", "time.sleep(60)", 4))
-
-    def test_late_test_on_a_late_machine_is_not_judged(self):
-        self.assertEqual((75, "0 passed, 0 failed, 1 skipped", 4), self.several("late", "self.fail('not within 1 s')"))
+    """The sleepers themselves."""
 
     def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
         witness = verdict.Witness()

@@ -154,6 +154,26 @@ static void test_json_walk_gives_members_and_values_in_their_order(void) {
     TEST_ASSERT_FALSE(iwn_json_find(member("d"), "c", &value));
 }
 
+static void test_json_names_of_the_root_are_found_in_their_order(void) {
+    const char *text = " {\"d\":-5,\"b\" : {\"z\":1,\"a\":{}} ,\"\\u0061\":[{\"e\":1}],\"c\":\"x\"}";
+    static const char *const names[] = {"a", "b", "c", "d"};
+    static const iwn_json_kind_t kinds[] = {IWN_JSON_LIST, IWN_JSON_OBJECT, IWN_JSON_TEXT, IWN_JSON_INTEGER};
+    TEST_ASSERT_TRUE(check(text, strlen(text)));
+    TEST_ASSERT_EQUAL_PTR(root.at, iwn_json_root(root.at - 1).at);
+    TEST_ASSERT_EQUAL_PTR(root.at, iwn_json_root(root.at).at);
+    TEST_ASSERT_EQUAL_UINT16(4, work.names);
+    for (unsigned i = 0; i < 4U; i++) {
+        const iwn_json_t name = iwn_json_name(root.at - 1, &work, i);
+        TEST_ASSERT_TRUE_MESSAGE(iwn_json_is(name, names[i]), names[i]);
+        TEST_ASSERT_EQUAL_INT(kinds[i], iwn_json_kind(iwn_json_value(name)));
+        TEST_ASSERT_EQUAL_PTR(member(names[i]).at, iwn_json_value(name).at);
+    }
+    TEST_ASSERT_TRUE(check("{}", 2U));
+    TEST_ASSERT_EQUAL_UINT16(0, work.names);
+    TEST_ASSERT_TRUE(check("[{\"a\":1}]", 9U));
+    TEST_ASSERT_EQUAL_UINT16(0, work.names);
+}
+
 static void test_json_kinds_are_told_apart(void) {
     const char *text = "{\"t\":true,\"f\":false,\"n\":null,\"i\":-0,\"r\":0.0,\"e\":1E5,\"s\":\"\",\"o\":{},\"l\":[]}";
     TEST_ASSERT_TRUE(check(text, strlen(text)));
@@ -204,6 +224,7 @@ int main(void) {
     RUN_TEST(test_json_refusal_tells_what_is_wrong_and_near_what);
     RUN_TEST(test_json_character_cut_by_the_end_is_not_completed_from_behind);
     RUN_TEST(test_json_walk_gives_members_and_values_in_their_order);
+    RUN_TEST(test_json_names_of_the_root_are_found_in_their_order);
     RUN_TEST(test_json_kinds_are_told_apart);
     RUN_TEST(test_json_integers_come_as_sent_to_the_last_one);
     RUN_TEST(test_json_text_is_given_as_it_means_if_it_fits);

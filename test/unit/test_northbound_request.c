@@ -235,6 +235,27 @@ static void test_request_missing_field_is_named(void) {
     refused(IWN_MISSING_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"right_mA\":5}");
 }
 
+/// The refusal of the line has this name and says this.
+static void refused_with(iwn_error_t error, const char *says, const char *line) {
+    refused(error, line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, says), refusal.message);
+}
+
+static void test_request_first_fault_in_the_line_is_named(void) {
+    refused_with(IWN_UNKNOWN_FIELD, "\"zz\"", "{\"cmd\":\"drive\",\"zz\":1,\"mm\":2,\"aa\":3}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"cmd\":\"drive\",\"aa\":1,\"mm\":2,\"zz\":3}");
+    refused_with(IWN_BAD_VALUE, "right_mm_s must", "{\"right_mm_s\":\"\",\"left_mm_s\":[],\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":[],\"right_mm_s\":\"\",\"cmd\":\"drive\"}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"zz\"", "{\"zz\":1,\"left_mm_s\":null,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":null,\"zz\":1,\"cmd\":\"drive\"}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"aa\":1,\"left_mm_s\":null,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":null,\"aa\":1,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "id must", "{\"aa\":1,\"cmd\":\"fly\",\"id\":null}");
+    refused_with(IWN_UNKNOWN_CMD, "cmd must", "{\"aa\":1,\"cmd\":\"fly\"}");
+    refused_with(IWN_BAD_JSON, "end of file", "{\"aa\":1,\"cmd\":\"fly\",\"id\":null} 7");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"aa\":1,\"cmd\":\"drive\"}");
+}
+
 static void test_request_field_of_another_command_is_unknown(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"left_mm_s\":1}");
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"v_mm_s\":1}");
@@ -402,6 +423,7 @@ int main(void) {
     RUN_TEST(test_request_worst_lines_are_read_to_their_end);
     RUN_TEST(test_request_integer_of_another_type_is_a_bad_value);
     RUN_TEST(test_request_missing_field_is_named);
+    RUN_TEST(test_request_first_fault_in_the_line_is_named);
     RUN_TEST(test_request_field_of_another_command_is_unknown);
     RUN_TEST(test_request_command_must_be_a_known_text);
     RUN_TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all);

@@ -44,7 +44,7 @@ static void test_settings_all_keys_are_read(void) {
                      "[odometry]\nrate_hz = 100\nodom_frame = w1/odom\nbase_frame = b\ntf = yes\n"));
     TEST_ASSERT_EQUAL_STRING("/tmp/x", settings.gateway.socket);
     TEST_ASSERT_EQUAL_UINT32(7, settings.ros.domain);
-    TEST_ASSERT_TRUE(settings.ros.loopback && settings.ros.humble && settings.drive.stamped);
+    TEST_ASSERT_TRUE(settings.ros.loopback && settings.ros.humble && settings.drive.command == ROS_COMMAND_STAMPED);
     TEST_ASSERT_EQUAL_STRING("w1", ros_settings_space(&settings));
     TEST_ASSERT_EQUAL_STRING("base", settings.ros.node);
     TEST_ASSERT_FALSE(settings.drive.enabled);

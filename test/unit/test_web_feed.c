@@ -94,13 +94,15 @@ static void test_state_that_is_forgotten_is_told_to_nobody(void) {
 
 // ---- metrics --------------------------------------------------------------------------------------------------------
 
+static web_tally_t tally;
+
 static char *metrics_of(const char *json) {
     char *text = NULL;
     size_t length = 0;
     const iwc_message_t message = {.text = json, .length = (json != NULL) ? strlen(json) : 0U};
     const web_own_t own = {3, 4, 5, 6, 7};
     FILE *file = open_memstream(&text, &length);
-    web_metrics_write((json != NULL) ? &message : NULL, &own, file);
+    web_metrics_write((json != NULL) ? &message : NULL, &own, &tally, file);
     (void)fclose(file);
     return text;
 }
@@ -138,6 +140,50 @@ static void test_metrics_without_a_gateway_say_so_and_nothing_of_wheels(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\niwheel_up 0\n"));
     TEST_ASSERT_NULL(strstr(text, "iwheel_wheel"));
     free(text);
+}
+
+static void stopped(const char *json, bool is_event) {
+    const iwc_message_t message = {.text = json, .length = strlen(json), .is_event = is_event};
+    web_tally_take(&tally, &message, is_event);
+}
+
+static void expect_line(const char *line) {
+    char *text = metrics_of(NULL);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, line), line);
+    free(text);
+}
+
+static void test_metrics_count_stops_by_cause_once_and_from_the_connection(void) {
+    memset(&tally, 0, sizeof tally);
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 0\n");
+    stopped("{\"number\":4,\"cause\":\"overspeed\",\"at_us\":9,\"wall_us\":1760000000000007}", false);
+    expect_line("\niwheel_stops_total{cause=\"overspeed\"} 0\n"); // Before our time.
+    expect_line("\niwheel_last_stop_number 4\n");
+    expect_line("\niwheel_last_stop_timestamp_seconds 1760000000.000007\n");
+    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", true);
+    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", false); // The same, from `why`.
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 1\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 0\n");
+    stopped("{\"number\":8,\"cause\":\"lease_lost\",\"at_us\":30}", false); // Two were missed.
+    expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 2\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
+}
+
+static void test_metrics_count_on_when_the_gateway_begins_anew(void) {
+    memset(&tally, 0, sizeof tally);
+    stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
+    expect_line("\niwheel_last_stop_number 0\n");
+    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":5}", true);
+    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":7}", true); // Of its next run.
+    stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
+    stopped("{\"number\":2,\"cause\":\"of the future\",\"at_us\":8}", true);
+    expect_line("\niwheel_stops_total{cause=\"client_stop\"} 2\n");
+    expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
+    expect_line("\niwheel_last_stop_number 2\n");
+}
+
+static void test_metrics_name_the_version(void) {
+    expect_line("\niwheel_build_info{version=\"" IWHEEL_VERSION "\"} 1\n");
 }
 
 // ---- settings -------------------------------------------------------------------------------------------------------
@@ -279,6 +325,9 @@ int main(void) {
     RUN_TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event);
     RUN_TEST(test_state_that_is_forgotten_is_told_to_nobody);
     RUN_TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown);
+    RUN_TEST(test_metrics_count_stops_by_cause_once_and_from_the_connection);
+    RUN_TEST(test_metrics_count_on_when_the_gateway_begins_anew);
+    RUN_TEST(test_metrics_name_the_version);
     RUN_TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels);
     RUN_TEST(test_settings_that_are_wrong_are_told_with_line_and_cure);
     RUN_TEST(test_settings_that_leave_the_machine_are_taken_with_tls);

@@ -1054,8 +1054,28 @@ def test_rules_and_dashboard_know_only_figures_that_there_are(rig):
     json.loads((ROOT / "share/web/grafana-dashboard.json").read_text(encoding="utf-8"))
     if not shutil.which("promtool"):
         raise Skip("promtool is missing (apt-get install prometheus)")
-    done = subprocess.run(["promtool", "check", "rules", ROOT / "share/web/prometheus-rules.yml"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    for words in (("check", "rules", ROOT / "share/web/prometheus-rules.yml"), ("test", "rules", ROOT / "test/web/prometheus-rules.test.yml")):
+        done = subprocess.run(["promtool", *words], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_metrics_count_a_stop_by_its_cause_and_tell_the_last_one(rig):
+    rig.start().connected()
+
+    def figure(name):
+        found = re.search(rf"^{re.escape(name)} (\S+)$", rig.ask("GET", "/metrics")[1], re.MULTILINE)
+        return float(found[1]) if found else None
+
+    until(lambda: figure("iwheel_last_stop_number") == 0, what="none yet")
+    before = figure('iwheel_stops_total{cause="estop_software"}')
+    client = rig.client(name="at the machine")
+    assert client.request("estop")["ok"]
+    client.close()
+    until(lambda: figure("iwheel_last_stop_number") == 1, what="the stop")
+    assert before == 0 and figure('iwheel_stops_total{cause="estop_software"}') == 1
+    assert abs(figure("iwheel_last_stop_timestamp_seconds") - time.time()) < 30
+    time.sleep(3)  # The bridge asks for the frames around it: the same stop again.
+    assert figure('iwheel_stops_total{cause="estop_software"}') == 1 and figure('iwheel_stops_total{cause="unknown"}') == 0
 
 
 PROMETHEUS = """

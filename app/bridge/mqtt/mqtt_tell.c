@@ -202,8 +202,10 @@ typedef struct {
 static const sensor_t sensors[] = {
     {"sensor", "state", "State", "value_json.state", NULL, NULL},
     {"sensor", "cause", "Stopped by", "value_json.cause or 'nothing'", NULL, NULL},
-    {"binary_sensor", "estop", "Emergency stop pressed", "'OFF' if value_json.estop.state == 'released' else 'ON'",
-     NULL, "problem"},
+    // None is "unknown" in Home Assistant: without a line nobody knows of a button. A line that cannot be read counts as pressed.
+    {"binary_sensor", "estop", "Emergency stop pressed",
+     "None if value_json.estop.state == 'none' else 'OFF' if value_json.estop.state == 'released' else 'ON'", NULL,
+     "problem"},
     {"binary_sensor", "bus", "Bus down", "'OFF' if value_json.bus.state == 'active' else 'ON'", NULL, "problem"},
     {"sensor", "battery_left", "Battery left",
      "value_json.left.battery_dV / 10 if value_json.left.battery_dV is number else None", "V", "voltage"},
@@ -226,6 +228,21 @@ static const sensor_t sensors[] = {
 void mqtt_sensor_topics(const mqtt_settings_t *settings, char out[MQTT_TOPIC_SIZE]) {
     (void)snprintf(out, MQTT_TOPIC_SIZE, "%s/+/iwheel_%s/+/config", settings->home_assistant.prefix,
                    settings->machine.id);
+}
+
+/// What Home Assistant keeps long-term statistics of: a distance only grows in sum, the others are measured.
+static const char *state_class_of(const sensor_t *sensor) {
+    if (sensor->unit == NULL) {
+        return NULL;
+    }
+    return (strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
+}
+
+static void tell_origin(iwn_out_t *out) {
+    iwn_out_open(out, "origin", '{');
+    iwn_out_text(out, "name", "iwheel-mqtt");
+    iwn_out_text(out, "sw_version", IWHEEL_VERSION);
+    iwn_out_close(out, '}');
 }
 
 static void tell_device(const mqtt_settings_t *settings, iwn_out_t *out) {
@@ -266,6 +283,10 @@ bool mqtt_tell_sensor(const mqtt_settings_t *settings, size_t number, char out_t
     if (sensor->class != NULL) {
         iwn_out_text(&out, "device_class", sensor->class);
     }
+    if (state_class_of(sensor) != NULL) {
+        iwn_out_text(&out, "state_class", state_class_of(sensor));
+    }
+    tell_origin(&out);
     tell_device(settings, &out);
     if (end(&out) == 0U) {
         return false;

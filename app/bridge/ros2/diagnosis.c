@@ -140,6 +140,37 @@ static void tell_assumptions(const ros_facts_t *facts, ros_status_t *status) {
     }
 }
 
+/// A publisher that DDS does not connect to cmd_vel: nothing that it sends arrives.
+static void tell_unmatched(const ros_unmatched_t *unmatched, ros_status_t *status) {
+    if (unmatched->policy[0] != '\0') {
+        say(status, ROS_WARN,
+            "%u publishers of %s are not received: the QoS policy %s of one of type %s does not match; publish with "
+            "ROS's default QoS",
+            unmatched->count, unmatched->topic, unmatched->policy, unmatched->type);
+    } else {
+        say(status, ROS_WARN,
+            "%u publishers of %s are not received: one sends %s; publish %s, or set [drive] command = both in "
+            "ros2.conf",
+            unmatched->count, unmatched->topic, unmatched->type, unmatched->wanted);
+    }
+}
+
+/// Publishers that are not received, or too many of them. Returns false if there is nothing to report.
+static bool tell_publishers(const ros_commands_t *commands, ros_status_t *status) {
+    if (commands->unmatched.count > 0U) {
+        tell_unmatched(&commands->unmatched, status);
+        return true;
+    }
+    if (commands->publishers > 1U) {
+        say(status, ROS_WARN,
+            "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
+            "twist_mux in between",
+            commands->publishers);
+        return true;
+    }
+    return false;
+}
+
 static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     const ros_commands_t *commands = &facts->commands;
     const int64_t lease_ms = (facts->machine.lease_ms > 0) ? facts->machine.lease_ms : 200;
@@ -151,6 +182,7 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     add(status, "dropped_bad", true, (int64_t)commands->bad);
     add(status, "dropped_unsent", true, (int64_t)commands->unsent);
     add(status, "refused", true, (int64_t)commands->refused);
+    add(status, "not_received", true, (int64_t)commands->unmatched.count);
     add(status, "needed_hz", true, (3000 + lease_ms - 1) / lease_ms);
     if (!facts->drive) {
         say(status, ROS_OK, "watching only: [drive] enabled = no");
@@ -158,11 +190,8 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
         say(status, ROS_WARN,
             "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine; it only "
             "watches");
-    } else if (commands->publishers > 1U) {
-        say(status, ROS_WARN,
-            "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
-            "twist_mux in between",
-            commands->publishers);
+    } else if (tell_publishers(commands, status)) {
+        return;
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
     } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {
@@ -171,6 +200,9 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             " commands of publishers on other machines were dropped because their clocks are not known yet: publish "
             "zeros for a second first, at 2 Hz or more; a publisher for each command never becomes known",
             commands->unknown);
+    } else if (commands->publishers == 0U && commands->unmatched.elsewhere[0] != '\0') {
+        say(status, ROS_OK, "no publisher of %s, but %s has one: remap it if it is meant for this machine",
+            commands->unmatched.topic, commands->unmatched.elsewhere);
     } else if (commands->late > 0 || commands->bad > 0) {
         say(status, ROS_WARN,
             "%" PRIu64 " commands came too late, %" PRIu64
@@ -184,9 +216,8 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
 }
 
 void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status) {
-    static const char *const names[ROS_TELLS] = {"iwheel: gateway",     "iwheel: e-stop",     "iwheel: bus",
-                                                 "iwheel: bus timing",  "iwheel: left wheel", "iwheel: right wheel",
-                                                 "iwheel: assumptions", "iwheel: cmd_vel"};
+    static const char *const names[ROS_TELLS] = {"gateway",    "e-stop",      "bus",         "bus timing",
+                                                 "left wheel", "right wheel", "assumptions", "cmd_vel"};
     out_status->name = names[which];
     out_status->value_count = 0;
     if (facts->link != ROS_LINK_UP && which != ROS_TELLS_GATEWAY && which != ROS_TELLS_COMMANDS) {

@@ -20,7 +20,7 @@ typedef enum {
     ROS_TELLS
 } ros_tells_t;
 
-#define ROS_VALUES_MAX 11U
+#define ROS_VALUES_MAX 12U
 
 typedef struct {
     const char *key; ///< With its unit.
@@ -30,7 +30,7 @@ typedef struct {
 typedef struct {
     ros_level_t level;
     unsigned value_count;
-    const char *name;
+    const char *name; ///< Of the part; the name of the node comes before it.
     ros_value_t values[ROS_VALUES_MAX];
     char message[ROS_SENTENCE_SIZE + 100U];
 } ros_status_t;

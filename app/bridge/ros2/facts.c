@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "facts.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,6 +25,36 @@ bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_mach
     (void)iwc_text(message, "bus.timing", out_machine->timing, sizeof out_machine->timing);
     (void)iwc_text(message, "lease.name", out_machine->holder, sizeof out_machine->holder);
     return true;
+}
+
+ros_estop_t ros_facts_estop(const ros_facts_t *facts) {
+    const char *state = facts->machine.estop;
+    if (state[0] == '\0' || strcmp(state, "none") == 0) {
+        return ROS_ESTOP_NO_LINE;
+    }
+    return (facts->link == ROS_LINK_UP && strcmp(state, "released") == 0) ? ROS_ESTOP_RELEASED : ROS_ESTOP_PRESSED;
+}
+
+void ros_facts_type_name(const char *dds, char *out, size_t size) {
+    size_t used = 0;
+    for (; *dds != '\0' && used + 1U < size; dds++) {
+        if (strncmp(dds, "::dds_", 6) == 0) {
+            dds += 5;
+        } else if (strncmp(dds, "::", 2) == 0) {
+            out[used++] = '/';
+            dds++;
+        } else {
+            const bool is_allowed = isalnum((unsigned char)*dds) || *dds == '_' || *dds == '/';
+            out[used++] = '?';
+            if (is_allowed) {
+                out[used - 1U] = *dds;
+            }
+        }
+    }
+    if (used > 0U && *dds == '\0' && out[used - 1U] == '_') {
+        used--;
+    }
+    out[used] = '\0';
 }
 
 /// Items of the ledger, and where a configuration has their values.

@@ -18,6 +18,20 @@ typedef enum {
     ROS_LINK_UP
 } ros_link_t;
 
+#define ROS_TYPE_SIZE  96U
+#define ROS_TOPIC_SIZE 160U
+
+/// Publishers that send to cmd_vel and are not received, as DDS announces them. All texts are of the characters that ROS allows in names.
+typedef struct {
+    unsigned count;
+    char topic[ROS_TOPIC_SIZE]; ///< The whole name of cmd_vel.
+    char type[ROS_TYPE_SIZE];   ///< Of one of them, as ROS writes it.
+    const char *policy;         ///< Its QoS policy that does not match; empty: its type does not.
+    const char *wanted;         ///< The types that are received.
+    /// Another topic whose name ends with cmd_vel and that has a publisher of Twist or TwistStamped; empty: none.
+    char elsewhere[ROS_TOPIC_SIZE];
+} ros_unmatched_t;
+
 /// Commands since the start.
 typedef struct {
     unsigned publishers;             ///< Of cmd_vel, now.
@@ -30,6 +44,7 @@ typedef struct {
     uint64_t refused;                ///< By the gateway.
     char refusal[ROS_SENTENCE_SIZE]; ///< Why the last one was refused, and the cure; empty since one was accepted.
     bool coming;                     ///< One came within the last second.
+    ros_unmatched_t unmatched;
 } ros_commands_t;
 
 /// Of a snapshot; and of the last stop the sentence.
@@ -66,6 +81,18 @@ typedef struct {
     ros_commands_t commands;
     unsigned odometry_restarts;
 } ros_facts_t;
+
+/// The e-stop as iwheel/emergency_stop publishes it. A line that cannot be read, or whose gateway is gone, counts as pressed.
+typedef enum {
+    ROS_ESTOP_NO_LINE = 0, ///< None is configured, or the gateway was never connected.
+    ROS_ESTOP_RELEASED,
+    ROS_ESTOP_PRESSED
+} ros_estop_t;
+
+ros_estop_t ros_facts_estop(const ros_facts_t *facts);
+
+/// `geometry_msgs/msg/Twist` of `geometry_msgs::msg::dds_::Twist_`, cut to `size`; a character that ROS does not allow becomes `?`.
+void ros_facts_type_name(const char *dds, char *out, size_t size);
 
 /// Takes in a snapshot (event `state`, reply to `status`). False, with `*out_machine` untouched, if it is none.
 bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_machine_t *out_machine);

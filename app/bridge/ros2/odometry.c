@@ -4,8 +4,13 @@
 #include <math.h>
 
 #define CONFIRMED 0.01
-#define ASSUMED   0.05
+#define ASSUMED   0.04
 #define SLIP      0.02
+/// Of a wheel's whole ticks, spread evenly, and of the difference of two wheels.
+#define TICK_SPREAD  0.29
+#define TICKS_SPREAD 0.41
+/// By which the heading drifts on a straight way of 1 m, and by its root on a longer one: the sum of many small slips.
+#define DRIFT_RAD 0.005
 /// Speeds are whole rpm: of a wheel of 192 mm 20 mm/s, spread evenly.
 #define SPEED_STEP_M_S 0.0058
 /// Room for what is read late and for wheels that a hand spins.
@@ -52,17 +57,20 @@ void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, const ros_m
 
 ros_doubt_t ros_odometry_doubt(const ros_odometry_t *self, const ros_measures_t *measures, double v_m_s,
                                double yaw_rad_s) {
-    const double of_way = (measures->radius_confirmed ? CONFIRMED : ASSUMED) + SLIP;
-    const double of_turn = of_way + (measures->track_confirmed ? CONFIRMED : ASSUMED);
-    const double step_rad = measures->tick_m / measures->track_m;
-    const double yaw_rad = step_rad / 2.0 + of_turn * self->turned_rad;
-    // A wrong heading leads aside by as much of the way.
-    const double aside_m = self->path_m * fmin(yaw_rad, 1.0);
-    const double along_m = measures->tick_m / 2.0 + of_way * self->path_m;
+    // Independent of each other: their squares add up.
+    const double of_way = hypot(measures->radius_confirmed ? CONFIRMED : ASSUMED, SLIP);
+    const double of_turn = hypot(of_way, measures->track_confirmed ? CONFIRMED : ASSUMED);
+    const double step_rad = TICKS_SPREAD * measures->tick_m / measures->track_m;
+    const double drift_rad = DRIFT_RAD * sqrt(self->path_m);
+    const double turn_rad = of_turn * self->turned_rad;
+    // A wrong heading leads aside by as much of the way. What drifts on that way was less before; whole ticks average out.
+    const double aside_m = self->path_m * fmin(hypot(turn_rad, drift_rad / sqrt(3.0)), 1.0);
+    const double along_m = of_way * self->path_m;
+    const double place_m = hypot(TICK_SPREAD * measures->tick_m, hypot(along_m, aside_m));
     return (ros_doubt_t){
-        .x_m = along_m + aside_m,
-        .y_m = along_m + aside_m,
-        .yaw_rad = yaw_rad,
+        .x_m = place_m,
+        .y_m = place_m,
+        .yaw_rad = fmin(hypot(hypot(step_rad, drift_rad), turn_rad), M_PI),
         .v_m_s = SPEED_STEP_M_S + of_way * fabs(v_m_s),
         .side_m_s = SPEED_STEP_M_S + SLIP * fabs(v_m_s),
         .yaw_rad_s = SPEED_STEP_M_S * 2.0 / measures->track_m + of_turn * fabs(yaw_rad_s),

@@ -30,6 +30,8 @@ static const char LOOPBACK[] =
 #define HASH_TF          HASH("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
 #define HASH_WRENCH      HASH("8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77")
 #define HASH_BATTERY     HASH("4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741")
+#define HASH_BOOL        HASH("feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9")
+#define HASH_GRAPH       HASH("e725f4a506958c79f95dd693b965722c57b19cd18e7eff984f49561b93dc985d")
 #define HASH_DIAGNOSTICS HASH("5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e")
 
 static const ros_topic_t written[WRITERS] = {
@@ -43,9 +45,11 @@ static const ros_topic_t written[WRITERS] = {
     [WRITES_DIAGNOSTICS] = {"/diagnostics", &diagnostic_msgs_msg_dds__DiagnosticArray__desc, HASH_DIAGNOSTICS, false},
     [WRITES_STATE] = {"iwheel/state", &std_msgs_msg_dds__String__desc, HASH_STRING, true},
     [WRITES_ANSWER] = {"iwheel/answer", &std_msgs_msg_dds__String__desc, HASH_STRING, false},
+    [WRITES_ESTOP] = {"iwheel/emergency_stop", &std_msgs_msg_dds__Bool__desc, HASH_BOOL, true},
 };
-static const ros_topic_t twist = {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc, HASH_TWIST, false};
-static const ros_topic_t twist_stamped = {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false};
+static const ros_topic_t commanded[ROS_COMMAND_READERS] = {
+    {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc, HASH_TWIST, false},
+    {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false}};
 static const ros_topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
 
 dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept) {
@@ -113,11 +117,14 @@ static bool open_topics(ros_t *self) {
             ros_writer(self, topic_of(self, topic), ros_qos(topic->hash, topic->kept ? 1 : 10, true, topic->kept));
         good = good && self->writers[i] > 0;
     }
-    if (self->settings.drive.enabled) {
-        // Best effort matches every publisher, and what was lost never comes later.
-        const ros_topic_t *topic = self->settings.drive.stamped ? &twist_stamped : &twist;
-        self->commands = ros_reader(self, topic_of(self, topic), ros_qos(topic->hash, 1, false, false), take_or_wake);
-        good = good && self->commands > 0;
+    for (unsigned i = 0; i < ROS_COMMAND_READERS && self->settings.drive.enabled; i++) {
+        const ros_topic_t *topic = &commanded[i];
+        if ((self->settings.drive.command & (1U << i)) != 0U) {
+            // Best effort matches every publisher, and what was lost never comes later.
+            self->commands[i] =
+                ros_reader(self, topic_of(self, topic), ros_qos(topic->hash, 1, false, false), take_or_wake);
+            good = good && self->commands[i] > 0;
+        }
     }
     self->asks = ros_reader(self, topic_of(self, &asked), ros_qos(asked.hash, 10, true, false), ros_wake);
     for (unsigned verb = 0; verb < ROS_VERBS; verb++) {
@@ -150,9 +157,9 @@ static bool announce(ros_t *self) {
     uint8_t readers[ENDPOINTS_MAX * sizeof(old_gid_bytes_t)] = {0};
     uint8_t writers[sizeof readers] = {0};
     char space[80];
-    const dds_entity_t inputs[2] = {self->commands, self->asks};
+    const dds_entity_t inputs[ROS_COMMAND_READERS + 1U] = {self->commands[0], self->commands[1], self->asks};
     uint32_t reading = gids_of(self->requests, ROS_VERBS, size, readers);
-    reading += gids_of(inputs, 2, size, readers + reading * size);
+    reading += gids_of(inputs, ROS_COMMAND_READERS + 1U, size, readers + reading * size);
     uint32_t writing = gids_of(self->writers, WRITERS, size, writers);
     writing += gids_of(self->replies, ROS_VERBS, size, writers + writing * size);
     (void)snprintf(space, sizeof space, "/%s", ros_settings_space(&self->settings));
@@ -161,7 +168,7 @@ static bool announce(ros_t *self) {
                                       : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
     type.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
     const dds_entity_t topic = dds_create_topic(self->participant, &type, "ros_discovery_info", NULL, NULL);
-    self->graph = ros_writer(self, topic, ros_qos("", 1, true, true));
+    self->graph = ros_writer(self, topic, ros_qos(old ? "" : HASH_GRAPH, 1, true, true));
 
     // Both kinds of node differ in the size of what the buffers hold only.
     rmw_dds_common_msg_dds__NodeEntitiesInfo_ node = {
@@ -226,6 +233,8 @@ ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, 
         return NULL;
     }
     self->settings = *settings;
+    const char *space = ros_settings_space(settings);
+    (void)snprintf(self->robot, sizeof self->robot, "%s%s%s", space, (space[0] != '\0') ? "/" : "", settings->ros.node);
     self->came = came;
     self->context = context;
     self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -270,27 +279,33 @@ static void copy(const geometry_msgs_msg_dds__Vector3_ *from, double out[3]) {
     out[2] = from->z;
 }
 
-bool ros_take_command(ros_t *self, ros_command_t *out_command) {
+bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command) {
+    const bool is_stamped = reader == 1U;
     void *sample = NULL;
     dds_sample_info_t info;
     bool taken = false;
-    while (self->commands > 0 && dds_take(self->commands, &sample, &info, 1, 1) == 1) {
+    while (self->commands[reader] > 0 && dds_take(self->commands[reader], &sample, &info, 1, 1) == 1) {
         if (info.valid_data) {
             const geometry_msgs_msg_dds__TwistStamped_ *stamped = sample;
-            const geometry_msgs_msg_dds__Twist_ *plain = self->settings.drive.stamped ? &stamped->twist : sample;
+            const geometry_msgs_msg_dds__Twist_ *plain = is_stamped ? &stamped->twist : sample;
             *out_command = (ros_command_t){.source = info.publication_handle, .sent_us = info.source_timestamp / 1000};
-            out_command->stamp_us = self->settings.drive.stamped ? time_of(&stamped->header.stamp) : 0;
+            out_command->stamp_us = is_stamped ? time_of(&stamped->header.stamp) : 0;
             copy(&plain->linear, out_command->linear);
             copy(&plain->angular, out_command->angular);
             taken = true;
         }
-        (void)dds_return_loan(self->commands, &sample, 1);
+        (void)dds_return_loan(self->commands[reader], &sample, 1);
         sample = NULL;
     }
     return taken;
 }
 
 unsigned ros_publishers(const ros_t *self) {
-    const dds_return_t count = (self->commands > 0) ? dds_get_matched_publications(self->commands, NULL, 0) : 0;
-    return (count > 0) ? (unsigned)count : 0U;
+    unsigned sum = 0;
+    for (unsigned i = 0; i < ROS_COMMAND_READERS; i++) {
+        const dds_return_t count =
+            (self->commands[i] > 0) ? dds_get_matched_publications(self->commands[i], NULL, 0) : 0;
+        sum += (count > 0) ? (unsigned)count : 0U;
+    }
+    return sum;
 }

@@ -33,11 +33,17 @@ typedef struct {
     int64_t stamp_us; ///< Of its header; 0: it has none.
 } ros_command_t;
 
-/// The newest command since the last call; false: none.
-bool ros_take_command(ros_t *self, ros_command_t *out_command);
+/// The types of cmd_vel: Twist and TwistStamped, one reader each.
+#define ROS_COMMAND_READERS 2U
 
-/// How many publishers of cmd_vel there are.
+/// The newest command of one reader since the last call; false: none.
+bool ros_take_command(ros_t *self, unsigned reader, ros_command_t *out_command);
+
+/// How many publishers of cmd_vel are received.
 unsigned ros_publishers(const ros_t *self);
+
+/// Finds the publishers of cmd_vel that are not received. The cost grows with the number of writers in the domain.
+void ros_find_unmatched(ros_t *self, ros_unmatched_t *out);
 
 typedef struct {
     ros_verb_t verb;
@@ -57,8 +63,11 @@ void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odo
 void ros_publish_wrench(ros_t *self, const ros_machine_t *machine);
 void ros_publish_battery(ros_t *self, const ros_machine_t *machine);
 
-/// `statuses` has ROS_TELLS entries; `wall_us` is now.
+/// `statuses` has ROS_TELLS entries, whose names get the name of the node before them; `wall_us` is now.
 void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us);
 void ros_publish_state(ros_t *self, const char *json);
+
+/// iwheel/emergency_stop: true if pressed.
+void ros_publish_estop(ros_t *self, bool pressed);
 
 #endif

@@ -102,14 +102,20 @@ static void take_command(bridge_t *self, const ros_command_t *command) {
     pass_on(self, command, &judged);
 }
 
+static void take_commands(bridge_t *self) {
+    ros_command_t command;
+    for (unsigned reader = 0; reader < ROS_COMMAND_READERS; reader++) {
+        if (ros_take_command(self->ros, reader, &command)) {
+            take_command(self, &command);
+        }
+    }
+}
+
 static void take_from_ros(bridge_t *self) {
     ros_request_t request;
-    ros_command_t command;
     ros_woken(self->ros);
     // A command first: it is soonest on the bus so, and a stop that came with it has the last word.
-    if (ros_take_command(self->ros, &command)) {
-        take_command(self, &command);
-    }
+    take_commands(self);
     while (ros_take_request(self->ros, &request)) {
         bridge_take_request(self, &request);
     }
@@ -140,6 +146,18 @@ static void show_stop(bridge_t *self, int64_t now) {
     self->shown = stop;
 }
 
+/// Once a false was published, a line that is gone is one that cannot be read.
+static void show_estop(bridge_t *self) {
+    ros_estop_t estop = ros_facts_estop(&self->facts);
+    if (estop == ROS_ESTOP_NO_LINE && self->estop != ROS_ESTOP_NO_LINE) {
+        estop = ROS_ESTOP_PRESSED;
+    }
+    if (estop != self->estop) {
+        self->estop = estop;
+        ros_publish_estop(self->ros, estop == ROS_ESTOP_PRESSED);
+    }
+}
+
 static void tell(bridge_t *self, int64_t now) {
     char state[sizeof self->state];
     ros_status_t statuses[ROS_TELLS];
@@ -152,6 +170,10 @@ static void tell(bridge_t *self, int64_t now) {
         memcpy(self->state, state, sizeof state);
         ros_publish_state(self->ros, state);
         show_stop(self, now);
+        show_estop(self);
+    }
+    if (now >= self->second_us) {
+        ros_find_unmatched(self->ros, &self->facts.commands.unmatched);
     }
     self->facts.commands.publishers = ros_publishers(self->ros);
     self->facts.commands.coming = self->coming_us > 0 && now - self->coming_us < SECOND_US;
@@ -215,13 +237,12 @@ int bridge_wait_ms(bridge_t *self, int *out_fd) {
 /// In a thread of DDS. With auto_arm a command may have to wait for the gateway, which is the loop's to do.
 static bool take_now(void *context) {
     bridge_t *self = context;
-    ros_command_t command;
     if (pthread_mutex_trylock(&self->lock) != 0) {
         return false;
     }
     const bool can = self->facts.link == ROS_LINK_UP && !self->settings.drive.auto_arm;
-    if (can && ros_take_command(self->ros, &command)) {
-        take_command(self, &command);
+    if (can) {
+        take_commands(self);
     }
     (void)pthread_mutex_unlock(&self->lock);
     return can;

@@ -37,6 +37,7 @@ typedef struct {
     int64_t commanded_us; ///< When the last command was passed on; 0: none since armed.
     int64_t coming_us;    ///< When the last command came, passed or not,
     int64_t moved_us;     ///< and the last one that was not zero; 0: none.
+    ros_estop_t estop;    ///< As iwheel/emergency_stop shows it.
     iwc_value_t shown;    ///< Number of the stop that iwheel/state shows,
     int64_t shown_us;     ///< since then.
     int64_t retry_us;     ///< When to connect again,

@@ -10,6 +10,8 @@
 
 /// The longest name of a DDS topic with its terminator.
 #define ROS_NAME_SIZE 200U
+/// A namespace and a node.
+#define ROS_ROBOT_SIZE 132U
 
 /// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
 typedef struct {
@@ -30,6 +32,7 @@ typedef enum {
     WRITES_DIAGNOSTICS,
     WRITES_STATE,
     WRITES_ANSWER,
+    WRITES_ESTOP,
     WRITERS
 } writer_t;
 
@@ -49,8 +52,8 @@ struct ros {
     ros_settings_t settings;
     dds_entity_t domain; ///< 0: not ours.
     dds_entity_t participant;
-    dds_entity_t writers[WRITERS]; ///< 0: not offered.
-    dds_entity_t commands;         ///< 0: not driving.
+    dds_entity_t writers[WRITERS];              ///< 0: not offered.
+    dds_entity_t commands[ROS_COMMAND_READERS]; ///< 0: not driving, or not this type.
     dds_entity_t asks;
     dds_entity_t requests[ROS_VERBS];
     dds_entity_t replies[ROS_VERBS];
@@ -58,7 +61,8 @@ struct ros {
     dds_entity_t graph;
     int fd; ///< An eventfd: DDS has something for us.
     ros_came_t came;
-    void *context; ///< Of `came`.
+    void *context;              ///< Of `came`.
+    char robot[ROS_ROBOT_SIZE]; ///< Namespace and node, by which /diagnostics tells two machines apart.
     char text[2048];
 };
 

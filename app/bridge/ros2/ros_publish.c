@@ -11,7 +11,6 @@ static char left_wheel[] = "left_wheel_joint";
 static char right_wheel[] = "right_wheel_joint";
 static char left_handle[] = "left_handle";
 static char right_handle[] = "right_handle";
-static char hardware[] = "iwheel";
 static char nothing[] = "";
 
 /// Samples point to what they hold as if it were theirs; nobody writes to it.
@@ -153,17 +152,19 @@ void ros_publish_battery(ros_t *self, const ros_machine_t *machine) {
 void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us) {
     diagnostic_msgs_msg_dds__KeyValue_ values[ROS_TELLS][ROS_VALUES_MAX];
     diagnostic_msgs_msg_dds__DiagnosticStatus_ all[ROS_TELLS];
+    char names[ROS_TELLS][ROS_ROBOT_SIZE + 24U];
     for (size_t i = 0; i < ROS_TELLS; i++) {
         const ros_status_t *status = &statuses[i];
         for (size_t j = 0; j < status->value_count; j++) {
             values[i][j] = (diagnostic_msgs_msg_dds__KeyValue_){.key = writable(status->values[j].key),
                                                                 .value = writable(status->values[j].text)};
         }
+        (void)snprintf(names[i], sizeof names[i], "%s: %s", self->robot, status->name);
         all[i] = (diagnostic_msgs_msg_dds__DiagnosticStatus_){
             .level = (uint8_t)status->level,
-            .name = writable(status->name),
+            .name = names[i],
             .message = writable(status->message),
-            .hardware_id = hardware,
+            .hardware_id = self->robot,
             .values = {._length = status->value_count, ._buffer = values[i]}};
     }
     const diagnostic_msgs_msg_dds__DiagnosticArray_ array = {.header = header(wall_us, nothing),
@@ -174,4 +175,9 @@ void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t 
 void ros_publish_state(ros_t *self, const char *json) {
     const std_msgs_msg_dds__String_ message = {.data = writable(json)};
     (void)dds_write(self->writers[WRITES_STATE], &message);
+}
+
+void ros_publish_estop(ros_t *self, bool pressed) {
+    const std_msgs_msg_dds__Bool_ message = {.data = pressed};
+    (void)dds_write(self->writers[WRITES_ESTOP], &message);
 }

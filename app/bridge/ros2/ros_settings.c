@@ -14,7 +14,8 @@
 static const settings_word_t networks[] = {{"default", 0}, {"loopback", 1}, {NULL, 0}};
 static const settings_word_t clocks[] = {{"unknown", 0}, {"synchronised", 1}, {NULL, 0}};
 static const settings_word_t releases[] = {{"jazzy", 0}, {"humble", 1}, {NULL, 0}};
-static const settings_word_t twists[] = {{"twist", 0}, {"twist_stamped", 1}, {NULL, 0}};
+static const settings_word_t twists[] = {
+    {"both", ROS_COMMAND_BOTH}, {"twist", ROS_COMMAND_TWIST}, {"twist_stamped", ROS_COMMAND_STAMPED}, {NULL, 0}};
 
 /// As ROS wants names: letters, digits, _ and between names /, not beginning with a digit.
 static const char *wrong_name(const char *text) {
@@ -38,7 +39,7 @@ static const settings_key_t keys[] = {
     {"ros", "namespace", "", TEXT(ros.ns, wrong_name)},
     {"ros", "node", "", TEXT(ros.node, wrong_name)},
     {"drive", "enabled", "", WORD(drive.enabled, settings_no_yes)},
-    {"drive", "command", "", WORD(drive.stamped, twists)},
+    {"drive", "command", "", WORD(drive.command, twists)},
     {"drive", "timeout_ms", " ms", NUMBER(drive.timeout_ms, 50, 500)},
     {"drive", "auto_arm", "", WORD(drive.auto_arm, settings_no_yes)},
     {"drive", "allow_reset", "", WORD(drive.allow_reset, settings_no_yes)},
@@ -50,7 +51,7 @@ static const settings_key_t keys[] = {
 const ros_settings_t ros_settings_standard = {
     .gateway = {"/run/iwheel/gateway.sock"},
     .ros = {.loopback = true, .ns = "none", .node = "iwheel"},
-    .drive = {.enabled = true, .timeout_ms = 500},
+    .drive = {.enabled = true, .command = ROS_COMMAND_BOTH, .timeout_ms = 500},
     .odometry = {.rate_hz = 50, .odom_frame = "odom", .base_frame = "base_link"},
 };
 

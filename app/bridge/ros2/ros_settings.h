@@ -8,6 +8,9 @@
 /// Read when no `-c FILE` is given. Its absence is no error then.
 #define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"
 
+/// Types of cmd_vel. ROS 2 programs send one or the other: Jazzy's controllers TwistStamped, most others Twist.
+typedef enum { ROS_COMMAND_TWIST = 1, ROS_COMMAND_STAMPED = 2, ROS_COMMAND_BOTH = 3 } ros_command_types_t;
+
 typedef struct {
     struct {
         char socket[108];
@@ -22,7 +25,7 @@ typedef struct {
     } ros;
     struct {
         bool enabled;
-        bool stamped; ///< cmd_vel is TwistStamped.
+        uint8_t command; ///< Bits of the types that cmd_vel accepts: `ros_command_types_t`.
         uint32_t timeout_ms;
         bool auto_arm;
         bool allow_reset;

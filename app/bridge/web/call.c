@@ -149,7 +149,7 @@ static enum MHD_Result send_metrics(web_call_t *self) {
     FILE *out = open_memstream(&text, &length);
     if (out != NULL) {
         const bool known = web_link_state(&self->server->link, self->server->now_us, &state);
-        web_metrics_write(known ? &state : NULL, &own, out);
+        web_metrics_write(known ? &state : NULL, &own, &self->server->link.tally, out);
     }
     return send_stream_text(self, out, &text, &length);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "metrics.h"
 
+#include "iwheel_northbound/words.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -178,12 +180,37 @@ static void write_state(const iwc_message_t *state, FILE *out) {
     write_gaps(state, out);
 }
 
-void web_metrics_write(const iwc_message_t *state, const web_own_t *own, FILE *out) {
+/// Every cause from the start, so that the first stop is an increase.
+static void write_stops(const web_tally_t *stops, FILE *out) {
+    static const char name[] = "iwheel_stops";
+    write_head(out, name, "counter",
+               "Stops by cause since the start of iwheel-web; unknown: it was not connected then");
+    for (unsigned cause = IW_CAUSE_NONE; cause < IW_CAUSES; cause++) {
+        (void)fprintf(out, "%s_total{cause=\"%s\"} %" PRIu64 "\n", name,
+                      (cause == IW_CAUSE_NONE) ? "unknown" : iwn_cause_name((iw_cause_t)cause), stops->by_cause[cause]);
+    }
+    write_head(out, "iwheel_last_stop_number", "gauge",
+               "Of the last stop, as the gateway counts; 0: none since its start");
+    if (stops->begun) {
+        (void)fprintf(out, "iwheel_last_stop_number %" PRId64 "\n", stops->number);
+    }
+    write_head(out, "iwheel_last_stop_timestamp_seconds", "gauge", "When the last stop was seen");
+    if (stops->wall_us > 0) {
+        (void)fputs("iwheel_last_stop_timestamp_seconds", out);
+        write_value(out, stops->wall_us, 6);
+    }
+}
+
+void web_metrics_write(const iwc_message_t *state, const web_own_t *own, const web_tally_t *stops, FILE *out) {
+    write_head(out, "iwheel_build_info", "gauge", "1, with the version of iwheel-web");
+    (void)fprintf(out, "iwheel_build_info{version=\"%s\"} 1\n", IWHEEL_VERSION);
+
     write_head(out, "iwheel_up", "gauge", "1: the gateway tells its state");
     (void)fprintf(out, "iwheel_up %d\n", (state != NULL) ? 1 : 0);
     if (state != NULL) {
         write_state(state, out);
     }
+    write_stops(stops, out);
     write_own(own, out);
     (void)fputs("# EOF\n", out);
 }

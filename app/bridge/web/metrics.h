@@ -3,7 +3,7 @@
 #ifndef WEB_METRICS_H
 #define WEB_METRICS_H
 
-#include "iwheel_client/client.h"
+#include "tally.h"
 
 #include <stdio.h>
 
@@ -16,6 +16,6 @@ typedef struct {
 } web_own_t;
 
 /// `state`: the event `state`; NULL: the gateway is not there, and only that and the bridge's own figures are told.
-void web_metrics_write(const iwc_message_t *state, const web_own_t *own, FILE *out);
+void web_metrics_write(const iwc_message_t *state, const web_own_t *own, const web_tally_t *stops, FILE *out);
 
 #endif

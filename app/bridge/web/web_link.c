@@ -42,7 +42,9 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
 
 static void take_why(void *context, const iwc_message_t *reply) {
     if (reply != NULL) {
-        keep_stop(context, reply);
+        web_link_t *self = context;
+        web_tally_take(&self->tally, reply, false);
+        keep_stop(self, reply);
     }
 }
 
@@ -67,6 +69,7 @@ static void take_event(void *context, const iwc_message_t *message, uint64_t now
     }
     if (strcmp(name, "stop") == 0) {
         bridge_lease_end(&self->lease, now_us);
+        web_tally_take(&self->tally, message, true);
         keep_stop(self, message); // Another one may come before its frames do.
         (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = now_us + WHY_US;

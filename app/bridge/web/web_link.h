@@ -6,6 +6,7 @@
 #include "common/bridge_link.h"
 #include "common/lease.h"
 #include "feed.h"
+#include "tally.h"
 
 #define WEB_STOPS_KEPT 16U
 
@@ -19,6 +20,7 @@ typedef struct {
     size_t state_length;
     char *stops[WEB_STOPS_KEPT]; ///< Replies to `why`, the newest first.
     web_feed_t feed;
+    web_tally_t tally;
 } web_link_t;
 
 /// False: no memory. It must not be moved afterwards.

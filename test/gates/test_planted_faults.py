@@ -1,32 +1,28 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass.
-
-usage: planted_faults.py [GATE...]      only the cases of these gates: the names of the functions below
-
-Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
-"""
+"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass. -k GATE: one gate's cases."""
 
 import argparse
 import collections
-import atexit
 import contextlib
-import functools
 import hashlib
 import importlib.machinery
 import importlib.util
 import io
 import json
+import os
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 
+import pytest
+
+pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
 ROOT = Path(__file__).resolve().parent.parent.parent
 SCRIPTS = ROOT / "scripts"
+os.environ["PATH"] = f"{ROOT}/.venv/bin:{os.environ['PATH']}"
 ARM = [
     "arm-none-eabi-gcc",
     "-mcpu=cortex-m4",
@@ -290,6 +286,14 @@ def arch(folder, fault):
     return run(SCRIPTS / "house.py", "layers", folder)
 
 
+def arch_of_names(folder, more):
+    """The same with one file more."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    (folder / more).write_text("// SPDX-License-Identifier: MIT\n")
+    return run(SCRIPTS / "house.py", "layers", folder)
+
+
 def faults(folder, fault):
     """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
     for part in ("core", "port", "lib", "app", "python", "test/faults"):
@@ -362,16 +366,8 @@ def python_pins(folder, fault):
     return run(ROOT / ".venv/bin/python", SCRIPTS / "house.py", "pins", folder)
 
 
-@functools.cache
-def an_environment():
-    folder = tempfile.mkdtemp()
-    atexit.register(shutil.rmtree, folder)
-    run(sys.executable, "-m", "venv", folder)
-    return Path(folder)
-
-
 def python_wheels(folder, lines):
-    """Two wheels, pinned; what is brought into an environment of its own is what has its checksum, and nothing else."""
+    """Two wheels, pinned; what is brought into an environment is what has its checksum, and nothing else."""
     sums = {}
     for name in ("one", "two"):
         with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as wheel:
@@ -381,12 +377,8 @@ def python_wheels(folder, lines):
             wheel.writestr(f"{name}-1.dist-info/RECORD", "")
         sums[name] = hashlib.sha256((folder / f"{name}-1-py3-none-any.whl").read_bytes()).hexdigest()
     (folder / "list.txt").write_text(lines.format(**sums, other="0" * 64))
-    venv = an_environment()
-    for path in venv.glob("lib/python*/site-packages/*"):
-        if path.name.startswith(("one", "two")):
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", SCRIPTS / "python_packages", venv, folder / "list.txt")
-    there = sorted(path.stem for path in venv.glob("lib/python*/site-packages/*.py") if path.stem in sums)
+    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", SCRIPTS / "python_packages", folder / "venv", folder / "list.txt")
+    there = sorted(path.stem for path in folder.glob("venv/lib/python*/site-packages/*.py") if path.stem in sums)
     if there != ([] if status else ["one", "two"]):
         raise RuntimeError(f"installed: {there}\n{said}")
     return status, said
@@ -457,6 +449,15 @@ def function(body, parameters="int a"):
 def nested(depth):
     """As many conditions inside each other: cognitive complexity 1 + 2 + ... + depth."""
     return "".join(f"    if (a > {n}) {{\n" for n in range(depth)) + "    a++;\n" + "    }\n" * depth + "    return a;\n"
+
+
+def null(folder, device):
+    """A test of ./check in a copy of the mounts where that is /dev/null."""
+    (folder / "file").touch()
+    mounts = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount --bind "$0" /dev/null && exec "$@"', folder / device]
+    if run(*mounts, "true")[0] != 0:
+        return 77, "nothing can be mounted here"
+    return run(*mounts, ROOT / "test/all/start", "idle", "lint", "planted", "", "true", cwd=folder)
 
 
 def junit(status, output):
@@ -723,6 +724,9 @@ CASES = [
     ),
     (arch, "python3", "a permission that nobody needs", ("docs/developer/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
     (arch, "python3", "a library that is not in the table", ("docs/developer/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch_of_names, "python3", "clean", "app/ctl/text/a_name_of_its_own.c", False),
+    (arch_of_names, "python3", "a source of a program with the name of another's", "app/ctl/text/host.c", True),
+    (arch_of_names, "python3", "a header of a library with the name of the port's", "lib/config/frame_ring.h", True),
     (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
     (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
     (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
@@ -775,41 +779,17 @@ CASES = [
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
     (counting, "python3", "a crash before the sum", junit("fail", "test.c:1:test_a:PASS"), True),
+    (null, "unshare", "clean", "/dev/null", False),
+    (null, "unshare", "a file in the place of /dev/null", "file", True),
     (counting, "python3", "a crash after the sum", junit("fail", "3 Tests 0 Failures 0 Ignored"), True),
 ]
 
 
-def has(tool):
-    if tool == "lizard":
-        return importlib.util.find_spec("lizard") is not None
-    return shutil.which(tool) is not None
-
-
-def main(gates):
-    unknown = set(gates) - {gate.__name__ for gate, *_ in CASES}
-    if unknown:
-        sys.exit(f"there is no gate {', '.join(sorted(unknown))}")
-    passed = failed = skipped = 0
-    for gate, tool, name, argument, must_catch in CASES:
-        if gates and gate.__name__ not in gates:
-            continue
-        if not has(tool):
-            skipped += 1
-            print(f"skip: {gate.__name__}: {name}: {tool} is missing")
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            status, said = gate(Path(folder), argument)
-        if status == 77:
-            skipped += 1
-            print(f"skip: {gate.__name__}: {name}: {said.strip().removeprefix('skip: ')}")
-        elif (status != 0) == must_catch and "Traceback" not in said:
-            passed += 1
-        else:
-            failed += 1
-            print(f"failed: {gate.__name__}: {name}: {'not caught' if must_catch else 'caught although clean'}\n{said}")
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+@pytest.mark.parametrize(("gate", "tool", "name", "argument", "must_catch"), CASES, ids=[f"{case[0].__name__}: {case[2]}" for case in CASES])
+def test_gate(tmp_path, gate, tool, name, argument, must_catch):
+    if not (importlib.util.find_spec(tool) if tool == "lizard" else shutil.which(tool)):
+        pytest.skip(f"{tool} is missing")
+    status, said = gate(tmp_path, argument)
+    if status == 77:
+        pytest.skip(said.strip().removeprefix("skip: "))
+    assert "Traceback" not in said and (status != 0) == must_catch, f"{'not caught' if must_catch else 'caught although clean'}\n{said}"
