@@ -292,14 +292,13 @@ def judge_index(folder, deep=()):
 
 PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
 LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
-PLANTS = "test/gates/planted_faults.py"  # Names pages that must not exist.
 
 
 def judge_names():
     """Pages that a file names from the root, and links of Markdown relative to their page, that do not exist."""
     wrong, count = [], 0
     for file in files("."):
-        text = (ROOT / file).read_text(errors="replace") if file != PLANTS else ""
+        text = (ROOT / file).read_text(errors="replace")
         named = [(found, ROOT / found[0]) for found in PAGE_NAMED.finditer(text)]
         if file.endswith(".md"):
             named += [(found, (ROOT / file).parent / found[1]) for found in LINK.finditer(text)]
