@@ -36,11 +36,11 @@ LISTED = {
     "service.tests": ("tests of the service", "-m pytest --collect-only -q test/service"),
 }
 COUNTED = {
-    "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^ *RUN_TEST\("),
+    "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^TEST\(|^ *RUN_TEST\("),
     "ctl.tests": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"),
     "unit.client": ("tests of the C client's example", "test/client/test_*.py", r"^    def test_"),
     "faults.table": ("seeded faults", "test/faults/*.faults", r"^@@ .* \| "),
-    "target.driver": ("tests of the STM32 driver", "test/target/*.c", r"^ *RUN_TEST\("),
+    "unit.driver": ("tests of the STM32 driver", "test/target/*.c", r"^TEST\(|^ *RUN_TEST\("),
     "kernel.verdicts": ("tests of the kernel's runner", "test/kernel/test_*.py", r"^    def test_"),
     "fuzz.targets": ("fuzz targets", "test/fuzz/fuzz_*.c", r"^int LLVMFuzzerTestOneInput"),
     "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"),

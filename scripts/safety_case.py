@@ -42,7 +42,7 @@ def defined_tests():
     """Every test's name, in C and in Python."""
     names = set()
     for path in (ROOT / "test").rglob("*.c"):
-        names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
+        names.update(re.findall(r"^(?:static void |TEST\()(test_\w+)(?:\(void)?\) \{", path.read_text(), re.M))
     for path in [*(ROOT / "test").rglob("*.py"), *(ROOT / "test").glob("*/run")]:
         names.update(re.findall(r"^ *def (\w+)\(|^(\w+)\(\) \{$", path.read_text(), re.M))
     return {name for found in names for name in ([found] if isinstance(found, str) else found)}

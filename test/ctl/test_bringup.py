@@ -705,6 +705,44 @@ class Bringup(unittest.TestCase):
             self.assertIn("\n;track_mm = ?", file.read())
         self.assertFalse([frame for frame in self.rig.bus.frames[-200:] if frame.id in (266, 298)], "nothing was sent")
 
+    def freeze(self, process_number, seconds):
+        os.kill(process_number, signal.SIGSTOP)
+        time.sleep(seconds)
+        os.kill(process_number, signal.SIGCONT)
+
+    def test_track_is_concluded_though_the_computer_stalls(self):
+        operator = self.begin()
+        self.drive_through(operator)
+        operator.answer("Distance in m", "")
+        for gateway in (False, True):  # The wheels count on, and nothing of it is lost.
+            self.begin_to_turn(operator)
+            self.freeze(children(operator.process.pid)["iwheel-gateway"] if gateway else operator.process.pid, 0.8)
+            self.wait_until_stands()
+            operator.type("\n")
+            self.assertRegex(operator.expect("None was configured"), r"in 3\s+turns: the\s+track\s+is 5[34]\d\s+mm")
+            operator.answer("Take that?", "n")
+        self.begin_to_turn(operator)
+        self.rig.sim.ask("mute left")
+        time.sleep(1.5)
+        self.rig.sim.ask("unmute left")
+        self.wait_until_stands()
+        operator.type("\n")
+        operator.expect("The wheels were not heard all the time")
+        self.begin_to_turn(operator)
+        self.freeze(operator.process.pid, 2.5)
+        self.wait_until_stands()
+        operator.type("\n")
+        operator.expect("too busy to follow the wheels")
+        operator.answer("How many full turns", "q")
+        self.assertEqual(1, operator.wait())
+
+    def begin_to_turn(self, operator):
+        operator.answer("How many full turns", "3")
+        operator.answer("Point it at the mark", "")
+        operator.expect("press Enter ...")
+        self.rig.sim.ask("turn 3")
+        time.sleep(0.5)
+
     # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------
 
     def ends_soon(self, operator, within_s=6):

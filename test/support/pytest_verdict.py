@@ -6,7 +6,7 @@ Each attempt is a process of its own, so that a test that crashes or hangs is on
 `together(name)`. Other plugins, as --junitxml, hear of the last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
 
     --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
-    --virtual      in virtual time: pytest_virtual.py
+    --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, chosen by the hash of the commit
     --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
 
 A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
@@ -16,6 +16,7 @@ What passing tests print, -rP shows.
 
 import contextlib
 import functools
+import hashlib
 import io
 import json
 import multiprocessing
@@ -23,6 +24,7 @@ import os
 import queue
 import shutil
 import signal
+import subprocess
 import tempfile
 import threading
 import traceback
@@ -52,6 +54,7 @@ def pytest_addoption(parser):
     group = parser.getgroup("verdicts")
     group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
     group.addoption("--jobs", type=int, default=2, metavar="N", help="tests at a time (default: 2)")
+    group.addoption("--sample", type=int, metavar="N", help="only N of the tests, others after each commit")
     group.addoption("--virtual", action="store_true", help="run them in virtual time, in the kernel of test/kernel")
     group.addoption("--inside", metavar="PLAN", help="of guest_pytest.py: this is inside that kernel")
     group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
@@ -73,6 +76,20 @@ def pytest_collection_modifyitems(config, items):
         long = [item for item in items if item.get_closest_marker("full")]
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+    if config.option.sample:
+        left_out = sample(items, commit(config.rootpath))[config.option.sample :]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def commit(folder):
+    """What is checked out; of a tree without git nothing, which is a sample too."""
+    return subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def sample(items, key):
+    """In an order that the key alone decides: nobody chooses, and the same commit has the same sample."""
+    return sorted(items, key=lambda item: hashlib.sha256(f"{key} {item.nodeid}".encode()).digest())
 
 
 # ---- in the process of an attempt ------------------------------------------------------------------------------------
@@ -110,7 +127,8 @@ def pytest_runtest_makereport(item, call):
     report = yield
     report.failures, report.claims = [], []
     if report.when == "call":
-        report.sections += [("its programs said", one.said()) for one in (item.funcargs or {}).values() if report.failed and hasattr(one, "said")]
+        rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type, which has said nothing.
+        report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)
@@ -238,7 +256,8 @@ def units_of(items):
     """{name: the tests that are one attempt}"""
     units = {}
     for item in items:
-        shared, mark = item.cls and "setUpClass" in vars(item.cls), item.get_closest_marker("together")
+        shared = item.cls and "setUpClass" in vars(item.cls)
+        mark = item.get_closest_marker("together")
         name = f"{item.path.name}: {mark.args[0]}" if mark else item.parent.nodeid if shared else item.nodeid
         units.setdefault(name, []).append(item)
     return units
@@ -302,7 +321,9 @@ class Run(verdict.Session):
                     report.outcome, report.longrepr = "skipped", (*report.location[:2], attempt.skip)
                 if report.skipped:
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
-                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
+                more = [f"attempt {tries}, alone"] if tries > 1 else []
+                more += [f"longest stall {self.stall_ms(attempt):.0f} ms"] if report.failed else []
+                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)

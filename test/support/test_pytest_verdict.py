@@ -36,6 +36,7 @@ FAULTS = (
     ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
     ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
     ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("a fixture that is a type hides the failure", "if not isinstance(one, type)]", "]", "test_fixture_that_is_a_type_hides_no_failure"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
     ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
     (
@@ -103,6 +104,7 @@ FAULTS = (
         "pass",
         "test_what_needs_real_time_is_left_out_of_virtual_time",
     ),
+    ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
 LATE = "[(verdict.now_us(), 500_000)]"
@@ -259,6 +261,22 @@ class Conclusive(Made):
                 assert False
             """)
         self.assertIn("Segmentation fault", said)
+
+    def test_fixture_that_is_a_type_hides_no_failure(self):
+        said = self.final("""
+            class Rig:
+                def said(self):
+                    return "nothing"
+
+            @pytest.fixture
+            def rig_type():
+                return Rig
+
+            def test_one(rig_type):
+                note("tried")
+                assert False, "Segmentation fault, the reason"
+            """)
+        self.assertIn("the reason", said)
 
     def test_crash_is_final(self):
         for crash in ("os.abort()", "os._exit(0)", "os.kill(os.getpid(), 9)"):
@@ -535,6 +553,14 @@ class Chosen(Made):
         ran = self.run_made(self.TWO, "--collect-only", "-q", "-q")
         self.assertEqual(["test_it.py::test_long", "test_it.py::test_short"], [line for line in ran.lines if "::" in line])
         self.assertFalse(re.search(r"\d+ passed", "\n".join(ran.lines)))
+
+    def test_sample_is_of_the_commit(self):
+        many = 'import pytest\n@pytest.mark.parametrize("number", range(40))\ndef test_it(number):\n    pass\n'
+        git = "import pytest_verdict\npytest_verdict.commit = lambda _: {!r}\n".format
+        first, again, other = (self.run_made(many, "--sample", "4", conftest=git(key)) for key in ("abc", "abc", "def"))
+        self.assertEqual("4 passed, 0 failed, 0 skipped", first.last, first.lines)
+        self.assertEqual(first.cases, again.cases)
+        self.assertNotEqual(first.cases, other.cases)
 
     def test_nothing_that_ran_is_no_success(self):
         for tests, options, last in (

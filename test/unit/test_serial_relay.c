@@ -491,8 +491,6 @@ static void test_stop_never_refused_by_a_relay_without_a_place(void) {
     TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // It has asked nothing.
 }
 
-// ---- why no board answers -----------------------------------------------------------------------------------------
-
 static char complaints[4096]; // The log.
 
 /// Runs it and keeps what it logs.

@@ -2,7 +2,7 @@
 // The reason why no board answers: which one, how soon it follows a change, and how often the log gets it.
 #include "serial_trouble.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -23,8 +23,6 @@ void setUp(void) {
     serial_trouble_begin(&trouble, now_us);
 }
 
-void tearDown(void) {}
-
 /// A window with this noise.
 static serial_report_t window(const serial_noise_t *noise) {
     TEST_ASSERT_EQUAL_UINT64(now_us + WINDOW, trouble.judge_us);
@@ -40,7 +38,7 @@ static void explains(const serial_noise_t *noise, const char *words) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(out, words), out);
 }
 
-static void test_trouble_reason_follows_from_the_noise(void) {
+TEST(test_trouble_reason_follows_from_the_noise) {
     explains(&nothing, "nothing comes from /dev/x: ");
     explains(&binary, "80 bytes came from /dev/x that are no text: the baud rate is another than 115200");
     explains(&text, "another protocol is spoken on /dev/x (such as \"login:\")");
@@ -51,7 +49,7 @@ static void test_trouble_reason_follows_from_the_noise(void) {
     explains(&(serial_noise_t){.bytes = 9}, "9 bytes came from /dev/x and no whole line");
 }
 
-static void test_trouble_of_another_kind_is_logged_after_its_window(void) {
+TEST(test_trouble_of_another_kind_is_logged_after_its_window) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing));
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&binary));
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
@@ -59,7 +57,7 @@ static void test_trouble_of_another_kind_is_logged_after_its_window(void) {
     TEST_ASSERT_EQUAL_INT(SERIAL_TROUBLE_BAUD, trouble.kind);
 }
 
-static void test_trouble_of_the_same_kind_is_logged_seldom(void) {
+TEST(test_trouble_of_the_same_kind_is_logged_seldom) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     for (unsigned i = 1; i < SERIAL_TROUBLE_AGAIN_US / WINDOW; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_CLIENTS, window(&text));
@@ -67,14 +65,14 @@ static void test_trouble_of_the_same_kind_is_logged_seldom(void) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
 }
 
-static void test_trouble_without_bytes_is_logged_once(void) {
+TEST(test_trouble_without_bytes_is_logged_once) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing));
     for (unsigned i = 0; i < 2U * SERIAL_TROUBLE_AGAIN_US / WINDOW; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_CLIENTS, window(&nothing));
     }
 }
 
-static void test_trouble_of_a_device_that_pauses_is_kept(void) {
+TEST(test_trouble_of_a_device_that_pauses_is_kept) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     for (unsigned i = 1; i < SERIAL_TROUBLE_PAUSE_US / WINDOW; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_KEEP, window(&nothing));
@@ -85,7 +83,7 @@ static void test_trouble_of_a_device_that_pauses_is_kept(void) {
 }
 
 /// Clients get each change; the log a burst of them, and then one for each refill.
-static void test_trouble_that_changes_all_the_time_does_not_flood_the_log(void) {
+TEST(test_trouble_that_changes_all_the_time_does_not_flood_the_log) {
     unsigned logged = 0;
     for (unsigned i = 0; i < HOUR / WINDOW; i++) {
         const serial_report_t report = window((i % 2U == 0U) ? &text : &binary);
@@ -104,7 +102,7 @@ static void test_trouble_that_changes_all_the_time_does_not_flood_the_log(void) 
 }
 
 /// A change that found the burst used up is logged later, if it still holds.
-static void test_trouble_that_was_held_back_is_logged_later(void) {
+TEST(test_trouble_that_was_held_back_is_logged_later) {
     for (unsigned i = 0; i < SERIAL_TROUBLE_BURST; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window((i % 2U == 0U) ? &text : &binary));
     }
@@ -115,23 +113,10 @@ static void test_trouble_that_was_held_back_is_logged_later(void) {
     TEST_ASSERT_TRUE(now_us > begin_us + WINDOW);
 }
 
-static void test_trouble_begins_anew_with_each_opening(void) {
+TEST(test_trouble_begins_anew_with_each_opening) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     serial_trouble_begin(&trouble, now_us);
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing)); // No pause: it is another opening.
     serial_trouble_begin(&trouble, now_us);
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_trouble_reason_follows_from_the_noise);
-    RUN_TEST(test_trouble_of_another_kind_is_logged_after_its_window);
-    RUN_TEST(test_trouble_of_the_same_kind_is_logged_seldom);
-    RUN_TEST(test_trouble_without_bytes_is_logged_once);
-    RUN_TEST(test_trouble_of_a_device_that_pauses_is_kept);
-    RUN_TEST(test_trouble_that_changes_all_the_time_does_not_flood_the_log);
-    RUN_TEST(test_trouble_that_was_held_back_is_logged_later);
-    RUN_TEST(test_trouble_begins_anew_with_each_opening);
-    return UNITY_END();
 }

@@ -30,7 +30,7 @@ def take_pictures(build, folder):
                     for speed in (300, 150, 350, 250):
                         driver.speed = speed
                         time.sleep(2)
-                    page.evaluate("goLive(); for (const plot of allPlots()) plot.move(0.35, 0.2)")
+                    page.evaluate("goLive(); moveView(0.35, 0.2)")
                     time.sleep(0.5)
                     page.screenshot(path=folder / f"web-{size}-{scheme}.png")
                 driver.end()

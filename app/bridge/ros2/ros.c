@@ -226,6 +226,20 @@ static bool join(ros_t *self, FILE *err) {
     return true;
 }
 
+/// Namespace and node, and the frames of the handles: with the prefix of the base's frame, as in w1/base_link.
+static void name_robot(ros_t *self) {
+    static const char *const handles[2] = {"left_handle", "right_handle"};
+    const char *space = ros_settings_space(&self->settings);
+    const char *base = self->settings.odometry.base_frame;
+    const char *slash = strrchr(base, '/');
+    const int prefix = (slash != NULL) ? (int)(slash - base) + 1 : 0;
+    (void)snprintf(self->robot, sizeof self->robot, "%s%s%s", space, (space[0] != '\0') ? "/" : "",
+                   self->settings.ros.node);
+    for (size_t i = 0; i < 2U; i++) {
+        (void)snprintf(self->handles[i], sizeof self->handles[i], "%.*s%s", prefix, base, handles[i]);
+    }
+}
+
 ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, FILE *err) {
     ros_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
@@ -233,8 +247,7 @@ ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, 
         return NULL;
     }
     self->settings = *settings;
-    const char *space = ros_settings_space(settings);
-    (void)snprintf(self->robot, sizeof self->robot, "%s%s%s", space, (space[0] != '\0') ? "/" : "", settings->ros.node);
+    name_robot(self);
     self->came = came;
     self->context = context;
     self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);

@@ -12,6 +12,8 @@
 #define ROS_NAME_SIZE 200U
 /// A namespace and a node.
 #define ROS_ROBOT_SIZE 132U
+/// The prefix of a frame and the name of a handle.
+#define ROS_FRAME_SIZE 80U
 
 /// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
 typedef struct {
@@ -61,8 +63,9 @@ struct ros {
     dds_entity_t graph;
     int fd; ///< An eventfd: DDS has something for us.
     ros_came_t came;
-    void *context;              ///< Of `came`.
-    char robot[ROS_ROBOT_SIZE]; ///< Namespace and node, by which /diagnostics tells two machines apart.
+    void *context;                   ///< Of `came`.
+    char robot[ROS_ROBOT_SIZE];      ///< Namespace and node, by which /diagnostics tells two machines apart.
+    char handles[2][ROS_FRAME_SIZE]; ///< Frames of the forces, left and right.
     char text[2048];
 };
 

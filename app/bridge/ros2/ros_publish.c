@@ -9,8 +9,6 @@
 // Not const, because samples want it so.
 static char left_wheel[] = "left_wheel_joint";
 static char right_wheel[] = "right_wheel_joint";
-static char left_handle[] = "left_handle";
-static char right_handle[] = "right_handle";
 static char nothing[] = "";
 
 /// Samples point to what they hold as if it were theirs; nobody writes to it.
@@ -115,13 +113,12 @@ void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odo
 /// acts on the handle. RViz drops a message in which any part is NaN. Without a known force there is no message.
 void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
     const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
-    char *frames[2] = {left_handle, right_handle};
     for (unsigned i = 0; i < 2U; i++) {
         if (!wheels[i]->force_net_mN.known) {
             continue;
         }
         const geometry_msgs_msg_dds__WrenchStamped_ wrench = {
-            .header = header(machine->wall_us, frames[i]),
+            .header = header(machine->wall_us, self->handles[i]),
             .wrench = {.force = {.x = in_thousands(wheels[i]->force_net_mN)}}};
         (void)dds_write(self->writers[WRITES_LEFT_WRENCH + i], &wrench);
     }

@@ -86,11 +86,27 @@ static void say_lost(wording_t *self) {
     iwn_text_add(&self->text, "check its power, cable and termination");
 }
 
+/// Both measured within `rest_rpm` and told zero, but not for long enough: figures of zero would contradict the sentence.
+static bool stands_too_short(const iw_snapshot_t *seen) {
+    const int32_t rest_rpm = (int32_t)seen->config->rest_rpm;
+    bool is_still = true;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const int32_t rpm = seen->wheel[side].told->speed.speed_rpm;
+        is_still = is_still && seen->wheel[side].heard && rpm <= rest_rpm && rpm >= -rest_rpm &&
+                   seen->applied.wheel[side].speed_mm_s == 0;
+    }
+    return is_still;
+}
+
 static void say_not_at_rest(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
     // Nothing is held yet, so that there is nothing to release: the wheels may stand all the same.
     if (self->request->cmd == IWN_CMD_RELEASE && seen->holder != IW_CLIENT_NONE) {
         say_holder(self);
+        return;
+    }
+    if (stands_too_short(seen)) {
+        number(self, "the wheels are not at standstill for ", seen->config->rest_ms, " ms yet; wait, then try again");
         return;
     }
     number(self, "the wheels turn or are told to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm, " rpm, told ");

@@ -1,21 +1,16 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The table of pins in docs/user/stm32.md, and the addresses and names of its commands that flash, are those of the boards.
-
-usage: board_page.py
 
 The pins are asked of the compiler (boards/BOARD/board.h, board_pins.h), the address of memory.ld. A row that is not true is printed as it must be.
 """
 
 import re
-import shutil
 import subprocess
-import sys
 import tempfile
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-STM32 = ROOT / "port/stm32_stub"
+import pytest
+from images import ROOT, STM32
+
 PAGE = ROOT / "docs/user/stm32.md"
 PRESETS = {"stm32f103": "arm-m3", "stm32f407": "arm", "stm32f446": "arm"}
 PINS = {
@@ -67,15 +62,7 @@ def commands():
         yield from (f"{image}.bin {address}\n", f"program {image}.elf verify", f"--download {image}.hex ", f"cmake --preset {preset}")
 
 
-def main():
-    if shutil.which("gcc") is None:
-        print("skip: gcc is missing")
-        return 77
+@pytest.mark.exact
+def test_page_tells_the_boards_pins_and_files():
     page = PAGE.read_text()
-    missing = [text for text in (*rows(), *commands()) if text not in page]
-    print(*(f"failed: docs/user/stm32.md lacks: {text.rstrip()}" for text in missing), sep="\n")
-    return 1 if missing else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    assert [text for text in (*rows(), *commands()) if text not in page] == []
