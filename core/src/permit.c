@@ -160,9 +160,7 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
 /// controller. More of them show a second master that drives, and the hold ends (fault 25).
 static void count_stranger(iw_permit_t *self) {
     self->strangers++;
-    if (self->strangers > LEFT_BEHIND_MAX) {
-        self->phase = IW_PHASE_LISTENING;
-    }
+    self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
 /// Handles a cause that neither latches nor stops a holder: it ends arming.
