@@ -9,8 +9,8 @@
 
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
-/// Of the request that subscribes.
-#define WATCH_SIZE 128U
+/// Request that subscribes, with the rate of the event `state`.
+#define WATCH "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}"
 /// The gateway changes the group of its socket after it made it: rights are missing only if that lasts.
 #define DENIED_US 5000000U
 
@@ -107,16 +107,10 @@ static int judge_rights(bridge_link_t *self) {
     return 0;
 }
 
-static void write_watch(const bridge_link_t *self, char request[WATCH_SIZE]) {
-    (void)snprintf(request, WATCH_SIZE,
-                   "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}",
-                   self->terms.rate_hz);
-}
-
 static void subscribe(bridge_link_t *self) {
-    char request[WATCH_SIZE];
+    char request[128];
     const bridge_sent_t sent = {0, self->now_us + BRIDGE_STOP_US, take_subscribed, self};
-    write_watch(self, request);
+    (void)snprintf(request, sizeof request, WATCH, self->terms.rate_hz);
     if (bridge_line_send(&self->line, request, &sent) != IWC_OK) {
         lose(self);
     }
@@ -150,12 +144,11 @@ static void listen_now(bridge_link_t *self) {
     if (self->terms.latest && self->state == BRIDGE_LINK_HERE) {
         (void)iwc_latest(self->line.gateway); // If it has ended, the next line finds that out.
     }
-    bool more = true; // Reads once; the descriptor stays readable if there is more than fits.
-    for (unsigned i = 0; i < 256U && more && bridge_line_next(&self->line, &event); i++) {
+    const iwc_t *gateway = self->line.gateway; // Read once: the descriptor stays readable if there is more.
+    for (unsigned i = 0; i < 256U && (i == 0U || iwc_pending(gateway)) && bridge_line_next(&self->line, &event); i++) {
         if (self->state == BRIDGE_LINK_HERE) {
             self->listener.event(self->listener.context, &event, self->now_us);
         }
-        more = iwc_pending(self->line.gateway);
     }
     (void)bridge_line_expire(&self->line, self->now_us);
     const bool subscribing = bridge_line_in_flight(&self->line) > 0U;
@@ -234,13 +227,11 @@ bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t a
 }
 
 void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us) {
-    const unsigned before_hz = self->terms.rate_hz;
-    char request[WATCH_SIZE];
-    self->terms.rate_hz = rate_hz;
-    write_watch(self, request);
-    if (rate_hz != before_hz && self->state == BRIDGE_LINK_HERE &&
-        !bridge_link_ask(self, request, NULL, NULL, now_us)) {
-        self->terms.rate_hz = before_hz; // The next call tries again.
+    char request[128];
+    (void)snprintf(request, sizeof request, WATCH, rate_hz);
+    if (rate_hz != self->terms.rate_hz &&
+        (self->line.state != BRIDGE_HERE || bridge_link_ask(self, request, NULL, NULL, now_us))) {
+        self->terms.rate_hz = rate_hz; // Otherwise the next call tries again.
     }
 }
 

@@ -71,7 +71,7 @@ int bridge_link_step(bridge_link_t *self, uint64_t now_us);
 /// When `step` has something to do, if no byte comes.
 uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us);
 
-/// Asks for another rate of the event `state`, if it is another one.
+/// Changes the rate of the event `state`. If the gateway cannot be asked now, nothing changes: call it again.
 void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us);
 
 /// For poll(): readable when `step` has something to do. It stands for all connections to the gateway, those of lease.h too.

@@ -146,9 +146,9 @@ static void take_reply(bridge_t *self, const iwc_message_t *reply) {
 void bridge_listen(bridge_t *self) {
     iwc_message_t message;
     bool fresh = false;
-    iwc_result_t result =
-        iwc_next(self->gateway, 0, &message); // Reads once; what does not fit leaves the descriptor readable.
-    while (result == IWC_OK) {
+    iwc_result_t result = iwc_next(self->gateway, 0, &message);
+    // Read once: the descriptor stays readable if there is more.
+    for (; result == IWC_OK; result = iwc_pending(self->gateway) ? iwc_next(self->gateway, 0, &message) : IWC_TIMEOUT) {
         if (!message.is_event) {
             take_reply(self, &message);
         } else if (iwc_is(&message, "event", "state")) {
@@ -159,12 +159,8 @@ void bridge_listen(bridge_t *self) {
         } else if (iwc_is(&message, "event", "ledger")) {
             self->assumptions_due = true;
         }
-        if (!iwc_pending(self->gateway)) {
-            break;
-        }
-        result = iwc_next(self->gateway, 0, &message);
     }
-    if (result != IWC_OK && result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
+    if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
         bridge_lose(self, "it has ended, or closed the connection");
     } else if (fresh) {
         ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);

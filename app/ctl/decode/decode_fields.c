@@ -133,9 +133,9 @@ void field_add_all(const decoded_t *decoded, iwn_text_t *line) {
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
             const field_words_t *word = &words[field];
-            IWN_TEXT_JOIN(line, gap, word->label, (word->label[0] == '\0') ? "" : " ");
-            text_add_number(line, decoded->value[field], word->digits);
-            IWN_TEXT_JOIN(line, (word->unit[0] == '\0') ? "" : " ", word->unit);
+            char number[TEXT_CELL];
+            text_number(decoded->value[field], word->digits, word->unit, number);
+            IWN_TEXT_JOIN(line, gap, word->label, (word->label[0] == '\0') ? "" : " ", number);
             gap = ", ";
         }
     }

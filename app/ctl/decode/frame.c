@@ -5,18 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CELL_MAX 12U
-
 const char *frame_direction(const candump_t *frame) {
     return (frame->mark == CANDUMP_SENT) ? "T" : (frame->mark == CANDUMP_RECEIVED) ? "R" : "";
 }
 
 void frame_add_id(const candump_t *frame, iwn_text_t *line) {
-    unsigned digits = frame->extended ? 8U : 3U;
-    while (digits < 8U && frame->id >> 4U * digits != 0U) {
-        digits++;
-    }
-    iwn_text_hex(line, frame->id, digits);
+    iwn_text_hex(line, frame->id, (frame->extended || frame->id > IW_CAN_ID_MASK) ? 8U : 3U);
 }
 
 void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) {
@@ -26,45 +20,33 @@ void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) 
     }
 }
 
-/// Padded to so many columns, at most CELL_MAX, on its right or on its left.
-static void add_cell(iwn_text_t *line, const char *text, size_t columns, bool to_the_right) {
-    static const char blanks[CELL_MAX + 1U] = "            ";
+/// Returns the blanks that fill a text up to `columns`, which is at most 12.
+static const char *fill(const char *text, size_t columns) {
+    static const char blanks[] = "            ";
     const size_t length = strlen(text);
-    const size_t gap = (length < columns) ? columns - length : 0U;
-    iwn_text_span(line, blanks, to_the_right ? gap : 0U);
-    iwn_text_span(line, text, length);
-    iwn_text_span(line, blanks, to_the_right ? 0U : gap);
-}
-
-static void add_undecoded(iwn_text_t *line, const candump_t *frame) {
-    IWN_TEXT_JOIN(line, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
-    iwn_text_int(line, frame->length);
-    IWN_TEXT_JOIN(line, (frame->length == 1U) ? " byte" : " bytes", (frame->length > 0U && !frame->remote) ? ": " : "");
-    frame_add_bytes(frame, " ", line);
+    return &blanks[sizeof blanks - 1U - ((length < columns) ? columns - length : 0U)];
 }
 
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded) {
     char text[FRAME_LINE_SIZE];
-    char id[IWN_DIGITS_MAX + 1U] = "";
+    char digits[IWN_DIGITS_MAX + 1U] = "";
+    const char *const id = iwn_digits(frame->id, &digits[IWN_DIGITS_MAX]);
+    const bool noted = decoded->note[0] != '\0';
     iwn_text_t line = iwn_text_begin(text, sizeof text);
-    add_cell(&line, time_text, CELL_MAX, true);
-    iwn_text_add(&line, "  ");
-    add_cell(&line, iwn_digits(frame->id, &id[IWN_DIGITS_MAX]), 4U, true);
-    iwn_text_add(&line, " (0x");
+    IWN_TEXT_JOIN(&line, fill(time_text, 12U), time_text, "  ", fill(id, 4U), id, " (0x");
     frame_add_id(frame, &line);
-    iwn_text_add(&line, (frame->mark == CANDUMP_SENT) ? ") T " : ")   ");
-    add_cell(&line, decoded->wheel, 6U, false);
-    add_cell(&line, decoded->message, 8U, false);
-    iwn_text_add(&line, "  ");
+    IWN_TEXT_JOIN(&line, (frame->mark == CANDUMP_SENT) ? ") T " : ")   ", decoded->wheel, fill(decoded->wheel, 6U),
+                  decoded->message, fill(decoded->message, 8U), "  ");
     if (decoded->present != 0U) {
         field_add_all(decoded, &line);
     } else {
-        add_undecoded(&line, frame);
+        IWN_TEXT_JOIN(&line, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
+        iwn_text_int(&line, frame->length);
+        IWN_TEXT_JOIN(&line, (frame->length == 1U) ? " byte" : " bytes",
+                      (frame->length > 0U && !frame->remote) ? ": " : "");
+        frame_add_bytes(frame, " ", &line);
     }
-    if (decoded->note[0] != '\0') {
-        IWN_TEXT_JOIN(&line, " (", decoded->note, ")");
-    }
-    iwn_text_add(&line, "\n");
+    IWN_TEXT_JOIN(&line, noted ? " (" : "", decoded->note, noted ? ")\n" : "\n");
     (void)fwrite(text, 1, line.length, stdout);
 }
 

@@ -7,15 +7,12 @@
 
 #include "iwheel_northbound/json_out.h"
 
-#include <assert.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
 /// An earlier time is not counted from 1970.
 #define CALENDAR_US 1000000000000000
-/// Decimals of a time.
-#define SECOND_DIGITS 6U
 
 typedef struct {
     const char *path;
@@ -55,7 +52,7 @@ static void write_text(decode_t *self, const candump_t *frame, const decoded_t *
         write_begin(self, frame);
     }
     char time_text[TEXT_CELL];
-    text_number(frame->time_us - self->begin_us, SECOND_DIGITS, "", time_text);
+    text_number(frame->time_us - self->begin_us, 6U, "", time_text);
     frame_print(time_text, frame, decoded);
 }
 
@@ -68,17 +65,16 @@ static void write_csv_header(void) {
 }
 
 static void write_csv(const candump_t *frame, const decoded_t *decoded) {
-    static const char commas[] = ",,,,,,,,,,,,,,,,,"; // One for each field.
-    static_assert(sizeof commas - 1U == FIELDS, "");
     char text[FRAME_LINE_SIZE];
+    char time_text[TEXT_CELL];
     char name[CANDUMP_INTERFACE_SIZE];
     iwn_text_t line = iwn_text_begin(text, sizeof text);
     for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would begin another column.
         const char c = frame->interface[i];
         name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
-    text_add_number(&line, frame->time_us, SECOND_DIGITS);
-    IWN_TEXT_JOIN(&line, ",", name, ",", frame_direction(frame), ",");
+    text_number(frame->time_us, 6U, "", time_text);
+    IWN_TEXT_JOIN(&line, time_text, ",", name, ",", frame_direction(frame), ",");
     iwn_text_int(&line, frame->id);
     iwn_text_add(&line, ",0x");
     frame_add_id(frame, &line);
@@ -87,16 +83,12 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     iwn_text_add(&line, ",");
     frame_add_bytes(frame, "", &line);
     IWN_TEXT_JOIN(&line, ",", decoded->wheel, ",", decoded->message);
-    size_t empty = 0;
     for (unsigned field = 0; field < FIELDS; field++) {
-        empty++;
+        iwn_text_span(&line, ",", 1U);
         if ((decoded->present & (1U << field)) != 0U) {
-            iwn_text_span(&line, commas, empty);
             iwn_text_int(&line, decoded->value[field]);
-            empty = 0;
         }
     }
-    iwn_text_span(&line, commas, empty);
     IWN_TEXT_JOIN(&line, ",\"", decoded->note, "\"\n");
     (void)fwrite(text, 1, line.length, stdout);
 }
@@ -107,8 +99,8 @@ static const char *or_null(const char *text) {
 }
 
 /// Writes one object: time and interface, id and bytes, wheel and message, and under `values` the values with the names
-/// of the CSV. An unknown value is null. Returns false if the line is too long; then nothing is written.
-static bool write_json(const candump_t *frame, const decoded_t *decoded) {
+/// of the CSV. An unknown value is null.
+static void write_json(const candump_t *frame, const decoded_t *decoded) {
     char line[2U * FRAME_LINE_SIZE];
     char data[2U * CANDUMP_DATA_MAX + 1U];
     iwn_text_t bytes = iwn_text_begin(data, sizeof data);
@@ -136,25 +128,20 @@ static bool write_json(const candump_t *frame, const decoded_t *decoded) {
     iwn_out_close(&out, '}');
     iwn_out_text(&out, "note", or_null(decoded->note));
     iwn_out_close(&out, '}');
-    const size_t length = iwn_out_finish(&out);
-    (void)fwrite(line, 1, length, stdout);
-    return length > 0U;
+    (void)fwrite(line, 1, iwn_out_finish(&out), stdout);
 }
 
-/// Writes one frame. Returns an exit code.
-static int write_frame(decode_t *self, const candump_t *frame, bool json) {
+static void write_frame(decode_t *self, const candump_t *frame, bool json) {
     decoded_t decoded;
     const iw_can_frame_t core = candump_to_core(frame);
     decode_fields(&core, &self->config, &decoded);
     if (json) {
-        return write_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "a line is too long");
-    }
-    if (self->csv) {
+        write_json(frame, &decoded);
+    } else if (self->csv) {
         write_csv(frame, &decoded);
     } else {
         write_text(self, frame, &decoded);
     }
-    return CTL_OK;
 }
 
 int verb_decode(ctl_t *self, int count, char **words) {
@@ -175,12 +162,11 @@ int verb_decode(ctl_t *self, int count, char **words) {
     if (decode.csv) {
         write_csv_header();
     }
-    while (code == CTL_OK && ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
-        code = write_frame(&decode, &frame, self->json);
+    while (ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
+        write_frame(&decode, &frame, self->json);
         if (recording_is_drained(&decode.recording)) {
             (void)fflush(stdout); // Live: each line must be visible before the next one comes.
         }
     }
-    const int read = recording_close(&decode.recording);
-    return (code == CTL_OK) ? read : code;
+    return recording_close(&decode.recording);
 }

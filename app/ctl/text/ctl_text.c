@@ -87,30 +87,20 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
 }
 
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]) {
-    iwn_text_t text = iwn_text_begin(out, TEXT_CELL);
-    text_add_number(&text, number, digits);
-    if (unit[0] != '\0') {
-        IWN_TEXT_JOIN(&text, " ", unit);
-    }
-}
-
-void text_add_number(iwn_text_t *text, long long number, unsigned digits) {
-    unsigned long long scale = 1;
+    long long scale = 1;
     for (unsigned i = 0; i < digits; i++) {
-        scale *= 10U;
+        scale *= 10;
     }
-    if (digits == 0U) {
-        iwn_text_int(text, number);
-        return;
+    iwn_text_t text = iwn_text_begin(out, TEXT_CELL);
+    iwn_text_add(&text, (number < 0 && number / scale == 0) ? "-" : "");
+    iwn_text_int(&text, number / scale);
+    iwn_text_add(&text, (digits > 0U) ? "." : "");
+    while (scale > 1) {
+        number %= scale;
+        scale /= 10;
+        iwn_text_int(&text, llabs(number / scale));
     }
-    const unsigned long long size = (number < 0) ? 0ULL - (unsigned long long)number : (unsigned long long)number;
-    iwn_text_add(text, (number < 0) ? "-" : "");
-    iwn_text_int(text, (int64_t)(size / scale));
-    iwn_text_span(text, ".", 1U);
-    while (scale > 1U) {
-        scale /= 10U;
-        iwn_text_span(text, &"0123456789"[size / scale % 10U], 1U);
-    }
+    IWN_TEXT_JOIN(&text, (unit[0] != '\0') ? " " : "", unit);
 }
 
 void text_age(const json_t *age_ms, char out[TEXT_CELL]) {

@@ -4,7 +4,6 @@
 #define CTL_TEXT_H
 
 #include "iwheel/config.h"
-#include "iwheel_northbound/text.h"
 
 #include <jansson.h>
 #include <stdarg.h>
@@ -48,9 +47,6 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
 
 /// Writes a known number as text_decimal does.
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]);
-
-/// Appends a known number as text_decimal does, without a unit.
-void text_add_number(iwn_text_t *text, long long number, unsigned digits);
 
 /// Writes an age in ms in a suitable unit: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is not an age.
 void text_age(const json_t *age_ms, char out[TEXT_CELL]);

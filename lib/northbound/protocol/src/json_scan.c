@@ -353,6 +353,10 @@ int iwn_scan(iwn_scan_t *self) {
     if (c < 0) {
         return (c == PEEK_END) ? IWN_TOKEN_END : IWN_TOKEN_INVALID;
     }
+    if (is_mark(c)) {
+        self->at++;
+        return c;
+    }
     if (c == '"') {
         return scan_text(self);
     }
@@ -361,10 +365,6 @@ int iwn_scan(iwn_scan_t *self) {
     }
     if (iwn_scan_is_letter(c)) {
         return scan_word(self);
-    }
-    if (is_mark(c)) {
-        self->at++;
-        return c;
     }
     self->at += character_length(self);
     return IWN_TOKEN_INVALID;
