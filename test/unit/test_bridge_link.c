@@ -319,3 +319,17 @@ TEST(test_rate_that_changed_while_away_is_subscribed) {
     step();
     TEST_ASSERT_EQUAL(0, read_all(WATCHES));
 }
+
+TEST(test_rate_that_changes_while_subscribing_is_asked_later) {
+    step();
+    step();
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
+    TEST_ASSERT_NOT_NULL(strstr(line, "\"rate_hz\":7"));
+    bridge_link_rate(&link_, 2, now_us); // The gateway knows the old rate only.
+    fake_gateway_reply(&gateway, WATCHES, line, true, "");
+    step();
+    bridge_link_rate(&link_, 2, now_us);
+    step();
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
+    TEST_ASSERT_NOT_NULL(strstr(line, "\"rate_hz\":2"));
+}

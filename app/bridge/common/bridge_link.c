@@ -228,9 +228,11 @@ bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t a
 
 void bridge_link_rate(bridge_link_t *self, unsigned rate_hz, uint64_t now_us) {
     char request[128];
+    if (rate_hz == self->terms.rate_hz) {
+        return;
+    }
     (void)snprintf(request, sizeof request, WATCH, rate_hz);
-    if (rate_hz != self->terms.rate_hz &&
-        (self->line.state != BRIDGE_HERE || bridge_link_ask(self, request, NULL, NULL, now_us))) {
+    if (self->line.state != BRIDGE_HERE || bridge_link_ask(self, request, NULL, NULL, now_us)) {
         self->terms.rate_hz = rate_hz; // Otherwise the next call tries again.
     }
 }

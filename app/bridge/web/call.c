@@ -120,7 +120,7 @@ static enum MHD_Result send_challenge(web_call_t *self) {
 /// Answered from the newest state: a viewer never asks the gateway anything.
 static enum MHD_Result send_status(web_call_t *self) {
     size_t length = 0;
-    web_link_look(&self->server->link, self->server->now_us);
+    self->server->link.looked_us = self->server->now_us;
     const char *text = web_link_status(&self->server->link, self->server->now_us, &length);
     return (text != NULL) ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
                           : web_call_refuse(self, 503, "not_delivered", web_not_there);
@@ -219,7 +219,6 @@ static enum MHD_Result send_events(web_call_t *self) {
         return web_call_refuse(self, 503, "busy",
                                "too many watch already: close a page, or raise max_connections under [web]");
     }
-    web_link_look(&self->server->link, self->server->now_us);
     web_reader_begin(&self->reader, &self->server->link.feed);
     self->next = self->server->streams;
     self->server->streams = self;

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #define STALE_US 2000000U
-/// The state comes no faster while no client reads it, but fast enough that what is read first is fresh.
+/// Rate of the event `state` while no client reads it: the first one that is read is still fresh.
 #define IDLE_HZ 2U
-/// A client that read the state may read it again within this time.
+/// Time until the slower rate after a client read the state.
 #define LOOKED_US 5000000U
 /// The frames after a stop are there then.
 #define WHY_US 2500000U
@@ -90,7 +90,7 @@ static void forget_state(web_link_t *self) {
 static void gateway_here(void *context, uint64_t now_us) {
     web_link_t *self = context;
     self->why_us = now_us;
-    web_link_look(self, now_us);
+    self->looked_us = now_us;
     (void)web_feed_add(&self->feed, "gateway", "{\"event\":\"gateway\",\"connected\":true}", 36, false);
 }
 
@@ -120,15 +120,9 @@ void web_link_close(web_link_t *self) {
     }
 }
 
-void web_link_look(web_link_t *self, uint64_t now_us) {
-    self->looked_us = now_us;
-    bridge_link_rate(&self->gateway, self->rate_hz, now_us);
-}
-
 int web_link_step(web_link_t *self, uint64_t now_us) {
-    if (now_us - self->looked_us > LOOKED_US && self->rate_hz > IDLE_HZ) {
-        bridge_link_rate(&self->gateway, IDLE_HZ, now_us);
-    }
+    const bool idle = now_us - self->looked_us > LOOKED_US && self->rate_hz > IDLE_HZ;
+    bridge_link_rate(&self->gateway, idle ? IDLE_HZ : self->rate_hz, now_us);
     const int code = bridge_link_step(&self->gateway, now_us);
     bridge_lease_step(&self->lease, now_us);
     if (self->gateway.state == BRIDGE_LINK_HERE && self->why_us != 0U && now_us >= self->why_us) {

@@ -13,8 +13,8 @@
 typedef struct {
     bridge_link_t gateway;
     bridge_lease_t lease; ///< Of the person who drives by this bridge.
-    unsigned rate_hz;     ///< Of the event `state` while somebody reads it.
-    uint64_t looked_us;   ///< When a client read the state last.
+    unsigned rate_hz;     ///< Of the event `state` while a client reads it; otherwise 2 Hz. Other events do not wait.
+    uint64_t looked_us;   ///< Time of the last read of the state by a client. Its readers set it.
     uint64_t why_us;      ///< When to ask why it stopped; 0: no need.
     uint64_t stop_number; ///< Of the newest in `stops`.
     uint64_t state_us;    ///< When the newest state came.
@@ -31,9 +31,6 @@ void web_link_close(web_link_t *self);
 
 /// The newest state with its answer of yes, as the reply to `status` has it; NULL: not known. To be freed.
 char *web_link_status(const web_link_t *self, uint64_t now_us, size_t *out_length);
-
-/// A client reads the state: it comes at the configured rate for some seconds, otherwise at 2 Hz. What happens comes at once either way.
-void web_link_look(web_link_t *self, uint64_t now_us);
 
 /// As `bridge_link_step`, `bridge_link_next_us`.
 int web_link_step(web_link_t *self, uint64_t now_us);

@@ -303,7 +303,7 @@ static void let_go(web_server_t *self) {
 int web_server_step(web_server_t *self) {
     self->now_us = bridge_now_us();
     if (self->streams != NULL) {
-        web_link_look(&self->link, self->now_us);
+        self->link.looked_us = self->now_us;
     }
     const int code = web_link_step(&self->link, self->now_us);
     if (code != 0) {

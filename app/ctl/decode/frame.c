@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "frame.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 const char *frame_direction(const candump_t *frame) {
     return (frame->mark == CANDUMP_SENT) ? "T" : (frame->mark == CANDUMP_RECEIVED) ? "R" : "";
-}
-
-void frame_add_id(const candump_t *frame, iwn_text_t *line) {
-    iwn_text_hex(line, frame->id, (frame->extended || frame->id > IW_CAN_ID_MASK) ? 8U : 3U);
 }
 
 void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) {
@@ -20,34 +17,24 @@ void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line) 
     }
 }
 
-/// Returns the blanks that fill a text up to `columns`, which is at most 12.
-static const char *fill(const char *text, size_t columns) {
-    static const char blanks[] = "            ";
-    const size_t length = strlen(text);
-    return &blanks[sizeof blanks - 1U - ((length < columns) ? columns - length : 0U)];
-}
-
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded) {
     char text[FRAME_LINE_SIZE];
-    char digits[IWN_DIGITS_MAX + 1U] = "";
-    const char *const id = iwn_digits(frame->id, &digits[IWN_DIGITS_MAX]);
-    const bool noted = decoded->note[0] != '\0';
-    iwn_text_t line = iwn_text_begin(text, sizeof text);
-    IWN_TEXT_JOIN(&line, fill(time_text, 12U), time_text, "  ", fill(id, 4U), id, " (0x");
-    frame_add_id(frame, &line);
-    IWN_TEXT_JOIN(&line, (frame->mark == CANDUMP_SENT) ? ") T " : ")   ", decoded->wheel, fill(decoded->wheel, 6U),
-                  decoded->message, fill(decoded->message, 8U), "  ");
+    iwn_text_t values = iwn_text_begin(text, sizeof text);
     if (decoded->present != 0U) {
-        field_add_all(decoded, &line);
+        field_add_all(decoded, &values);
     } else {
-        IWN_TEXT_JOIN(&line, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
-        iwn_text_int(&line, frame->length);
-        IWN_TEXT_JOIN(&line, (frame->length == 1U) ? " byte" : " bytes",
+        IWN_TEXT_JOIN(&values, frame->remote ? "remote, " : "", frame->fd ? "CAN FD, " : "");
+        iwn_text_int(&values, frame->length);
+        IWN_TEXT_JOIN(&values, (frame->length == 1U) ? " byte" : " bytes",
                       (frame->length > 0U && !frame->remote) ? ": " : "");
-        frame_add_bytes(frame, " ", &line);
+        frame_add_bytes(frame, " ", &values);
     }
-    IWN_TEXT_JOIN(&line, noted ? " (" : "", decoded->note, noted ? ")\n" : "\n");
-    (void)fwrite(text, 1, line.length, stdout);
+    if (decoded->note[0] != '\0') {
+        IWN_TEXT_JOIN(&values, " (", decoded->note, ")");
+    }
+    (void)printf("%12s  %4" PRIu32 " (0x%0*" PRIX32 ")%-2s %-5s %-8s  %s\n", time_text, frame->id,
+                 frame->extended ? 8 : 3, frame->id, (frame->mark == CANDUMP_SENT) ? " T" : "", decoded->wheel,
+                 decoded->message, text);
 }
 
 /// Reads hexadecimal text into bytes. Returns their number.

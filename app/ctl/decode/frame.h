@@ -14,9 +14,6 @@ const char *frame_direction(const candump_t *frame);
 /// Size of the longest line of a frame, with newline and terminator.
 #define FRAME_LINE_SIZE 1024U
 
-/// Appends the id in hexadecimal: 3 digits, or 8 if it is extended.
-void frame_add_id(const candump_t *frame, iwn_text_t *line);
-
 /// Appends the data in hexadecimal, with `gap` between the bytes.
 void frame_add_bytes(const candump_t *frame, const char *gap, iwn_text_t *line);
 

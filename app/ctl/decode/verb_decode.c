@@ -66,31 +66,23 @@ static void write_csv_header(void) {
 
 static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     char text[FRAME_LINE_SIZE];
-    char time_text[TEXT_CELL];
     char name[CANDUMP_INTERFACE_SIZE];
-    iwn_text_t line = iwn_text_begin(text, sizeof text);
+    iwn_text_t values = iwn_text_begin(text, sizeof text);
     for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would begin another column.
         const char c = frame->interface[i];
         name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
-    text_number(frame->time_us, 6U, "", time_text);
-    IWN_TEXT_JOIN(&line, time_text, ",", name, ",", frame_direction(frame), ",");
-    iwn_text_int(&line, frame->id);
-    iwn_text_add(&line, ",0x");
-    frame_add_id(frame, &line);
-    iwn_text_add(&line, ",");
-    iwn_text_int(&line, frame->length);
-    iwn_text_add(&line, ",");
-    frame_add_bytes(frame, "", &line);
-    IWN_TEXT_JOIN(&line, ",", decoded->wheel, ",", decoded->message);
+    frame_add_bytes(frame, "", &values);
+    IWN_TEXT_JOIN(&values, ",", decoded->wheel, ",", decoded->message, ",");
     for (unsigned field = 0; field < FIELDS; field++) {
-        iwn_text_span(&line, ",", 1U);
         if ((decoded->present & (1U << field)) != 0U) {
-            iwn_text_int(&line, decoded->value[field]);
+            iwn_text_int(&values, decoded->value[field]);
         }
+        iwn_text_span(&values, ",", 1U);
     }
-    IWN_TEXT_JOIN(&line, ",\"", decoded->note, "\"\n");
-    (void)fwrite(text, 1, line.length, stdout);
+    (void)printf("%" PRId64 ".%06" PRId64 ",%s,%s,%" PRIu32 ",0x%0*" PRIX32 ",%u,%s\"%s\"\n", frame->time_us / 1000000,
+                 frame->time_us % 1000000, name, frame_direction(frame), frame->id, frame->extended ? 8 : 3, frame->id,
+                 frame->length, text, decoded->note);
 }
 
 /// Returns the text, or NULL (written as null) if it is empty.

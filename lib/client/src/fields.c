@@ -4,30 +4,21 @@
 
 #include <string.h>
 
-#define WALK(walk, key) iwc_json_walk((walk), (key), sizeof(key) - 1U)
-
 static iwc_span_t field(const iwc_message_t *message, const char *path) {
     return iwc_json_find((iwc_span_t){message->text, message->length}, path);
 }
 
-static iwc_value_t integer_of(iwc_span_t span) {
+iwc_value_t iwc_integer(const iwc_message_t *message, const char *path) {
     iwc_value_t value = {false, 0};
-    value.known = iwc_json_integer(span, &value.value);
+    value.known = iwc_json_integer(field(message, path), &value.value);
     return value;
 }
 
-static iwc_value_t truth_of(iwc_span_t span) {
-    const bool yes = span.length == 4 && memcmp(span.at, "true", 4) == 0;
-    const bool no = span.length == 5 && memcmp(span.at, "false", 5) == 0;
-    return (iwc_value_t){yes || no, yes ? 1 : 0};
-}
-
-iwc_value_t iwc_integer(const iwc_message_t *message, const char *path) {
-    return integer_of(field(message, path));
-}
-
 iwc_value_t iwc_truth(const iwc_message_t *message, const char *path) {
-    return truth_of(field(message, path));
+    const iwc_span_t value = field(message, path);
+    const bool yes = value.length == 4 && memcmp(value.at, "true", 4) == 0;
+    const bool no = value.length == 5 && memcmp(value.at, "false", 5) == 0;
+    return (iwc_value_t){yes || no, yes ? 1 : 0};
 }
 
 /// Bytes of the character, or of the escape, that begins with `byte`.
@@ -39,7 +30,8 @@ static size_t unit_length(const char *at) {
     return (byte < 0x80U) ? 1 : (byte < 0xE0U) ? 2 : (byte < 0xF0U) ? 3 : 4;
 }
 
-static bool text_of(iwc_span_t value, char *out, size_t size) {
+bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
+    const iwc_span_t value = field(message, path);
     size_t used = 0;
     if (size == 0) {
         return false;
@@ -63,10 +55,6 @@ static bool text_of(iwc_span_t value, char *out, size_t size) {
     return true;
 }
 
-bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
-    return text_of(field(message, path), out, size);
-}
-
 bool iwc_is(const iwc_message_t *message, const char *path, const char *text) {
     return iwc_json_is_text(field(message, path), text);
 }
@@ -77,31 +65,37 @@ const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out
     return value.at;
 }
 
-/// The fields in the order in which the gateway writes them, so that one walk finds them all; another order costs time only.
-static void read_wheel(iwc_span_t span, iwc_wheel_t *out_wheel) {
-    iwc_walk_t wheel = {span, NULL};
-    memset(out_wheel, 0, sizeof *out_wheel);
-    out_wheel->heard = truth_of(WALK(&wheel, "heard")).value == 1;
-    out_wheel->at_rest = truth_of(WALK(&wheel, "at_rest"));
-    out_wheel->speed_mm_s = integer_of(WALK(&wheel, "speed_mm_s"));
-    out_wheel->commanded_mm_s = integer_of(WALK(&wheel, "commanded_mm_s"));
-    out_wheel->applied_mm_s = integer_of(WALK(&wheel, "applied_mm_s"));
-    out_wheel->speed_age_ms = integer_of(WALK(&wheel, "speed_age_ms"));
-    out_wheel->battery_dV = integer_of(WALK(&wheel, "battery_dV"));
-    out_wheel->temperature_degC = integer_of(WALK(&wheel, "temperature_degC"));
-    out_wheel->distance_mm = integer_of(WALK(&wheel, "distance_mm"));
-    const iwc_value_t force_net_mN = integer_of(WALK(&wheel, "force_net_mN"));
-    if (iwc_json_is_text(WALK(&wheel, "force_validity"), "valid")) {
-        out_wheel->force_net_mN = force_net_mN;
-    }
-    out_wheel->force_age_ms = integer_of(WALK(&wheel, "force_age_ms"));
+static iwc_value_t integer_in(iwc_span_t object, const char *key) {
+    iwc_value_t value = {false, 0};
+    value.known = iwc_json_integer(iwc_json_find(object, key), &value.value);
+    return value;
 }
 
-static iwc_machine_t machine_of(iwc_span_t state) {
+static void read_wheel(const iwc_message_t *message, const char *side, iwc_wheel_t *out_wheel) {
+    const iwc_span_t wheel = field(message, side);
+    const iwc_message_t inner = {.text = wheel.at, .length = wheel.length};
+    *out_wheel = (iwc_wheel_t){
+        .heard = iwc_truth(&inner, "heard").value == 1,
+        .at_rest = iwc_truth(&inner, "at_rest"),
+        .speed_mm_s = integer_in(wheel, "speed_mm_s"),
+        .commanded_mm_s = integer_in(wheel, "commanded_mm_s"),
+        .applied_mm_s = integer_in(wheel, "applied_mm_s"),
+        .distance_mm = integer_in(wheel, "distance_mm"),
+        .battery_dV = integer_in(wheel, "battery_dV"),
+        .temperature_degC = integer_in(wheel, "temperature_degC"),
+        .speed_age_ms = integer_in(wheel, "speed_age_ms"),
+        .force_age_ms = integer_in(wheel, "force_age_ms"),
+    };
+    if (iwc_is(&inner, "force_validity", "valid")) {
+        out_wheel->force_net_mN = integer_in(wheel, "force_net_mN");
+    }
+}
+
+static iwc_machine_t machine_of(const iwc_message_t *message) {
     static const char *const names[] = {
         [IWC_LISTENING] = "listening", [IWC_ARMED] = "armed", [IWC_STOPPING] = "stopping", [IWC_LATCHED] = "latched"};
     for (unsigned i = IWC_LISTENING; i <= (unsigned)IWC_LATCHED; i++) {
-        if (iwc_json_is_text(state, names[i])) {
+        if (iwc_is(message, "state", names[i])) {
             return (iwc_machine_t)i;
         }
     }
@@ -109,28 +103,21 @@ static iwc_machine_t machine_of(iwc_span_t state) {
 }
 
 bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state) {
-    iwc_walk_t snapshot = {{message->text, message->length}, NULL};
-    const iwc_span_t t_us = WALK(&snapshot, "t_us");
-    const iwc_span_t state = WALK(&snapshot, "state");
-    const iwc_span_t cause = WALK(&snapshot, "cause");
-    iwc_walk_t lease = {WALK(&snapshot, "lease"), NULL};
-    iwc_walk_t bus = {WALK(&snapshot, "bus"), NULL};
-    iwc_walk_t estop = {WALK(&snapshot, "estop"), NULL};
-    const iwc_span_t left = WALK(&snapshot, "left");
-    const iwc_span_t right = WALK(&snapshot, "right");
-    if (left.at == NULL || right.at == NULL || lease.object.at == NULL || state.at == NULL) {
+    size_t length = 0;
+    if (iwc_json(message, "left", &length) == NULL || iwc_json(message, "right", &length) == NULL ||
+        iwc_json(message, "lease", &length) == NULL || iwc_json(message, "state", &length) == NULL) {
         return false;
     }
     memset(out_state, 0, sizeof(*out_state));
-    out_state->t_us = integer_of(t_us).value;
-    out_state->machine = machine_of(state);
-    (void)text_of(cause, out_state->cause, sizeof out_state->cause);
-    out_state->holder = integer_of(WALK(&lease, "holder"));
+    out_state->t_us = iwc_integer(message, "t_us").value;
+    out_state->machine = machine_of(message);
+    (void)iwc_text(message, "cause", out_state->cause, sizeof out_state->cause);
+    out_state->holder = iwc_integer(message, "lease.holder");
     out_state->ours = out_state->holder.known && self->number != 0 && out_state->holder.value == self->number;
-    out_state->remaining_ms = integer_of(WALK(&lease, "remaining_ms"));
-    out_state->estop_released = iwc_json_is_text(WALK(&estop, "state"), "released");
-    out_state->bus_active = iwc_json_is_text(WALK(&bus, "state"), "active");
-    read_wheel(left, &out_state->left);
-    read_wheel(right, &out_state->right);
+    out_state->remaining_ms = iwc_integer(message, "lease.remaining_ms");
+    out_state->estop_released = iwc_is(message, "estop.state", "released");
+    out_state->bus_active = iwc_is(message, "bus.state", "active");
+    read_wheel(message, "left", &out_state->left);
+    read_wheel(message, "right", &out_state->right);
     return true;
 }

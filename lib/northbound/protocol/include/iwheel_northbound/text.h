@@ -27,8 +27,7 @@ bool iwn_plain_is(uint32_t code_point);
 /// Returns true if all characters are plain.
 bool iwn_plain_text(const char *text);
 
-/// Returns the number of bytes at the beginning that stand in JSON as they are: printable ASCII without quote and
-/// backslash.
+/// Returns the number of leading bytes that JSON shows unchanged: printable ASCII without quote and backslash.
 size_t iwn_plain_length(const char *text, size_t length);
 
 /// Copies a text with `?` instead of each character that is not plain. Characters that do not fit are omitted as a
