@@ -2,7 +2,7 @@
 /// Fetches the list of recordings and one recording of a machine by MQTT commands, in pieces with checksums.
 ///
 ///     LISTING --list--> LISTED --fetch_choose--> FETCHING --every file whole--> DONE
-/// any of them, after `patience_us` without a piece, or after a final refusal: FAILED, with `why`
+///     any of them, after `patience_us` without a piece, or after a final refusal: FAILED, with `why`
 ///
 /// Each command quotes `boot` and `t_us` of the machine from the last answer. `hello` requests them at the start and
 /// after a time without an answer. So a lost answer, a machine that was away and a bridge that restarted cost only a
