@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The only connection to the MQTT broker, by libmosquitto. The connection is retried without end. No call waits.
+/// The only connection to the MQTT broker, by libmosquitto. The connection is retried without end. Only
+/// `mqtt_broker_close` waits.
 ///
 ///     AWAY --try--> CONNECTING --socket--> GREETING --CONNACK--> UP --lost--> AWAY, tried again after 0.5 s to 30 s
 ///

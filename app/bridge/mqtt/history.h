@@ -85,8 +85,8 @@ typedef struct {
 bool history_open(history_t *self, const history_config_t *config, FILE *out);
 void history_close(history_t *self);
 
-/// Receives one event of the stream, in the order of storage. A `stream_take_t` with the history as context. Returns
-/// false if the output is closed.
+/// Receives one event of the stream, in the order of storage. It has the type `stream_take_t`, with the history as
+/// context. Returns false if the output is closed.
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
 
 /// Receives the retained `info` of a machine. All of them must precede the first event.
