@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// Shared by the feed and by the readers that are in the middle of it.
+/// One message, shared by the feed and by readers that are sending it.
 struct web_message {
     unsigned holders;
     size_t length;
@@ -72,7 +72,7 @@ void web_reader_end(web_reader_t *self) {
     self->sending = NULL;
 }
 
-/// Events before the state: what happened led to it.
+/// Returns the next message. Events precede the state, because they led to it.
 static web_message_t *next(web_reader_t *self, web_feed_t *feed) {
     char json[64];
     const uint64_t oldest = (feed->count > WEB_FEED_STORED) ? feed->count - WEB_FEED_STORED : 0U;

@@ -6,13 +6,13 @@
 #include <string.h>
 
 #define STALE_US 2000000U
-/// Rate of the event `state` while no client reads it: the first one that is read is still fresh.
+/// Rate of the event `state` while no client reads it. The first state that a client reads is still fresh.
 #define IDLE_HZ 2U
-/// Time until the slower rate after a client read the state.
+/// Time from the last read of the state by a client to that rate.
 #define LOOKED_US 5000000U
-/// The frames after a stop are there then.
+/// Delay after a stop until the frames after it are recorded.
 #define WHY_US 2500000U
-/// All places for questions are in use.
+/// Delay of another try when all places for questions are in use.
 #define WHY_AGAIN_US 200000U
 
 static char *copy_of(const iwc_message_t *message) {
@@ -33,7 +33,7 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
     if (copy == NULL) {
         return;
     }
-    // The same stop again, now with its frames, or its recording: in place of the first.
+    // The same stop again, now with its frames or its recording, replaces the first reply.
     const bool same = self->stops[0] != NULL && (uint64_t)number.value == self->stop_number;
     free(self->stops[same ? 0 : WEB_STOPS_STORED - 1U]);
     if (!same) {
@@ -74,7 +74,7 @@ static void take_event(void *context, const iwc_message_t *message, uint64_t now
     if (strcmp(name, "stop") == 0) {
         bridge_lease_end(&self->lease, now_us);
         web_tally_take(&self->tally, message, true);
-        keep_stop(self, message); // Another one may come before its frames do.
+        keep_stop(self, message); // Another stop may happen before the frames are recorded.
         (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = now_us + WHY_US;
     }
@@ -153,7 +153,7 @@ bool web_link_state(const web_link_t *self, uint64_t now_us, iwc_message_t *out_
 char *web_link_status(const web_link_t *self, uint64_t now_us, size_t *out_length) {
     static const char yes[] = "{\"ok\":true,";
     iwc_message_t state;
-    const char *rest = web_link_state(self, now_us, &state) ? strchr(state.text, ',') : NULL; // Behind "event":"state".
+    const char *rest = web_link_state(self, now_us, &state) ? strchr(state.text, ',') : NULL; // After the event name.
     char *text = (rest != NULL) ? malloc(state.length + sizeof yes) : NULL;
     if (text != NULL) {
         *out_length = (size_t)sprintf(text, "%s%s", yes, rest + 1);
