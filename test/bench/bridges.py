@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the bridges cost beside a gateway at 617 frames/s: their instructions in a second (callgrind).
+"""Instructions of the bridges in a second, next to a gateway at 617 frames/s (callgrind).
 
-Nobody is connected to iwheel-web and nobody reads iwheel-ros2; iwheel-mqtt sends every state to a broker. The figures move by a few per cent with when lines
-come together, so they are held against limits.
+iwheel-web has no client and iwheel-ros2 no reader; iwheel-mqtt sends every state to a broker. The figures vary by a few per cent with the number of lines
+that arrive together, so they are compared with limits.
 """
 
 import os
@@ -17,9 +17,9 @@ from pathlib import Path
 import loop
 
 START_S = 30
-SETTLE_S = 7.0  # The web bridge goes on at its full rate for 5 s after it has connected.
-# Instructions in a second: what was measured (200 000 to 260 000, 1 650 000, 14 200 000) and a fifth more.
-LIMITS = {"iwheel-web, nobody connected": 320000, "iwheel-mqtt, a state every 100 ms": 2200000, "iwheel-ros2, odometry at 50 Hz": 17000000}
+SETTLE_S = 7.0  # iwheel-web keeps its full rate for 5 s after it has connected.
+# Instructions in a second: the measured figures (200 000 to 260 000, 1 650 000, 14 200 000) and a fifth more.
+LIMITS = {"iwheel-web, no client": 320000, "iwheel-mqtt, a state every 100 ms": 2200000, "iwheel-ros2, odometry at 50 Hz": 17000000}
 PROGRAMS = {"iwheel-web": "web", "iwheel-mqtt": "mqtt", "iwheel-ros2": "ros2"}
 
 

@@ -7,7 +7,7 @@
 #define KINDS_MAX 128U
 /// In the place of a line's first byte: nobody will ask for it.
 #define STRUCK '\0'
-static const char EVENT[] = "{\"event\":";
+static const char EVENT[] = "{\"event\":"; // Beginning of every event of the gateway.
 /// A `lost` event is only a number, which is added up.
 #define KIND_LOST UINT64_C(0)
 
@@ -50,7 +50,7 @@ static bool admit_reply(iwc_t *self, iwc_span_t line) {
     return !has_id || is_odd(id);
 }
 
-/// False: it is no message. In a line that begins as the gateway's events do names are not compared.
+/// Returns false if the line is no message. Names are not compared in a line that begins like an event of the gateway.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
     const bool begins = line.length > sizeof EVENT && memcmp(line.at, EVENT, sizeof EVENT - 1U) == 0;
     if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, begins)) {

@@ -12,7 +12,7 @@ typedef struct {
     size_t length;
 } iwc_span_t;
 
-/// True if the text is one object and nothing else but blanks. A trusted one may have a name twice.
+/// True if the text is one object and nothing else but blanks. Names are not compared in a trusted text.
 bool iwc_json_is_object(const char *text, size_t length, bool trusted);
 
 /// The value at a path of keys, "left.speed_mm_s", in an object for which `iwc_json_is_object` holds; keys are compared as written.

@@ -8,7 +8,7 @@
 typedef struct {
     iwn_scan_t scan;
     iwn_work_t *work;              ///< NULL: names are not compared.
-    uint16_t names;                ///< Of all objects that are open.
+    uint16_t names;                ///< Number of names in all open objects.
     uint16_t first[IWN_DEPTH_MAX]; ///< The first of them, per object.
     bool is_list[IWN_DEPTH_MAX];
     unsigned depth;
@@ -191,7 +191,7 @@ static const char *skip_value(const char *at) {
         depth -= ((*at | 0x20) == '}') ? 1U : 0U;
         at++;
         while (depth == 0U && *at > ' ' && *at != ',' && (*at | 0x20) != '}') {
-            at++; // Of a number or word.
+            at++; // Inside a number or word.
         }
     } while (depth > 0U);
     return at;

@@ -5,7 +5,7 @@
 
 /// No more of a wrong token than this is repeated.
 #define NEAR_MAX 20U
-/// An integer of so many bytes has 64 bits.
+/// An integer of this length always fits 64 bits.
 #define INTEGER_SAFE 18
 /// The decimal exponent of the largest double.
 #define REAL_EXPONENT_MAX 308
@@ -78,7 +78,7 @@ static size_t character_length(const iwn_scan_t *self) {
     return (iwn_plain_read(copy, &bytes) != IWN_PLAIN_BROKEN) ? bytes : 0U;
 }
 
-/// Outside ASCII: the byte, or PEEK_BROKEN, and that is told.
+/// Returns the next byte, which is not ASCII; PEEK_BROKEN, and reports it, if it begins no UTF-8 character.
 static int peek_wide(iwn_scan_t *self) {
     const unsigned char byte = (unsigned char)*self->at;
     if (character_length(self) == 0U) {

@@ -5,7 +5,7 @@
 
 /// Every character that controls a terminal needs four digits.
 #define ESCAPE_SIZE sizeof "\\uFFFD"
-/// A byte of a word of the machine, in all of its bytes.
+/// A machine word in which every byte has this value.
 #define IN_EACH(byte) ((size_t)-1 / 255U * (byte))
 
 static const struct {
@@ -70,12 +70,12 @@ bool iwn_plain_text(const char *text) {
     return true;
 }
 
-/// Whether a byte stands in a text as it is.
+/// Returns true if JSON shows the byte unchanged.
 static bool is_plain(char c) {
     return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
 }
 
-/// A word of the machine at a time. In one whose bytes are below 0x80 a subtraction borrows only behind a byte that is not
+/// Reads a machine word at a time. If all bytes are below 0x80, a subtraction borrows only after a byte that is not
 /// plain either.
 size_t iwn_plain_length(const char *text, size_t length) {
     size_t plain = 0;
@@ -89,7 +89,7 @@ size_t iwn_plain_length(const char *text, size_t length) {
         const size_t odd = (word | control | quote | backslash | erase) & IN_EACH(0x80U);
         if (odd != 0U) {
 #if !defined(__OPTIMIZE_SIZE__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-            return plain + (size_t)__builtin_ctzll(odd) / 8U; // The lowest bit is of the first such byte.
+            return plain + (size_t)__builtin_ctzll(odd) / 8U; // The lowest bit belongs to the first such byte.
 #else
             break;
 #endif
