@@ -314,6 +314,7 @@ TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones) {
     static const char *const bad[] = {"x\n",
                                       "\n",
                                       "{\"ok\":true,\"event\":\"both\"}\n",
+                                      "{\"ok\":true,\"ok\":true}\n",
                                       "{\"neither\":1}\n",
                                       "{\"event\":\"\xff\"}\n",
                                       "{\"event\":\"a\",\"b\":01}\n",
