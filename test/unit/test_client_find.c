@@ -64,7 +64,7 @@ TEST(test_find_only_gateway_is_returned) {
     TEST_ASSERT_EQUAL_STRING(path, out);
 }
 
-TEST(test_find_several_are_listed) {
+TEST(test_find_several_gateways_are_listed) {
     add_socket("can0.sock");
     add_socket("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
