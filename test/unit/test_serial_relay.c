@@ -481,7 +481,7 @@ static bool stop_beyond_the_places(void) {
     return step == 350U;
 }
 
-static void test_relay_stop_without_a_free_place_is_not_refused(void) {
+static void test_stop_never_refused_by_a_relay_without_a_place(void) {
     settings.northbound.max_clients = 1;
     run(stop_beyond_the_places);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"open\""), to_board);
@@ -608,7 +608,7 @@ int main(void) {
     RUN_TEST(test_relay_event_before_hello_is_dropped);
     RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_does_not_end_the_relay);
-    RUN_TEST(test_relay_stop_without_a_free_place_is_not_refused);
+    RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
     RUN_TEST(test_relay_reason_follows_the_received_bytes);
     RUN_TEST(test_relay_missing_port_is_not_reported_as_no_bytes);
     RUN_TEST(test_relay_board_restarted_late_is_reported_as_no_bytes);
