@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// small.c against the library of this machine, under other names.
+// Compares small.c, under other names, with the library of this machine.
 #include "unit.h"
 
 #include <stdlib.h>
