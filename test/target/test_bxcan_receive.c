@@ -108,7 +108,7 @@ TEST(test_received_frames_and_echoes_are_in_the_order_of_the_bus) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
 }
 
-TEST(test_foreign_setpoint_is_received_and_no_echo) {
+TEST(test_received_foreign_setpoint_is_no_echo) {
     iw_can_frame_t taken;
     (void)rig_hear(0, 266, 5);
     TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));

@@ -64,7 +64,7 @@ TEST(test_sent_frame_has_the_same_bytes) {
     TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, on_bus.data, 8);
 }
 
-TEST(test_every_dlc_is_sent) {
+TEST(test_sent_frame_may_have_any_dlc) {
     for (uint8_t dlc = 0; dlc <= 8; dlc++) {
         const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
         model_frame_t on_bus;
@@ -206,7 +206,7 @@ TEST(test_pair_is_accepted_while_both_old_frames_are_sent) {
     assert_no_echo();
 }
 
-TEST(test_call_places_no_more_frames_than_wheels) {
+TEST(test_send_call_accepts_no_more_frames_than_wheels) {
     const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
     TEST_ASSERT_EQUAL(2, brd_bxcan_send(driver, three, 3));
     assert_on_bus(266, 1);
@@ -510,7 +510,7 @@ TEST(test_purge_of_an_idle_device_succeeds) {
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
 }
 
-TEST(test_receive_of_a_stopped_device_is_broken) {
+TEST(test_send_and_receive_of_a_stopped_device_fail) {
     iw_can_frame_t frame;
     rig_init(0, false);
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_receive(driver, &frame));

@@ -170,7 +170,7 @@ TEST(test_pending_reply_of_a_closed_channel_frees_its_place) {
     TEST_ASSERT_NULL(strstr(all, "\"id\":103"));
 }
 
-TEST(test_pending_place_is_of_one_client_and_one_request) {
+TEST(test_pending_place_belongs_to_one_client_and_request) {
     static brd_pending_t pool;
     const iwn_id_t one = {.kind = IWN_ID_NUMBER, .number = 1};
     const iwn_id_t two = {.kind = IWN_ID_NUMBER, .number = 2};

@@ -116,7 +116,7 @@ static void press(iw_side_t side, uint32_t span_ms) {
     }
 }
 
-TEST(test_host_tare_of_one_wheel_is_that_wheels_zero) {
+TEST(test_host_tare_of_one_wheel_sets_its_zero_only) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     press(IW_LEFT, 4000);
     ask("{\"cmd\":\"tare\",\"id\":2,\"side\":\"left\"}", "\"left\":{");

@@ -89,7 +89,7 @@ TEST(test_store_blank_flash_has_no_record) {
     TEST_ASSERT_EQUAL_UINT(4, brd_store_blank(&store));
 }
 
-TEST(test_store_each_record_is_the_newest) {
+TEST(test_store_newest_record_is_the_last_one_written) {
     brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 50U; number++) {

@@ -38,7 +38,7 @@ TEST(test_health_at_the_thresholds_is_no_fault) {
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
-TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel) {
+TEST(test_health_value_beyond_for_5_s_is_a_fault_of_its_wheel) {
     told[IW_LEFT].status.battery_dV = 219;
     told[IW_RIGHT].status.temperature_degC = 61;
     step(0);
@@ -52,7 +52,7 @@ TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel) {
     TEST_ASSERT_TRUE(health.present[IW_RIGHT][GW_TEMPERATURE_HIGH]);
 }
 
-TEST(test_health_fault_is_gone_after_five_seconds_within) {
+TEST(test_health_fault_ends_after_5_s_within_the_thresholds) {
     told[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US);

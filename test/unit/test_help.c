@@ -116,7 +116,7 @@ TEST(test_help_names_each_choice_of_an_argument) {
     TEST_ASSERT_GREATER_THAN(IW_ASSUMPTION_ITEMS + IWN_TOPICS, choices);
 }
 
-TEST(test_help_of_confirm_lists_the_items_and_no_other) {
+TEST(test_help_of_confirm_lists_exactly_the_items) {
     char expected[512] = "\nITEM  ";
     char found[512] = "";
     for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {

@@ -65,7 +65,7 @@ TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
 
-TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers) {
+TEST(test_inspect_rate_off_by_over_10_percent_warns_with_numbers) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
     inspect_bus(&local, &heard, &config, &findings);
@@ -73,7 +73,7 @@ TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers) {
     TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
 }
 
-TEST(test_rate_within_a_tenth_or_two_frames_is_right) {
+TEST(test_inspect_rate_within_10_percent_or_two_frames_is_ok) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
     heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
@@ -91,14 +91,14 @@ TEST(test_inspect_missing_message_is_named) {
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
 }
 
-TEST(test_offsets_may_be_missing_after_the_first_minute) {
+TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
     hear_healthy();
     TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
     inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
 }
 
-TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them) {
+TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
     inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
     hear_healthy();
@@ -109,7 +109,7 @@ TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them) {
     expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
 }
 
-TEST(test_unknown_ids_are_listed_and_the_list_is_bounded) {
+TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     iw_can_frame_t frame = {.id = 0x266U};
     hear_healthy();
     inspect_heard_take(&heard, &frame);
@@ -142,7 +142,7 @@ TEST(test_inspect_damaged_frames_have_their_own_counts) {
     TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, heard.bits);
 }
 
-TEST(test_full_bus_warns) {
+TEST(test_inspect_full_bus_warns) {
     hear_healthy();
     heard.bits = 1100000U;
     inspect_bus(&local, &heard, &config, &findings);
@@ -159,7 +159,7 @@ TEST(test_inspect_bus_that_was_never_up_does_not_judge_wheels) {
     expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
 }
 
-TEST(test_error_passive_bus_warns) {
+TEST(test_inspect_error_passive_bus_warns) {
     hear_healthy();
     heard.worst = IW_BUS_PASSIVE;
     inspect_bus(&local, &heard, &config, &findings);
@@ -180,7 +180,7 @@ TEST(test_inspect_bus_off_fails_and_wheels_are_not_judged) {
     TEST_ASSERT_NULL(find("left_wheel"));
 }
 
-TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged) {
+TEST(test_inspect_past_bus_off_warns_and_wheels_are_judged) {
     hear_healthy();
     heard.worst = IW_BUS_OFF;
     inspect_bus(&local, &heard, &config, &findings);
@@ -215,7 +215,7 @@ TEST(test_inspect_correct_link_has_no_finding) {
     expect("bit_timing", INSPECT_OK, "1000000 bit/s, sample point 62.5 %", "");
 }
 
-TEST(test_each_fault_of_the_link_has_its_command) {
+TEST(test_inspect_each_fault_of_the_link_names_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
                                  .is_mute = true,
                                  .bitrate_hz = 500000,
@@ -251,7 +251,7 @@ TEST(test_inspect_unknown_buffer_is_not_judged) {
     TEST_ASSERT_EQUAL_UINT(0U, findings.count);
 }
 
-TEST(test_wrong_timing_only_warns_where_it_is_configured_so) {
+TEST(test_inspect_wrong_timing_warns_only_where_configured) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
     inspect_config_t lenient = config;
     lenient.refuses = false;
@@ -275,7 +275,7 @@ TEST(test_inspect_absent_and_foreign_interfaces_differ) {
     expect("interface", INSPECT_FAIL, "is down", "ip link set can0 up");
 }
 
-TEST(test_estop_levels) {
+TEST(test_inspect_estop_levels_have_their_verdicts) {
     inspect_estop_t estop = {.line = "ESTOP", .present = true, .level = -1, .trouble = "gpioinfo lists them"};
     inspect_estop(&estop, &findings);
     expect("estop", INSPECT_FAIL, "unreadable, which counts as pressed", "gpioinfo");
@@ -309,7 +309,7 @@ TEST(test_estop_levels) {
     expect("estop", INSPECT_WARN, "none", "[estop] line");
 }
 
-TEST(test_full_list_counts_on_and_loses_no_failure) {
+TEST(test_inspect_full_list_counts_further_failures) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
         inspect_cure(&findings, "cure %u", i);

@@ -30,7 +30,7 @@ TEST(test_json_control_characters_and_invalid_utf8_are_escaped) {
         "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
 }
 
-TEST(test_json_escapes_and_separates) {
+TEST(test_json_members_are_escaped_and_separated) {
     iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "low", INT64_MIN);
@@ -53,7 +53,7 @@ TEST(test_json_escapes_and_separates) {
         line);
 }
 
-TEST(test_json_that_does_not_fit_is_no_line_at_any_size) {
+TEST(test_json_that_does_not_fit_is_not_written_at_any_size) {
     for (size_t size = 1; size <= 64U; size++) {
         memset(line, 0x5A, sizeof line);
         iwn_out_init(&json, line, size);
@@ -68,7 +68,7 @@ TEST(test_json_that_does_not_fit_is_no_line_at_any_size) {
     }
 }
 
-TEST(test_json_number_is_written_as_printf_writes_it) {
+TEST(test_json_number_is_written_like_printf) {
     int64_t number = 1;
     for (unsigned digits = 1; digits < 19U; digits++) {
         number *= 10;
@@ -174,7 +174,7 @@ TEST(test_json_elements_need_exactly_their_length) {
         line, length);
 }
 
-TEST(test_json_frame_has_its_bytes_its_kind_and_its_flags) {
+TEST(test_json_frame_has_its_bytes_kind_and_flags) {
     const iw_can_frame_t frame = {.id = 0x10AU, .dlc = 3, .kind = (uint8_t)IW_CAN_ECHO, .data = {0x00, 0x9F, 0xA0}};
     iwn_out_frame(&frame, 17, &json);
     expect("\"t_us\":17,\"id\":266,\"dlc\":3,\"data\":\"009FA0\",\"kind\":\"echo\",\"flags\":[]");

@@ -15,7 +15,7 @@ static iwl_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
     return iwl_timing_judge(&link, IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE);
 }
 
-TEST(test_timing_bands_around_the_wanted_sample_point) {
+TEST(test_timing_verdict_depends_on_the_sample_point_distance) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const int off = (permille > 625) ? permille - 625 : 625 - permille;
         const iwl_timing_t expected = (off <= 5) ? IWL_TIMING_RIGHT : (off <= 25) ? IWL_TIMING_NEAR : IWL_TIMING_WRONG;
@@ -36,7 +36,7 @@ TEST(test_timing_missing_value_is_unknown_unless_other_is_wrong) {
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(0, 750));
 }
 
-TEST(test_timing_of_a_virtual_link_does_not_exist) {
+TEST(test_timing_of_a_virtual_link_is_not_judged) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .is_virtual = true, .bitrate_hz = 5};
     TEST_ASSERT_EQUAL(IWL_TIMING_VIRTUAL, iwl_timing_judge(&link, 1000000, 625));
 }
@@ -65,7 +65,7 @@ TEST(test_link_is_same_compares_interface_values_only) {
 }
 
 /// The loopback interface has a carrier unless it is down; then the kernel returns no value.
-TEST(test_carrier_is_that_of_the_kernel_or_unknown) {
+TEST(test_link_carrier_is_that_of_the_kernel_or_unknown) {
     char told[8] = "";
     FILE *file = fopen("/sys/class/net/lo/carrier", "r");
     TEST_ASSERT_NOT_NULL(file);

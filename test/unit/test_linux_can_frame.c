@@ -60,7 +60,7 @@ TEST(test_filters_every_standard_id_goes_to_exactly_one_socket) {
     }
 }
 
-TEST(test_filters_an_extended_frame_counts_by_its_whole_number) {
+TEST(test_filters_extended_frame_is_matched_by_its_whole_id) {
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         TEST_ASSERT_TRUE(is_ours(ids[i] | CAN_EFF_FLAG));
         TEST_ASSERT_FALSE(is_others(ids[i] | CAN_EFF_FLAG));
@@ -69,7 +69,7 @@ TEST(test_filters_an_extended_frame_counts_by_its_whole_number) {
     }
 }
 
-TEST(test_filters_do_not_ask_for_error_frames) {
+TEST(test_filters_do_not_request_error_frames) {
     for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
         TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
@@ -94,7 +94,7 @@ TEST(test_translate_preserves_format_id_and_data) {
                             translate(256U | CAN_EFF_FLAG | CAN_RTR_FLAG, 0, 0).id);
 }
 
-TEST(test_translate_only_our_own_sockets_frame_is_an_echo) {
+TEST(test_translate_only_a_frame_of_our_socket_is_an_echo) {
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, translate(266, 5, MSG_CONFIRM | MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, 0).kind);
@@ -146,7 +146,7 @@ TEST(test_error_mask_has_the_known_classes_only) {
     TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iwl_can_error_mask());
 }
 
-TEST(test_bits_of_frames) {
+TEST(test_frame_bits_match_format_and_length) {
     struct can_frame raw = {.can_id = 266, .len = 5};
     TEST_ASSERT_EQUAL_UINT32(47 + 40, iwl_socketcan_bits(&raw));
     raw.can_id = 266U | CAN_RTR_FLAG;

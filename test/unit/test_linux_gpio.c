@@ -21,7 +21,7 @@ void setUp(void) {
     now_us = START_US;
 }
 
-TEST(test_address_by_chip_and_offset) {
+TEST(test_address_by_chip_and_offset_is_parsed) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("gpiochip0:4", &address));
     TEST_ASSERT_TRUE(address.by_offset);
     TEST_ASSERT_EQUAL_STRING("gpiochip0", address.name);
@@ -31,7 +31,7 @@ TEST(test_address_by_chip_and_offset) {
     TEST_ASSERT_EQUAL_UINT(65535, address.offset);
 }
 
-TEST(test_address_by_name) {
+TEST(test_address_by_name_is_parsed) {
     static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_gpio_address_parse(names[i], &address), names[i]);
@@ -60,7 +60,7 @@ TEST(test_address_invalid_is_refused_and_changes_nothing) {
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, &address, sizeof address);
 }
 
-TEST(test_address_the_longest_name_fits) {
+TEST(test_address_with_the_longest_name_fits) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
     TEST_ASSERT_EQUAL_size_t(31, strlen(address.name));
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));

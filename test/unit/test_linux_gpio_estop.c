@@ -256,7 +256,7 @@ TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now) {
     TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
 }
 
-TEST(test_estop_without_a_descriptor_for_waiting_is_refused) {
+TEST(test_estop_without_a_free_descriptor_is_refused) {
     struct rlimit before;
     tearDown();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));

@@ -101,7 +101,7 @@ TEST(test_hal_last_result_is_stored) {
     TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
 }
 
-TEST(test_next_time_is_the_sooner_of_bus_and_estop) {
+TEST(test_hal_next_time_is_the_earlier_of_bus_and_estop) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 200;
     estop_due_us = 100;
@@ -145,7 +145,7 @@ static int open_with(const char *first, const char *second) {
     return error;
 }
 
-TEST(test_one_line_under_two_names_is_no_second_contact) {
+TEST(test_hal_one_line_under_two_names_is_no_second_contact) {
     if (iwl_gpio_estop_ops == NULL) {
         TEST_IGNORE_MESSAGE("without libgpiod");
     }
@@ -190,7 +190,7 @@ TEST(test_hal_second_contact_is_read_at_any_value_of_the_first) {
     TEST_ASSERT_EQUAL_INT(-1, look());
 }
 
-TEST(test_contacts_are_judged_at_the_time_of_the_round) {
+TEST(test_hal_contacts_are_judged_at_the_time_of_the_poll) {
     set_up_two();
     answer2 = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
@@ -216,7 +216,7 @@ TEST(test_hal_each_contact_is_waited_for_polled_and_reported) {
     TEST_ASSERT_EQUAL_INT(2, iwl_hal_estop_trouble(&hal, 1));
 }
 
-TEST(test_each_contact_is_closed) {
+TEST(test_hal_each_contact_is_closed) {
     closed = 0;
     iwl_hal_close(&hal);
     TEST_ASSERT_EQUAL_UINT(1, closed);

@@ -209,7 +209,7 @@ static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
+static void test_local_error_frames_change_only_the_state(void) {
     iw_can_frame_t heard;
     struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
     passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
@@ -319,7 +319,7 @@ static void test_local_estop_pulse_between_two_reads_is_an_edge(void) {
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
-static void test_estop_any_byte_but_zero_is_pressed(void) {
+static void test_local_estop_any_byte_but_zero_is_pressed(void) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     press("?");
@@ -341,7 +341,7 @@ static void test_local_estop_reconnected_is_unreadable_until_first_byte(void) {
     TEST_ASSERT_EQUAL_INT(0, hal.estop_last);
 }
 
-static void test_hal_names_without_a_backend_are_refused_without_a_leak(void) {
+static void test_local_names_without_a_backend_leave_no_descriptor_open(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     const int before = dup(0);
@@ -363,7 +363,7 @@ static void test_hal_names_without_a_backend_are_refused_without_a_leak(void) {
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
+static void test_local_two_contacts_must_be_of_one_kind(void) {
     static iwl_hal_t other;
     static char second_name[200];
     const char *cause = NULL;
@@ -397,7 +397,7 @@ static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
+static void test_local_without_an_estop_is_released(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&other, bus_name, &(iwl_estop_config_t){.name = "none"}, &cause));
@@ -449,7 +449,7 @@ static void test_local_hub_absent_at_start_is_retried_after_20_ms(void) {
     iwl_hal_close(&other);
 }
 
-static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
+static void test_local_bus_off_lasts_until_a_new_hub(void) {
     iw_can_frame_t heard;
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
@@ -484,7 +484,7 @@ static void test_local_without_descriptors_open_fails_and_poll_retries(void) {
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
-static void test_local_bus_has_no_timing_and_an_echo_that_proves(void) {
+static void test_local_bus_has_no_timing_and_a_proven_echo(void) {
     const iwl_bus_link_t *link = iwl_hal_link(&hal);
     TEST_ASSERT_EQUAL_INT(IWL_LINK_LOCAL, link->presence);
     TEST_ASSERT_TRUE(link->is_virtual);
@@ -499,10 +499,10 @@ int main(void) {
     (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
     UNITY_BEGIN();
     RUN_TEST(test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark);
-    RUN_TEST(test_local_bus_has_no_timing_and_an_echo_that_proves);
+    RUN_TEST(test_local_bus_has_no_timing_and_a_proven_echo);
     RUN_TEST(test_local_lost_hub_is_retried_with_growing_intervals);
     RUN_TEST(test_local_hub_absent_at_start_is_retried_after_20_ms);
-    RUN_TEST(test_local_bus_off_lasts_until_the_hub_is_another);
+    RUN_TEST(test_local_bus_off_lasts_until_a_new_hub);
     RUN_TEST(test_local_without_descriptors_open_fails_and_poll_retries);
     RUN_TEST(test_local_frames_of_several_batches_arrive_in_order);
     RUN_TEST(test_local_frame_formats_differ);
@@ -510,18 +510,18 @@ int main(void) {
     RUN_TEST(test_local_hub_lost_and_back_between_reads_is_reported_once);
     RUN_TEST(test_local_half_read_batch_is_dropped_when_the_hub_is_lost);
     RUN_TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off);
-    RUN_TEST(test_local_error_frames_change_the_state_and_are_no_frames);
+    RUN_TEST(test_local_error_frames_change_only_the_state);
     RUN_TEST(test_local_state_frames_of_clients_cannot_end_bus_off);
     RUN_TEST(test_local_restart_reports_a_missed_bus_off);
     RUN_TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss);
     RUN_TEST(test_local_full_hub_refuses_the_frame_and_stays_active);
     RUN_TEST(test_local_estop_is_unreadable_until_the_first_byte);
     RUN_TEST(test_local_estop_pulse_between_two_reads_is_an_edge);
-    RUN_TEST(test_estop_any_byte_but_zero_is_pressed);
+    RUN_TEST(test_local_estop_any_byte_but_zero_is_pressed);
     RUN_TEST(test_local_estop_reconnected_is_unreadable_until_first_byte);
-    RUN_TEST(test_hal_names_without_a_backend_are_refused_without_a_leak);
-    RUN_TEST(test_hal_opens_two_contacts_of_one_kind_or_none);
-    RUN_TEST(test_hal_without_an_estop_is_released_and_watches_nothing);
+    RUN_TEST(test_local_names_without_a_backend_leave_no_descriptor_open);
+    RUN_TEST(test_local_two_contacts_must_be_of_one_kind);
+    RUN_TEST(test_local_without_an_estop_is_released);
     const int failed = UNITY_END();
     (void)unlink(bus_name + 5);
     (void)unlink(estop_name + 5);

@@ -154,7 +154,7 @@ static void test_netlink_controller_values_are_all_parsed(void) {
     TEST_ASSERT_EQUAL_UINT32(10, reading.link.queue_length);
 }
 
-static void test_controller_states(void) {
+static void test_netlink_controller_states_map_to_bus_states(void) {
     parse_state(CAN_STATE_ERROR_ACTIVE, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_WARNING, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_PASSIVE, IW_BUS_PASSIVE);
@@ -180,14 +180,14 @@ static void test_netlink_controller_modes_set_echo_proven_and_mute(void) {
     TEST_ASSERT_TRUE(reading.link.is_mute);
 }
 
-static void test_controller_without_the_echo_flag_proves_nothing(void) {
+static void test_netlink_controller_without_echo_flag_is_not_proven(void) {
     begin(IFF_UP);
     add_controller(&(controller_t){.bitrate = 1000000});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_interface_that_is_down_has_no_state_of_its_own(void) {
+static void test_netlink_interface_down_ignores_the_controller_state(void) {
     begin(IFF_ECHO);
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -195,7 +195,7 @@ static void test_interface_that_is_down_has_no_state_of_its_own(void) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, reading.state);
 }
 
-static void test_virtual_interface_has_no_timing_and_is_active_while_up(void) {
+static void test_netlink_virtual_interface_is_active_without_timing(void) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "vcan");
@@ -217,7 +217,7 @@ static void test_netlink_interface_of_another_type_is_not_can(void) {
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_values_that_are_too_short_are_not_reported(void) {
+static void test_netlink_values_that_are_too_short_are_not_reported(void) {
     begin(IFF_UP | IFF_ECHO);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "can");
@@ -231,7 +231,7 @@ static void test_values_that_are_too_short_are_not_reported(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, reading.state);
 }
 
-static void test_a_kind_that_only_begins_like_a_controller_is_none(void) {
+static void test_netlink_kind_with_the_prefix_can_is_virtual(void) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "canary");
@@ -249,7 +249,7 @@ static void test_netlink_messages_of_another_kind_are_refused(void) {
     TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
 }
 
-static void test_attributes_cut_short_anywhere_are_survived(void) {
+static void test_netlink_attributes_cut_anywhere_do_not_crash(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625});
     const uint32_t whole = message->nlmsg_len;
@@ -316,7 +316,7 @@ static void test_netlink_restart_refused_by_the_kernel_fails_immediately(void) {
     TEST_ASSERT_EQUAL_UINT(2, kernel->asked);
 }
 
-static void test_restart_that_was_killed_has_failed(void) {
+static void test_netlink_restart_process_that_was_killed_has_failed(void) {
     const pid_t process = fork();
     siginfo_t ended;
     if (process == 0) {
@@ -334,20 +334,20 @@ int main(void) {
     }
     UNITY_BEGIN();
     RUN_TEST(test_netlink_controller_values_are_all_parsed);
-    RUN_TEST(test_controller_states);
+    RUN_TEST(test_netlink_controller_states_map_to_bus_states);
     RUN_TEST(test_netlink_controller_modes_set_echo_proven_and_mute);
-    RUN_TEST(test_controller_without_the_echo_flag_proves_nothing);
-    RUN_TEST(test_interface_that_is_down_has_no_state_of_its_own);
-    RUN_TEST(test_virtual_interface_has_no_timing_and_is_active_while_up);
+    RUN_TEST(test_netlink_controller_without_echo_flag_is_not_proven);
+    RUN_TEST(test_netlink_interface_down_ignores_the_controller_state);
+    RUN_TEST(test_netlink_virtual_interface_is_active_without_timing);
     RUN_TEST(test_netlink_interface_of_another_type_is_not_can);
-    RUN_TEST(test_values_that_are_too_short_are_not_reported);
-    RUN_TEST(test_a_kind_that_only_begins_like_a_controller_is_none);
+    RUN_TEST(test_netlink_values_that_are_too_short_are_not_reported);
+    RUN_TEST(test_netlink_kind_with_the_prefix_can_is_virtual);
     RUN_TEST(test_netlink_messages_of_another_kind_are_refused);
-    RUN_TEST(test_attributes_cut_short_anywhere_are_survived);
+    RUN_TEST(test_netlink_attributes_cut_anywhere_do_not_crash);
     RUN_TEST(test_netlink_socket_has_no_group_and_is_closed_once);
     RUN_TEST(test_netlink_request_reads_the_reply_with_its_sequence);
     RUN_TEST(test_netlink_restart_retries_up_until_the_link_is_up);
     RUN_TEST(test_netlink_restart_refused_by_the_kernel_fails_immediately);
-    RUN_TEST(test_restart_that_was_killed_has_failed);
+    RUN_TEST(test_netlink_restart_process_that_was_killed_has_failed);
     return UNITY_END();
 }

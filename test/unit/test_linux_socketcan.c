@@ -353,7 +353,7 @@ TEST(test_socketcan_down_at_start_is_reported_without_netlink) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
 }
 
-TEST(test_interface_without_sockets_is_down_until_it_has_some) {
+TEST(test_socketcan_interface_without_sockets_is_down) {
     iw_can_frame_t frame;
     iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
@@ -367,7 +367,7 @@ TEST(test_interface_without_sockets_is_down_until_it_has_some) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_full_queue_is_no_loss) {
+TEST(test_socketcan_full_queue_is_no_loss) {
     fake_interface.send_result = 0;
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
@@ -401,7 +401,7 @@ TEST(test_socketcan_purge_result_survives_a_link_reading) {
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, link_now()->purge);
 }
 
-TEST(test_load_counts_the_frames_of_ours_and_of_others) {
+TEST(test_socketcan_load_counts_all_frames) {
     wait_ms(1000);
     TEST_ASSERT_EQUAL_UINT32(0, link_now()->load_permille);
     for (unsigned i = 0; i < 20U; i++) {
@@ -422,7 +422,7 @@ TEST(test_load_counts_the_frames_of_ours_and_of_others) {
     TEST_ASSERT_EQUAL_UINT32(2U * ours, link_now()->load_permille);
 }
 
-TEST(test_purge_that_was_not_allowed_is_not_tried_again) {
+TEST(test_socketcan_purge_that_was_not_permitted_is_not_retried) {
     (void)iwl_bus_purge(&store);
     fake_interface.restart_result = EPERM;
     wait_ms(1);

@@ -99,7 +99,7 @@ TEST(test_command_correlation_data_is_stored_up_to_its_limit) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled(3, NULL, MQTT_CORRELATION_MAX + 1U));
 }
 
-TEST(test_command_cannot_make_its_own_life_longer) {
+TEST(test_command_ttl_cannot_extend_its_age_limit) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 1, ",\"ttl_ms\":1000", NOW_US + 300001U));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
@@ -110,7 +110,7 @@ TEST(test_command_of_another_boot_is_dropped_before_its_age) {
     TEST_ASSERT_EQUAL(MQTT_OTHER_BOOT, judge_text("stop", text, NOW_US));
 }
 
-TEST(test_command_seq_must_rise) {
+TEST(test_command_seq_must_increase) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 5, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 5, "", NOW_US + 1U));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 4, "", NOW_US + 1000000U));
@@ -132,7 +132,7 @@ TEST(test_stop_never_needs_a_seq_that_rises_or_a_place) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_text("stop", text, NOW_US + 1000001U));
 }
 
-TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive) {
+TEST(test_command_reset_needs_its_stop_and_the_drive_age_limit) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, ",\"stop\":\"4\"", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("reset", NOW_US, 2, ",\"stop\":4", NOW_US + 300000U));
@@ -174,7 +174,7 @@ TEST(test_command_of_one_sender_too_many_is_dropped) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("why", text, NOW_US + 1000001U));
 }
 
-TEST(test_command_retained_is_dropped_hello_too) {
+TEST(test_command_retained_is_dropped_including_hello) {
     const char *text = "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1}";
     static const char *const verbs[] = {"stop", "estop", "hello", "drive"};
     for (size_t i = 0; i < 4U; i++) {
@@ -185,12 +185,12 @@ TEST(test_command_retained_is_dropped_hello_too) {
     TEST_ASSERT_EQUAL_UINT64(4, judge.counts[MQTT_RETAINED]);
 }
 
-TEST(test_command_hello_needs_no_time) {
+TEST(test_command_hello_without_a_time_is_accepted) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("hello", "{\"from\":\"far\",\"seq\":1}", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_text("stop", "{\"from\":\"far\",\"seq\":2}", NOW_US));
 }
 
-TEST(test_command_that_drives_needs_the_right_stop_never) {
+TEST(test_command_that_drives_needs_the_right_and_stop_does_not) {
     static const char *const verbs[] = {"arm", "drive", "twist", "reset"};
     rules.may_drive = false;
     rules.may_reset = false;
@@ -244,7 +244,7 @@ TEST(test_command_too_long_is_garbled) {
 
 // ---- topics and messages ------------------------------------------------------------------------------------------
 
-TEST(test_topics_are_of_this_machine_only) {
+TEST(test_topics_of_other_machines_are_not_parsed) {
     char topic[MQTT_TOPIC_SIZE];
     mqtt_topic("w1", "event", "stop", topic);
     TEST_ASSERT_EQUAL_STRING("iwheel/w1/event/stop", topic);
@@ -269,7 +269,7 @@ TEST(test_messages_of_the_gateway_follow_the_fields_of_the_bridge) {
                                  text, length);
 }
 
-TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply) {
+TEST(test_reply_quotes_time_seq_and_reply_of_the_gateway) {
     char text[512];
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";

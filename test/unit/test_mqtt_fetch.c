@@ -225,7 +225,7 @@ TEST(test_fetch_always_late_fails_with_the_last_reason) {
     TEST_ASSERT_LESS_THAN_UINT(300, sent);
 }
 
-TEST(test_fetch_one_is_chosen_by_name_or_number) {
+TEST(test_fetch_recording_is_selected_by_name_or_number) {
     list();
     fetch_choose(&fetch, "3", now_us);
     TEST_ASSERT_EQUAL_size_t(0, fetch.chosen);

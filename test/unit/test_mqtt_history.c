@@ -186,7 +186,7 @@ TEST(test_history_with_an_unchecked_end_reports_it) {
     TEST_ASSERT_NOT_NULL(strstr(text(), "; its end is not checked"));
 }
 
-TEST(test_history_gap_has_its_cause) {
+TEST(test_history_gap_is_printed_with_its_cause) {
     begin((history_config_t){0});
     info("a", 4, 1, 9, 0, 5);
     stop("a", 1, 1, 1, 1);

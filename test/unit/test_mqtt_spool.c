@@ -85,7 +85,7 @@ TEST(test_spool_new_is_empty) {
     expect(1, 0);
 }
 
-TEST(test_spool_events_outlive_the_process_in_order) {
+TEST(test_spool_events_survive_a_restart_in_order) {
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
@@ -156,7 +156,7 @@ TEST(test_spool_full_drops_deferred_events_first) {
     TEST_ASSERT_EQUAL_UINT64(2, event.number);
 }
 
-TEST(test_spool_of_others_is_refused) {
+TEST(test_spool_writable_by_others_or_linked_is_refused) {
     char second[96];
     TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0777));

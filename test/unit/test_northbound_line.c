@@ -93,7 +93,7 @@ TEST(test_line_that_does_not_fit_is_not_written_at_any_size) {
     TEST_ASSERT_EQUAL_UINT(0, iwn_line_write(&beyond, bytes, sizeof bytes));
 }
 
-TEST(test_line_with_any_bit_turned_is_refused) {
+TEST(test_line_with_any_flipped_bit_is_refused) {
     const iwn_line_t sent = stamped(3, 1250000, "{\"ok\":true}");
     const size_t length = iwn_line_write(&sent, bytes, sizeof bytes) - 1U;
     for (size_t bit = 0; bit < length * 8U; bit++) {

@@ -83,7 +83,7 @@ TEST(test_client_lines_of_one_read_are_in_order_and_a_part_waits) {
     expect_line("half");
 }
 
-TEST(test_client_half_a_line_at_the_end_is_never_a_line) {
+TEST(test_client_part_of_a_line_at_the_end_is_no_line) {
     say("stop");
     (void)shutdown(peer, SHUT_WR);
     sock_client_read(&client);
@@ -209,7 +209,7 @@ TEST(test_client_with_bytes_in_its_socket_is_not_caught_up) {
     TEST_ASSERT_EQUAL_UINT64(6, client.caught_up_us);
 }
 
-TEST(test_client_that_filled_the_buffer_is_not_caught_up) {
+TEST(test_client_with_a_full_buffer_is_not_caught_up) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
     }

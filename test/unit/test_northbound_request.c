@@ -187,7 +187,7 @@ TEST(test_request_line_of_4096_bytes_is_the_longest) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, refusal.error);
 }
 
-TEST(test_request_worst_lines_are_read_to_their_end) {
+TEST(test_request_with_the_most_values_has_a_defined_refusal) {
     static const char *const units[] = {"{},", "[],", "\"\",", "1,", "1.5,", "{\"a\":1},", "[1],", "\"\\u20ac\","};
     char line[IWN_LINE_MAX];
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {

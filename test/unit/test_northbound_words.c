@@ -138,7 +138,7 @@ TEST(test_why_shows_three_decimals_of_any_time) {
     }
 }
 
-TEST(test_why_that_does_not_fit_is_cut_and_ends) {
+TEST(test_why_that_does_not_fit_is_cut_and_terminated) {
     char text[24];
     const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_CLIENT_STOP};
     memset(text, 'x', sizeof text);

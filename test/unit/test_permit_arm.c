@@ -219,7 +219,7 @@ TEST(test_permit_arm_after_a_zero_drive_is_accepted) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-TEST(test_permit_drive_while_arming_is_refused_and_does_not_move) {
+TEST(test_permit_drive_while_arming_is_refused) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -302,7 +302,7 @@ TEST(test_permit_arm_in_stopping_needs_zero_and_standstill) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 
-TEST(test_permit_arming_in_stopping_never_sends_anything_but_zero) {
+TEST(test_permit_arming_in_stopping_sends_only_zero) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(600));
     (void)permit_rig_arm(&rig, OTHER);

@@ -173,7 +173,7 @@ TEST(test_permit_stop_after_a_cut_one_ramps_again) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
 }
 
-TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows) {
+TEST(test_permit_cut_stop_stays_cut_after_a_ramping_cause) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);

@@ -189,7 +189,7 @@ TEST(test_permit_reset_of_a_latch_from_listening_is_accepted) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing) {
+TEST(test_permit_reset_while_not_latched_changes_nothing) {
     for (int situation = 0; situation < PERMIT_LATCHED; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
         const iw_permit_t before = rig.permit;

@@ -266,7 +266,7 @@ TEST(test_permit_keep_ends_by_a_second_master) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-TEST(test_permit_keep_lasts_through_every_other_fault) {
+TEST(test_permit_keep_continues_through_every_other_fault) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,     IW_CAUSE_BUS_DOWN,   IW_CAUSE_SEND_STALLED,
                                         IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_OVERSPEED};
     for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {

@@ -301,7 +301,7 @@ TEST(test_permit_stop_needs_no_lease_and_ramps) {
     }
 }
 
-TEST(test_permit_stop_elsewhere_changes_nothing) {
+TEST(test_permit_stop_while_not_sending_changes_nothing) {
     static const permit_situation_t situations[] = {PERMIT_LISTENING, PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
     for (size_t i = 0; i < 4; i++) {
         permit_rig_begin(&rig, situations[i]);
@@ -311,7 +311,7 @@ TEST(test_permit_stop_elsewhere_changes_nothing) {
     }
 }
 
-TEST(test_permit_moving_again_after_stop_needs_arm_and_pause) {
+TEST(test_permit_arm_after_a_stop_needs_500_ms_without_a_drive) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_arm(&rig, HOLDER));
     permit_rig_wait(&rig, MS(500));

@@ -34,7 +34,7 @@ TEST(test_rolling_begins_after_300_ms_and_ends_after_300_ms) {
     TEST_ASSERT_FALSE(rolling.is_fault);
 }
 
-TEST(test_rolling_pushes_shorter_than_300_ms_do_not_add_up) {
+TEST(test_rolling_pulses_shorter_than_300_ms_do_not_add_up) {
     for (uint32_t i = 0; i < 20U; i++) {
         run(true, 290);
         run(false, 1);

@@ -128,7 +128,7 @@ TEST(test_ages_after_a_clock_set_back_a_stream_is_known_again) {
     }
 }
 
-TEST(test_ages_clock_set_forward_only_refuses) {
+TEST(test_ages_clock_set_forward_makes_earlier_samples_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 0));
     const int64_t sent_us = wall_us;
     wall_us += 60 * SECOND;

@@ -231,7 +231,7 @@ static uint32_t count_before(size_t end) {
     return rtps_read(message + end - 4U, 4, true);
 }
 
-TEST(test_firsts_first_acknack_is_that_of_fast_dds) {
+TEST(test_firsts_first_acknack_asks_from_sequence_zero) {
     for (unsigned little = 0; little < 2U; little++) {
         begin_message(1);
         put_destination(15, 12);

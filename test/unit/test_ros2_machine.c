@@ -70,7 +70,7 @@ TEST(test_odometry_turn_to_the_left_is_positive_without_drift) {
     expect_near(0.01, 0.0, odometry.x_m);
 }
 
-TEST(test_odometry_quarter_circle_ends_where_it_must) {
+TEST(test_odometry_quarter_circle_has_the_exact_pose) {
     const double radius_mm = 1000.0;
     for (int i = 0; i <= 1000; i++) {
         const double angle = M_PI / 2.0 * i / 1000.0;
@@ -256,7 +256,7 @@ TEST(test_diagnosis_button_never_pressed_is_a_warning) {
     expect(ROS_TELLS_ESTOP, ROS_OK, "released");
 }
 
-TEST(test_diagnosis_all_in_order_is_ok) {
+TEST(test_diagnosis_without_a_fault_is_ok) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&facts, (ros_tells_t)i, &status);
         TEST_ASSERT_EQUAL_MESSAGE(ROS_OK, status.level, status.message);

@@ -109,7 +109,7 @@ TEST(test_service_request_of_another_type_is_unreadable) {
 
 // ---- sample identity ------------------------------------------------------------------------------------------------
 
-TEST(test_service_identity_is_the_writers_and_the_number) {
+TEST(test_service_identity_is_the_writer_and_the_number) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         begin_message();
@@ -121,7 +121,7 @@ TEST(test_service_identity_is_the_writers_and_the_number) {
     }
 }
 
-TEST(test_service_identity_is_the_one_that_inline_qos_names) {
+TEST(test_service_identity_in_inline_qos_has_priority) {
     static const uint8_t kinds[2][2] = {{0x83, 0}, {0x0F, 0x80}};
     for (unsigned i = 0; i < 2U; i++) {
         uint8_t qos[40] = {0x71, 0, 4, 0, 0, 0, 0, 1, kinds[i][0], kinds[i][1], 24, 0, 'c', 'l', 'i', 'e', 'n', 't'};

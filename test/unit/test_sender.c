@@ -54,7 +54,7 @@ TEST(test_sender_starts_with_zero_counters_and_no_pending_frame) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender.verdict);
 }
 
-TEST(test_sender_first_pair_ends_no_gap) {
+TEST(test_sender_first_pair_has_no_gap) {
     send_whole(0);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
@@ -73,7 +73,7 @@ TEST(test_sender_retains_the_largest_gap_until_it_rests) {
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
 }
 
-TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair) {
+TEST(test_sender_zero_to_one_wheel_only_is_no_complete_pair) {
     static const iw_side_t blocked[] = {IW_LEFT, IW_RIGHT};
     for (size_t i = 0; i < 2; i++) {
         setUp();

@@ -55,7 +55,7 @@ TEST(test_link_is_up_from_its_event_on) {
     TEST_ASSERT_EQUAL_UINT(1, line.channel);
 }
 
-TEST(test_link_another_boot_is_another_board) {
+TEST(test_link_another_boot_is_a_new_link) {
     (void)hear_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 6000000, 20));
     TEST_ASSERT_EQUAL_STRING(OTHER, state.boot);

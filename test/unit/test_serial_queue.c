@@ -48,7 +48,7 @@ TEST(test_queue_kind_of_each_command_is_that_of_its_effect) {
     TEST_ASSERT_EQUAL_INT(SERIAL_ASKS, serial_kind_of(IWN_CMD_STATUS));
 }
 
-TEST(test_queue_sends_one_and_the_next_when_it_is_answered) {
+TEST(test_queue_sends_the_next_request_after_the_reply) {
     serial_request_t *first = put(SERIAL_ASKS, NOW);
     serial_request_t *second = put(SERIAL_ASKS, NOW);
     TEST_ASSERT_EQUAL_PTR(first, send_next(NOW));
@@ -167,7 +167,7 @@ TEST(test_queue_reply_without_a_request_is_rejected) {
     TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, serial_queue_answered(&queue)->error);
 }
 
-TEST(test_queue_is_full_and_empty_again) {
+TEST(test_queue_full_refuses_until_it_is_drained) {
     for (unsigned round = 0; round < 3U; round++) {
         for (unsigned i = 0; i < SERIAL_QUEUE_SIZE; i++) {
             TEST_ASSERT_FALSE(serial_queue_is_full(&queue));

@@ -403,7 +403,7 @@ static bool board_restarts(void) {
     return (step < 40U) ? event_before_hello() : step == 50U;
 }
 
-static void test_relay_client_ends_with_its_start_of_the_board(void) {
+static void test_relay_client_is_closed_by_a_restart_of_the_board(void) {
     run(board_restarts);
 }
 
@@ -606,7 +606,7 @@ int main(void) {
     RUN_TEST(test_relay_arm_during_a_stall_is_not_sent);
     RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
     RUN_TEST(test_relay_event_before_hello_is_dropped);
-    RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
+    RUN_TEST(test_relay_client_is_closed_by_a_restart_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_does_not_end_the_relay);
     RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
     RUN_TEST(test_relay_reason_follows_the_received_bytes);

@@ -54,7 +54,7 @@ TEST(test_setpoint_braking_follows_time_at_every_period) {
     }
 }
 
-/// After 35 minutes the product of slope and time would overflow 32 bits to a small step.
+/// In 32 bits the product of slope and time would wrap to a step of zero after 35 minutes.
 TEST(test_setpoint_braking_has_ended_after_any_pause) {
     rig.config.decel_mm_s2 = 2048;
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);

@@ -200,7 +200,7 @@ TEST(test_setpoint_same_command_again_does_not_move_the_pair) {
     assert_only_due_from(last_us + MS(20));
 }
 
-TEST(test_setpoint_command_storm_is_spaced_and_never_starves) {
+TEST(test_setpoint_command_burst_is_spaced_without_a_missing_pair) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     iw_time_us_t last_us = FIXTURE_START_US;

@@ -79,7 +79,7 @@ TEST(test_bus_lowest_id_wins_when_several_wait) {
     expect_none(START_US + SECOND);
 }
 
-TEST(test_bus_frame_that_has_begun_is_not_displaced) {
+TEST(test_bus_frame_under_way_is_not_replaced_by_a_lower_id) {
     sim_bus_open(&bus, 0U, 4U, false);
     sim_bus_open(&bus, 1U, 4U, false);
     submit(START_US, 0U, 545U);

@@ -54,7 +54,7 @@ TEST(test_sim_pair_neither_sends_nor_receives_while_it_boots) {
     TEST_ASSERT_TRUE(sim_pair_acknowledges(&pair));
 }
 
-TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start) {
+TEST(test_sim_pair_offset_frames_end_60_s_after_the_start) {
     rig_run(START_US, START_US + 100U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[513].count);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[545].count);
@@ -208,7 +208,7 @@ TEST(test_sim_pair_bytes_do_not_depend_on_the_steps) {
     TEST_ASSERT_GREATER_THAN_UINT32(12000U, frames);
 }
 
-TEST(test_pair_another_seed_gives_other_noise) {
+TEST(test_sim_pair_another_seed_gives_other_noise) {
     static sim_pair_t other;
     sim_sent_t sent;
     uint32_t differ = 0U;
@@ -221,7 +221,7 @@ TEST(test_pair_another_seed_gives_other_noise) {
     TEST_ASSERT_GREATER_THAN_UINT32(50U, differ);
 }
 
-TEST(test_pair_null_configuration_is_the_default) {
+TEST(test_sim_pair_null_configuration_is_the_default) {
     static sim_pair_t standard;
     sim_sent_t one;
     sim_sent_t other;

@@ -63,7 +63,7 @@ static sim_wheel_t *wheel(iw_side_t side) {
     return &world.pair.wheel[side];
 }
 
-TEST(test_panel_every_command_with_right_arguments_is_done) {
+TEST(test_panel_every_command_with_valid_arguments_is_executed) {
     static const char *const right[] = {
         "power off",
         "power on",
@@ -378,7 +378,7 @@ static unsigned all_lines(const char *list) {
 }
 
 /// The list contains the help of each command once, and no other help.
-TEST(test_panel_lists_are_those_of_the_tables) {
+TEST(test_panel_help_lists_exactly_the_commands) {
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_wheel), expect_listed(sim_wheel_commands, sim_commands_wheel));
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_bus), expect_listed(sim_bus_commands, sim_commands_bus) + 1U);
     TEST_ASSERT_EQUAL_UINT(1U, lines_of(sim_commands_bus, "help"));
@@ -409,7 +409,7 @@ TEST(test_panel_status_has_the_last_setpoint_and_its_age) {
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint_age_ms\":499,\"driven\":true"));
 }
 
-TEST(test_panel_status_that_does_not_fit_is_cut_and_ended) {
+TEST(test_panel_status_that_does_not_fit_is_cut_and_terminated) {
     char small[40];
     memset(small, 0x5A, sizeof small);
     TEST_ASSERT_EQUAL_size_t(sizeof small - 1U, sim_panel_status(&panel, NOW_US, small, sizeof small));
@@ -430,7 +430,7 @@ TEST(test_panel_commands_reach_the_side_they_name) {
     TEST_ASSERT_EQUAL_INT32(12500, wheel(IW_RIGHT)->force.load_mN);
 }
 
-TEST(test_panel_mark_and_quit_reach_the_hooks) {
+TEST(test_panel_mark_and_quit_call_their_hooks) {
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge looks here"));
     TEST_ASSERT_EQUAL_STRING("the judge looks here", marked);
     expect_done("quit");

@@ -36,7 +36,7 @@ TEST(test_sim_pair_load_after_2_s_does_not_change_the_offset) {
     TEST_ASSERT_INT_WITHIN(600, 1230 + 10000, rig_last(512U).as.force.force_raw);
 }
 
-TEST(test_pair_load_sways_by_five_percent_at_0_7_hertz) {
+TEST(test_sim_pair_load_varies_by_5_percent_at_0_7_hertz) {
     int32_t low = INT32_MAX;
     int32_t high = INT32_MIN;
     unsigned rising = 0U;
@@ -74,7 +74,7 @@ TEST(test_sim_pair_with_zero_removed_sends_its_offset) {
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
 }
 
-TEST(test_pair_force_saturates_and_can_be_forced_to_any_raw_value) {
+TEST(test_sim_pair_force_saturates_or_has_a_set_raw_value) {
     pair.wheel[IW_LEFT].force.load_mN = 4000000;
     pair.wheel[IW_RIGHT].force.load_mN = -4000000;
     rig_run(START_US, START_US + 1U * SECOND);
@@ -116,7 +116,7 @@ TEST(test_sim_pair_swapped_sign_negates_rpm_and_ticks) {
     TEST_ASSERT_LESS_THAN_INT32(-60, rig_last(289U).as.status.odometry_ticks);
 }
 
-TEST(test_pair_ticks_wrap_at_the_end_of_int32) {
+TEST(test_sim_pair_ticks_wrap_at_the_end_of_int32) {
     rig_run(START_US, BOOTED);
     pair.wheel[IW_LEFT].motion.ticks = INT32_MAX;
     rig_drive(500, 500);
@@ -125,7 +125,7 @@ TEST(test_pair_ticks_wrap_at_the_end_of_int32) {
     TEST_ASSERT_GREATER_THAN_INT32(INT32_MIN + 20, rig_last(257U).as.status.odometry_ticks);
 }
 
-TEST(test_pair_straight_drive_ends_straight_ahead) {
+TEST(test_sim_pair_straight_drive_has_a_straight_pose) {
     rig_run(START_US, BOOTED);
     rig_drive(500, 500);
     rig_run(BOOTED, START_US + 10U * SECOND);
@@ -148,14 +148,14 @@ TEST(test_sim_pair_turn_on_the_spot_turns_by_distance_over_track) {
     TEST_ASSERT_INT_WITHIN(15, 0, pose.y_mm);
 }
 
-TEST(test_pair_curve_to_the_left_has_positive_y_and_psi) {
+TEST(test_sim_pair_curve_to_the_left_has_positive_y_and_psi) {
     rig_drive(250, 350);
     rig_run(START_US, START_US + 5U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT16(500, rig_last(290U).as.pose.y_mm);
     TEST_ASSERT_GREATER_THAN_INT16(600, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_pose_needs_the_left_wheel_on_the_bus) {
+TEST(test_sim_pair_pose_needs_the_left_wheel_on_the_bus) {
     pair.wheel[IW_LEFT].muted = true;
     rig_drive(300, 300);
     rig_run(START_US, START_US + 4U * SECOND);
@@ -172,7 +172,7 @@ TEST(test_sim_pair_mirrored_wheel_is_negated_in_the_pose) {
     TEST_ASSERT_INT_WITHIN(15, 0, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi) {
+TEST(test_sim_pair_pose_saturates_in_x_and_wraps_in_psi) {
     rig_run(START_US, BOOTED);
     pair.pose.x_nm = INT64_C(40000000000);
     pair.pose.y_nm = INT64_C(-40000000000);
@@ -183,7 +183,7 @@ TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi) {
     TEST_ASSERT_EQUAL_INT(33000 - 65536, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_battery_sags_under_load_and_temperature_rises) {
+TEST(test_sim_pair_battery_drops_and_temperature_rises_under_load) {
     rig_run(START_US, START_US + 2U * SECOND);
     TEST_ASSERT_EQUAL_UINT8(248U, rig_last(257U).as.status.battery_dV);
     TEST_ASSERT_EQUAL_UINT8(28U, rig_last(257U).as.status.temperature_degC);

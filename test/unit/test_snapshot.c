@@ -352,7 +352,7 @@ TEST(test_snapshot_failed_arming_has_refusal_and_left_behind) {
 }
 
 /// Counters that ordinary runs do not change, each with a separate value.
-TEST(test_snapshot_every_count_of_sending_is_its_own) {
+TEST(test_snapshot_counters_of_sending_are_not_exchanged) {
     gateway_rig_arm(&rig);
     rig.gateway.sender.sent.later = 101;
     rig.gateway.sender.sent.clamped = 102;

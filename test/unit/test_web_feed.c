@@ -182,7 +182,7 @@ TEST(test_metrics_counts_continue_after_a_gateway_restart) {
     expect_line("\niwheel_last_stop_number 2\n");
 }
 
-TEST(test_metrics_name_the_version) {
+TEST(test_metrics_have_the_version) {
     expect_line("\niwheel_build_info{version=\"" IWHEEL_VERSION "\"} 1\n");
 }
 
@@ -299,7 +299,7 @@ TEST(test_token_that_others_can_read_is_refused) {
     end_token();
 }
 
-TEST(test_token_that_is_only_read_is_never_made) {
+TEST(test_token_that_is_only_read_is_never_created) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 1);

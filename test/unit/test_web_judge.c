@@ -104,7 +104,7 @@ TEST(test_request_without_proof_is_refused) {
     }
 }
 
-TEST(test_secret_for_reading_only_reads) {
+TEST(test_secret_for_reading_grants_only_reading) {
     static const char *const commands[] = {"/api/estop", "/api/arm", "/api/drive", "/api/reset"};
     rules.may_drive = true;
     rules.may_reset = true;
@@ -138,7 +138,7 @@ TEST(test_header_given_twice_is_refused) {
     TEST_ASSERT_EQUAL_UINT(400, status());
 }
 
-TEST(test_unknown_path_and_other_method_are_refused) {
+TEST(test_request_to_unknown_path_or_method_is_refused) {
     static const char *const nowhere[] = {"/api", "/api/status/", "/../etc/passwd",   "/%2e%2e/token", "//",
                                           "",     "/index.html",  "/uPlot.LICENSE/.."};
     for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++) {
@@ -272,7 +272,7 @@ TEST(test_drive_command_beyond_limits_counts_as_motion) {
     TEST_ASSERT_FALSE(web_command_moves(&command));
 }
 
-TEST(test_age_of_arm_and_reset_has_two_ends) {
+TEST(test_arm_and_reset_outside_their_age_limits_are_refused) {
     static const char *const wrong[] = {NULL, "", "x", "-1", "3999999", "5100001", "0", "9223372036854775807"};
     static const char *const good[] = {"4000000", "5000000", "5100000"};
     int64_t t_us = 7;

@@ -74,7 +74,7 @@ TEST(test_proof_of_another_request_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, judge("POST", "/api/arm?t_us=1", text));
 }
 
-TEST(test_proof_in_another_form_is_wrong) {
+TEST(test_proof_in_another_spelling_is_wrong) {
     static const char *const forms[] = {"IWheel %s %s %u %s x",  "IWheel %s %s %u %s ", "IWheel %.31s %s %u %s",
                                         "IWheel %s %.31s %u %s", "IWheel %s %s -%u %s", "IWheel %s %s %u %.63s",
                                         "iwheel %s %s %u %s",    "Bearer %s %s %u %s"};
@@ -88,7 +88,7 @@ TEST(test_proof_in_another_form_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("POST", "/api/arm?t_us=1", "IWheel "));
 }
 
-TEST(test_session_begins_only_with_a_nonce_in_force) {
+TEST(test_session_begins_only_with_a_valid_nonce) {
     now_us = proofs.renew_us + WEB_NONCE_US - 1U; // The previous nonce.
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     setUp();

@@ -174,7 +174,7 @@ TEST(test_wheel_jump_of_2_31_ticks_is_judged_to_the_tick) {
     TEST_ASSERT_EQUAL_INT64(INT32_MIN, wheel.ticks);
 }
 
-TEST(test_wheel_distance_and_speed_of_the_documented_wheel) {
+TEST(test_wheel_distance_and_speed_match_the_documented_wheel) {
     hear_ticks(0);
     hear_ticks(10);
     TEST_ASSERT_INT64_WITHIN(1000, 201061930, distance_nm());

@@ -17,7 +17,7 @@ static int32_t turn_of(const iw_pair_t *pair) {
     return pair->wheel[IW_RIGHT].speed_mm_s - pair->wheel[IW_LEFT].speed_mm_s;
 }
 
-TEST(test_yaw_bounds_are_those_of_the_real_machine) {
+TEST(test_yaw_bounds_match_the_real_machine) {
     static const struct {
         uint16_t max_mrad_s, accel_mrad_s2, track_mm, radius_mm;
         int32_t most_mm_s;
@@ -106,7 +106,7 @@ TEST(test_yaw_bound_is_the_growth_up_to_the_limit) {
 }
 
 /// 2 um/s are reserved for the rounding of both wheels.
-TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change) {
+TEST(test_yaw_room_is_the_margin_on_the_side_of_the_change) {
     static const struct {
         int32_t bound, from, change;
         uint32_t room;
@@ -119,7 +119,7 @@ TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change) {
     }
 }
 
-TEST(test_yaw_grows_by_its_acceleration_and_to_its_end) {
+TEST(test_yaw_grows_by_its_acceleration_to_its_target) {
     setpoint_rig_follow(&rig);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, -270, 270, 2000);
