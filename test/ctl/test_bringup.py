@@ -34,7 +34,7 @@ class Bringup(unittest.TestCase):
         self.records = os.path.join(self.folder.name, "records")
         with open(self.out + ".from", "w", encoding="utf-8") as file:
             file.write(f"[record]\ndirectory = {self.records}\n")
-        self.runtime = tempfile.mkdtemp(prefix="iwbr-")
+        self.runtime = tempfile.mkdtemp(prefix="iwbr-", dir="/tmp")  # bringup uses a folder of at most 30 characters.
         self.addCleanup(self.nothing_left_behind)
         time.sleep(0.5)
 
