@@ -789,7 +789,7 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
     assert rig.ask("POST", "/api/estop")[0] == 200
     time.sleep(1.2)
     number = newest()
-    for delay_s, burst in ((0.1, 1), (1.2, 1), (5, 20)) + (((60, 100),) if os.environ.get("IWHEEL_FULL") else ()):
+    for delay_s, burst in ((0.1, 1), (1.2, 1), (5, 20)) + (((60, 100),) if os.environ.get("IWHEEL_FULL") == "1" else ()):
         forwarder.delay_s = delay_s
         claims = [reset_of(person, number) for _ in range(burst)]
         with ThreadPoolExecutor(burst) as pool:
