@@ -19,9 +19,9 @@ ARM_CPUS = ("cortex-m4", "cortex-m0plus")
 # Instructions for a line.
 READ_LIMITS = {
     "libiwheel-client, an event `state`": 120000,
-    "the same, and its fields": 160000,
-    "iwheelctl decode": 5000,
-    "iwheelctl decode --csv": 5000,
+    "the same, and its fields": 190000,
+    "iwheelctl decode": 8500,
+    "iwheelctl decode --csv": 8500,
     "iwheelctl --json decode": 6000,
 }
 PROFILE_FROM = 40  # instructions of a function in a step

@@ -4,21 +4,30 @@
 
 #include <string.h>
 
+#define WALK(walk, key) iwc_json_walk((walk), (key), sizeof(key) - 1U)
+
 static iwc_span_t field(const iwc_message_t *message, const char *path) {
     return iwc_json_find((iwc_span_t){message->text, message->length}, path);
 }
 
-iwc_value_t iwc_integer(const iwc_message_t *message, const char *path) {
+static iwc_value_t integer_of(iwc_span_t span) {
     iwc_value_t value = {false, 0};
-    value.known = iwc_json_integer(field(message, path), &value.value);
+    value.known = iwc_json_integer(span, &value.value);
     return value;
 }
 
-iwc_value_t iwc_truth(const iwc_message_t *message, const char *path) {
-    const iwc_span_t value = field(message, path);
+static iwc_value_t truth_of(iwc_span_t value) {
     const bool yes = value.length == 4 && memcmp(value.at, "true", 4) == 0;
     const bool no = value.length == 5 && memcmp(value.at, "false", 5) == 0;
     return (iwc_value_t){yes || no, yes ? 1 : 0};
+}
+
+iwc_value_t iwc_integer(const iwc_message_t *message, const char *path) {
+    return integer_of(field(message, path));
+}
+
+iwc_value_t iwc_truth(const iwc_message_t *message, const char *path) {
+    return truth_of(field(message, path));
 }
 
 /// Bytes of the character, or of the escape, that begins with `byte`.
@@ -65,30 +74,24 @@ const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out
     return value.at;
 }
 
-static iwc_value_t integer_in(iwc_span_t object, const char *key) {
-    iwc_value_t value = {false, 0};
-    value.known = iwc_json_integer(iwc_json_find(object, key), &value.value);
-    return value;
-}
-
-static void read_wheel(const iwc_message_t *message, const char *side, iwc_wheel_t *out_wheel) {
-    const iwc_span_t wheel = field(message, side);
-    const iwc_message_t inner = {.text = wheel.at, .length = wheel.length};
-    *out_wheel = (iwc_wheel_t){
-        .heard = iwc_truth(&inner, "heard").value == 1,
-        .at_rest = iwc_truth(&inner, "at_rest"),
-        .speed_mm_s = integer_in(wheel, "speed_mm_s"),
-        .commanded_mm_s = integer_in(wheel, "commanded_mm_s"),
-        .applied_mm_s = integer_in(wheel, "applied_mm_s"),
-        .distance_mm = integer_in(wheel, "distance_mm"),
-        .battery_dV = integer_in(wheel, "battery_dV"),
-        .temperature_degC = integer_in(wheel, "temperature_degC"),
-        .speed_age_ms = integer_in(wheel, "speed_age_ms"),
-        .force_age_ms = integer_in(wheel, "force_age_ms"),
-    };
-    if (iwc_is(&inner, "force_validity", "valid")) {
-        out_wheel->force_net_mN = integer_in(wheel, "force_net_mN");
+/// Reads the fields in the order of the gateway, so that one walk finds all; another order only costs time.
+static void read_wheel(iwc_span_t span, iwc_wheel_t *out_wheel) {
+    iwc_walk_t wheel = {span, NULL};
+    memset(out_wheel, 0, sizeof *out_wheel);
+    out_wheel->heard = truth_of(WALK(&wheel, "heard")).value == 1;
+    out_wheel->at_rest = truth_of(WALK(&wheel, "at_rest"));
+    out_wheel->speed_mm_s = integer_of(WALK(&wheel, "speed_mm_s"));
+    out_wheel->commanded_mm_s = integer_of(WALK(&wheel, "commanded_mm_s"));
+    out_wheel->applied_mm_s = integer_of(WALK(&wheel, "applied_mm_s"));
+    out_wheel->speed_age_ms = integer_of(WALK(&wheel, "speed_age_ms"));
+    out_wheel->battery_dV = integer_of(WALK(&wheel, "battery_dV"));
+    out_wheel->temperature_degC = integer_of(WALK(&wheel, "temperature_degC"));
+    out_wheel->distance_mm = integer_of(WALK(&wheel, "distance_mm"));
+    const iwc_value_t force_net_mN = integer_of(WALK(&wheel, "force_net_mN"));
+    if (iwc_json_is_text(WALK(&wheel, "force_validity"), "valid")) {
+        out_wheel->force_net_mN = force_net_mN;
     }
+    out_wheel->force_age_ms = integer_of(WALK(&wheel, "force_age_ms"));
 }
 
 static iwc_machine_t machine_of(const iwc_message_t *message) {
@@ -103,9 +106,11 @@ static iwc_machine_t machine_of(const iwc_message_t *message) {
 }
 
 bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state) {
-    size_t length = 0;
-    if (iwc_json(message, "left", &length) == NULL || iwc_json(message, "right", &length) == NULL ||
-        iwc_json(message, "lease", &length) == NULL || iwc_json(message, "state", &length) == NULL) {
+    iwc_walk_t snapshot = {{message->text, message->length}, NULL};
+    const iwc_span_t left = WALK(&snapshot, "left");
+    const iwc_span_t right = WALK(&snapshot, "right");
+    if (left.at == NULL || right.at == NULL || field(message, "lease").at == NULL ||
+        field(message, "state").at == NULL) {
         return false;
     }
     memset(out_state, 0, sizeof(*out_state));
@@ -117,7 +122,7 @@ bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out
     out_state->remaining_ms = iwc_integer(message, "lease.remaining_ms");
     out_state->estop_released = iwc_is(message, "estop.state", "released");
     out_state->bus_active = iwc_is(message, "bus.state", "active");
-    read_wheel(message, "left", &out_state->left);
-    read_wheel(message, "right", &out_state->right);
+    read_wheel(left, &out_state->left);
+    read_wheel(right, &out_state->right);
     return true;
 }

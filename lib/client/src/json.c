@@ -17,18 +17,6 @@ bool iwc_json_is_object(const char *text, size_t length, bool trusted) {
            iwn_json_kind(root) == IWN_JSON_OBJECT;
 }
 
-static iwc_span_t find_key(iwc_span_t object, const char *key, size_t length) {
-    iwn_json_t rest = {object.at + 1};
-    iwn_json_t name;
-    iwn_json_t value;
-    while (iwn_json_next(&rest, &name, &value)) {
-        if (strncmp(name.at + 1, key, length) == 0 && name.at[length + 1U] == '"') {
-            return (iwc_span_t){value.at, (size_t)(rest.at - value.at)};
-        }
-    }
-    return NOTHING;
-}
-
 static iwc_span_t skip_blanks(iwc_span_t text) {
     while (text.length > 0 && strchr(" \t\r\n", text.at[0]) != NULL) {
         text = (iwc_span_t){text.at + 1, text.length - 1U};
@@ -36,19 +24,41 @@ static iwc_span_t skip_blanks(iwc_span_t text) {
     return text;
 }
 
-iwc_span_t iwc_json_find(iwc_span_t object, const char *path) {
-    object = skip_blanks(object);
-    for (;;) {
-        const size_t length = strcspn(path, ".");
-        if (object.length == 0 || object.at[0] != '{') {
-            return NOTHING;
+/// Searches from `*rest` to the end of the object, and moves `*rest` behind the value.
+static iwc_span_t find_key(const char **rest, const char *key, size_t length) {
+    iwn_json_t left = {*rest};
+    iwn_json_t name;
+    iwn_json_t value;
+    while (iwn_json_next(&left, &name, &value)) {
+        if (strncmp(name.at + 1, key, length) == 0 && name.at[length + 1U] == '"') {
+            *rest = left.at;
+            return (iwc_span_t){value.at, (size_t)(left.at - value.at)};
         }
-        object = find_key(object, path, length);
-        if (path[length] == '\0') {
-            return object;
-        }
-        path += length + 1U;
     }
+    return NOTHING;
+}
+
+iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length) {
+    const iwc_span_t object = skip_blanks(self->object);
+    if (object.length == 0 || object.at[0] != '{') {
+        return NOTHING;
+    }
+    const iwc_span_t value = (self->rest != NULL) ? find_key(&self->rest, key, length) : NOTHING;
+    if (value.at != NULL) {
+        return value;
+    }
+    self->rest = object.at + 1;
+    return find_key(&self->rest, key, length);
+}
+
+iwc_span_t iwc_json_find(iwc_span_t object, const char *path) {
+    size_t length = strcspn(path, ".");
+    while (path[length] == '.') {
+        object = iwc_json_walk(&(iwc_walk_t){object, NULL}, path, length);
+        path += length + 1U;
+        length = strcspn(path, ".");
+    }
+    return iwc_json_walk(&(iwc_walk_t){object, NULL}, path, length);
 }
 
 bool iwc_json_is_text(iwc_span_t value, const char *text) {

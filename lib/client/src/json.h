@@ -18,6 +18,15 @@ bool iwc_json_is_object(const char *text, size_t length, bool trusted);
 /// The value at a path of keys, "left.speed_mm_s", in an object for which `iwc_json_is_object` holds; keys are compared as written.
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
 
+/// An object whose fields are read in their order.
+typedef struct {
+    iwc_span_t object;
+    const char *rest; ///< Place behind the last value; NULL before the first.
+} iwc_walk_t;
+
+/// Returns the value of a key as `iwc_json_find` does, but searches behind the last value first.
+iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length);
+
 /// True if the value is exactly that text, as written between its quotes.
 bool iwc_json_is_text(iwc_span_t value, const char *text);
 

@@ -68,7 +68,7 @@ static bool check_name(check_t *self, int *token) {
     if (self->work != NULL && !add_name(self)) {
         return false;
     }
-    if (iwn_scan(&self->scan) != ':') {
+    if (!iwn_scan_skip(&self->scan, ':') && iwn_scan(&self->scan) != ':') {
         return fail(self, "':' expected");
     }
     *token = iwn_scan(&self->scan);
@@ -133,7 +133,7 @@ static bool check_value(check_t *self, int token) {
 
 /// What stands behind a value of an object or list: its end, or a comma and the next one.
 static bool check_next(check_t *self) {
-    int token = iwn_scan(&self->scan);
+    int token = iwn_scan_skip(&self->scan, ',') ? ',' : iwn_scan(&self->scan);
     if (token == closing(self)) {
         close_container(self);
         return true;

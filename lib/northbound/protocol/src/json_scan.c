@@ -5,8 +5,6 @@
 
 /// No more of a wrong token than this is repeated.
 #define NEAR_MAX 20U
-/// An integer of this length always fits 64 bits.
-#define INTEGER_SAFE 18
 /// The decimal exponent of the largest double.
 #define REAL_EXPONENT_MAX 308
 /// No exponent beyond it means anything else, however many digits come before.
@@ -221,9 +219,6 @@ static bool skip_digits(iwn_scan_t *self, int *c) {
 
 /// 64 bits.
 static int check_integer(iwn_scan_t *self) {
-    if (self->at - self->token <= INTEGER_SAFE) {
-        return IWN_TOKEN_SCALAR;
-    }
     const bool negative = *self->token == '-';
     const uint64_t most = negative ? (uint64_t)INT64_MAX + 1U : (uint64_t)INT64_MAX;
     uint64_t number = 0;

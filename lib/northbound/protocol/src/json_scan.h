@@ -28,6 +28,13 @@ bool iwn_scan_fail(iwn_scan_t *self, const char *what);
 /// The next code point of a text whose escapes are right; 0 behind it.
 uint32_t iwn_scan_character(const char **at);
 
+/// Skips the mark if it is the next byte.
+static inline bool iwn_scan_skip(iwn_scan_t *self, char mark) {
+    const bool there = self->at < self->end && *self->at == mark;
+    self->at += there ? 1 : 0;
+    return there;
+}
+
 static inline bool iwn_scan_is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\n' || c == '\r';
 }
