@@ -51,8 +51,8 @@ typedef struct {
 #define IWL_LINK_QUEUE_MAX 4U
 
 /// Requested size of the receive buffer. The kernel doubles it (`room_bytes`) and counts about 780 bytes per frame, so
-/// it holds half a second of a full bus. Without CAP_NET_ADMIN the limit is net.core.rmem_max, by default a twentieth of
-/// this.
+/// it holds half a second of a full bus. Without CAP_NET_ADMIN the limit is net.core.rmem_max, by default a twentieth
+/// of this.
 #define IWL_LINK_ROOM_BYTES (4U * 1024U * 1024U)
 
 /// Comparison of the link's bit timing with that of the wheels.
