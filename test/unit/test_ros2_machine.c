@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SECOND 1000000
+#define SECOND INT64_C(1000000)
 #define TRACK  540
 
 static ros_odometry_t odometry;

@@ -801,8 +801,8 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
             until(lambda: newest() != number, what="another stop")
             number = newest()
         else:
-            assert [answer for answer in answers if answer[1]["error"] != "stale_command"] == []
             assert gateway_state(rig)["state"] == "latched"
+            assert [answer for answer in answers if answer[1]["error"] != "stale_command"] == []
     # In time, but for the stop before: somebody reset at the machine and pressed once more.
     forwarder.delay_s = 0.6
     claim = reset_of(person, number)

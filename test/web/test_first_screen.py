@@ -445,11 +445,11 @@ def test_cause_that_prevents_driving_is_one_sentence(rig):
     rig.start().connected()
     with page_of(rig, "small", **touch("small")) as page:
         live(page)
-        rig.sim.ask("power left off")
+        rig.sim.ask("power off")
         seen(page, "document.querySelector('#word').textContent === 'Not ready'")
         assert page.inner_text("#sentence") == "Wheel offline: switch the wheels on; check their cable and the termination."
-        assert page.inner_text("#big-left-speed") == NO_FIGURE and page.inner_text("#big-right-speed") == "0.00"
-        all_seen(page, ["word", "sentence", *FIGURES], "a wheel without power")
+        assert {page.inner_text(f"#big-{side}-speed") for side in ("left", "right")} == {NO_FIGURE}
+        all_seen(page, ["word", "sentence", *FIGURES], "wheels without power")
 
 
 @pytest.mark.rig(driving=True)
