@@ -94,11 +94,11 @@ static void read_wheel(iwc_span_t span, iwc_wheel_t *out_wheel) {
     out_wheel->force_age_ms = integer_of(WALK(&wheel, "force_age_ms"));
 }
 
-static iwc_machine_t machine_of(const iwc_message_t *message) {
+static iwc_machine_t machine_of(iwc_span_t state) {
     static const char *const names[] = {
         [IWC_LISTENING] = "listening", [IWC_ARMED] = "armed", [IWC_STOPPING] = "stopping", [IWC_LATCHED] = "latched"};
     for (unsigned i = IWC_LISTENING; i <= (unsigned)IWC_LATCHED; i++) {
-        if (iwc_is(message, "state", names[i])) {
+        if (iwc_json_is_text(state, names[i])) {
             return (iwc_machine_t)i;
         }
     }
@@ -107,19 +107,20 @@ static iwc_machine_t machine_of(const iwc_message_t *message) {
 
 bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state) {
     iwc_walk_t snapshot = {{message->text, message->length}, NULL};
+    const iwc_span_t state = WALK(&snapshot, "state");
+    iwc_walk_t lease = {WALK(&snapshot, "lease"), NULL};
     const iwc_span_t left = WALK(&snapshot, "left");
     const iwc_span_t right = WALK(&snapshot, "right");
-    if (left.at == NULL || right.at == NULL || field(message, "lease").at == NULL ||
-        field(message, "state").at == NULL) {
+    if (left.at == NULL || right.at == NULL || lease.object.at == NULL || state.at == NULL) {
         return false;
     }
     memset(out_state, 0, sizeof(*out_state));
     out_state->t_us = iwc_integer(message, "t_us").value;
-    out_state->machine = machine_of(message);
+    out_state->machine = machine_of(state);
     (void)iwc_text(message, "cause", out_state->cause, sizeof out_state->cause);
-    out_state->holder = iwc_integer(message, "lease.holder");
+    out_state->holder = integer_of(WALK(&lease, "holder"));
     out_state->ours = out_state->holder.known && self->number != 0 && out_state->holder.value == self->number;
-    out_state->remaining_ms = iwc_integer(message, "lease.remaining_ms");
+    out_state->remaining_ms = integer_of(WALK(&lease, "remaining_ms"));
     out_state->estop_released = iwc_is(message, "estop.state", "released");
     out_state->bus_active = iwc_is(message, "bus.state", "active");
     read_wheel(left, &out_state->left);
