@@ -19,7 +19,7 @@ ARM_CPUS = ("cortex-m4", "cortex-m0plus")
 # Instructions for a line.
 READ_LIMITS = {
     "libiwheel-client, an event `state`": 120000,
-    "the same, and its fields": 190000,
+    "the same, and its fields": 180000,
     "iwheelctl decode": 8500,
     "iwheelctl decode --csv": 8500,
     "iwheelctl --json decode": 6000,
