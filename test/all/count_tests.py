@@ -22,6 +22,7 @@ OURS = re.compile(r"^(\d+) passed, (\d+) failed(?:, (\d+) skipped)?$", re.MULTIL
 NOT_JUDGED = re.compile(r"^real time not judged: .*\n\d+ passed, 0 failed, \d+ skipped$", re.MULTILINE)
 INCONCLUSIVE = re.compile(r"^(\d+) inconclusive", re.MULTILINE)
 PYTHON = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(.*)$", re.MULTILINE)
+REASON = re.compile(r"\d+: (E  |FAILED)")  # As `start` shows a line of pytest's.
 STARTED = re.compile(r"^layer=(\S+) status=(\d+) inconclusive=(\d+) processor_s=([\d.]+)$", re.MULTILINE)
 
 
@@ -71,6 +72,7 @@ def main(path):
         layers[layer] = [total + one for total, one in zip(layers[layer], (sum(counts), float(processor_s), wall_s), strict=True)]
         if counts[1]:
             failed.append(f"failed: {name}: {counts[1]} of {sum(counts)}; all of it: {log}")
+            failed += [f"  {line}" for line in output.splitlines() if REASON.match(line)][:12]
             if layer == "none":
                 failed += ["  did not end by itself; it said last:", *(log.read_text(errors="replace").splitlines()[-25:] if log.exists() else [])]
         elif counts[2]:

@@ -54,7 +54,7 @@ class Bringup(unittest.TestCase):
             self.assertLess(time.monotonic(), end, "bringup's folder is left behind")
             time.sleep(0.05)
 
-    def start(self, *words):
+    def start(self, *words, variables=None):
         operator = Operator(
             [
                 find_program(BUILD, "iwheelctl"),
@@ -68,7 +68,7 @@ class Bringup(unittest.TestCase):
                 self.out + ".from",
                 *words,
             ],
-            environment(self.runtime),
+            variables or environment(self.runtime),
         )
         self.addCleanup(self.end, operator)
         return operator
@@ -798,21 +798,7 @@ class Bringup(unittest.TestCase):
             self.ends_soon(operator)
 
     def test_folder_in_tmp_is_removed_when_there_is_no_runtime_directory(self):
-        operator = Operator(
-            [
-                find_program(BUILD, "iwheelctl"),
-                "bringup",
-                self.out,
-                "--can",
-                f"unix:{self.rig.path('bus')}",
-                "--estop",
-                f"unix:{self.rig.path('button')}",
-                "--from",
-                self.out + ".from",
-            ],
-            environment(),
-        )
-        self.addCleanup(operator.close)
+        operator = self.start(variables=environment())
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
         with open(f"/proc/{children(operator.process.pid)['iwheel-gateway']}/cmdline", "rb") as file:
