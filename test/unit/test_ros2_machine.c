@@ -320,6 +320,14 @@ static void test_diagnosis_commands_tell_what_keeps_them_from_driving(void) {
     (void)snprintf(facts.commands.refusal, sizeof facts.commands.refusal, "arm first");
     facts.commands.coming = true;
     expect(ROS_TELLS_COMMANDS, ROS_WARN, "refused: arm first");
+    facts.commands.unusable = true;
+    facts.commands.bad = 7;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+           "no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, 7 so far");
+    facts.commands.coming = false;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late, 7 were no usable numbers");
+    facts.commands.coming = true;
+    facts.commands.unusable = false;
     facts.commands.publishers = 2;
     expect(ROS_TELLS_COMMANDS, ROS_WARN, "twist_mux");
     facts.machine.setpoint_current = true;

@@ -181,6 +181,11 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
             "twist_mux in between",
             commands->publishers);
+    } else if (commands->coming && commands->unusable) {
+        say(status, ROS_WARN,
+            "the commands that come are no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, "
+            "%" PRIu64 " so far; fix what publishes them",
+            commands->bad);
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
     } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {

@@ -44,6 +44,7 @@ typedef struct {
     uint64_t refused;                ///< By the gateway.
     char refusal[ROS_SENTENCE_SIZE]; ///< Why the last one was refused, and the cure; empty since one was accepted.
     bool coming;                     ///< One came within the last second.
+    bool unusable;                   ///< The last one was no usable numbers.
     ros_unmatched_t unmatched;
 } ros_commands_t;
 

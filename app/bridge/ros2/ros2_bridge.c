@@ -45,6 +45,7 @@ static judged_t judge_command(bridge_t *self, const ros_command_t *command) {
         self->moved_us = self->coming_us;
     }
     ros_commands_t *commands = &self->facts.commands;
+    commands->unusable = !judged.good;
     if (!judged.good) {
         commands->bad++;
     } else if (judged.age == ROS_AGE_UNKNOWN) {
