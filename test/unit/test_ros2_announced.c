@@ -99,6 +99,28 @@ static void test_announced_large_data_becomes_padding_and_the_rest_stays(void) {
     }
 }
 
+/// CycloneDDS sends what is longer than 1344 bytes in fragments: the free data begins in the first one and ends in another.
+static void test_announced_data_that_begins_in_the_first_fragment_becomes_padding(void) {
+    for (unsigned first = 1; first <= 2U; first++) {
+        (void)begin(3, 0, true, false);
+        memmove(message + 56, message + 44, 4); // The encapsulation, behind the longer head.
+        memset(message + 44, 0, 12);
+        message[20] = 0x16;
+        rtps_write(28, 2, true, message + 26);
+        rtps_write(first, 4, true, message + 44);
+        length = 60;
+        (void)parameter(NAME, 40, true);
+        const size_t user = length;
+        put(USER, true);
+        put(8000, true);
+        memset(message + length, 'x', 1200);
+        length += 1200U;
+        rtps_write((uint32_t)(length - 24U), 2, true, message + 22);
+        rtps_drop_large_data(message, length);
+        TEST_ASSERT_EQUAL_HEX((first == 1U) ? 0U : USER, id_at(user, true));
+    }
+}
+
 static void test_announced_data_of_a_user_is_untouched(void) {
     (void)begin(5, 0, true, false);
     (void)parameter(USER, 4000, true);
@@ -153,6 +175,7 @@ static void test_log_of_others_is_bounded_and_counts_what_it_leaves_out(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_announced_large_data_becomes_padding_and_the_rest_stays);
+    RUN_TEST(test_announced_data_that_begins_in_the_first_fragment_becomes_padding);
     RUN_TEST(test_announced_data_of_a_user_is_untouched);
     RUN_TEST(test_announced_message_that_is_cut_or_damaged_is_survived);
     RUN_TEST(test_log_of_others_is_bounded_and_counts_what_it_leaves_out);

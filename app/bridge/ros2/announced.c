@@ -4,11 +4,14 @@
 #include <string.h>
 
 #define DATA             0x15U
+#define DATA_FRAG        0x16U
 #define HAS_QOS          0x02U
 #define DATA_TO_QOS_AT   6U
 #define DATA_COUNTS_FROM 8U
 #define DATA_WRITER_AT   12U
 #define DATA_HEADER      24U
+#define FRAG_FIRST_AT    24U ///< Of DATA_FRAG: the number of its first fragment, from 1.
+#define FRAG_HEADER      36U
 #define ENCAPSULATION    4U
 #define PARAMETER        4U ///< Its id and its length.
 #define PID_PAD          0x0000U
@@ -16,11 +19,19 @@
 #define PID_USER_DATA    0x002CU
 #define PID_TOPIC_DATA   0x002EU ///< Group data is between them.
 
+/// Of a sample in fragments the first, in which its list of parameters begins.
+static bool begins_a_sample(const rtps_part_t *part) {
+    if (part->bytes[0] == DATA_FRAG) {
+        return part->size >= FRAG_HEADER && rtps_read(part->bytes + FRAG_FIRST_AT, 4, part->little) == 1U;
+    }
+    return part->bytes[0] == DATA && part->size >= DATA_HEADER;
+}
+
 /// RTPS 2.2, table 9.2: the writers that announce participants, writers and readers.
 static bool is_announcement(const rtps_part_t *part) {
     static const uint8_t writers[3][4] = {{0, 1, 0, 0xC2}, {0, 0, 3, 0xC2}, {0, 0, 4, 0xC2}};
     bool found = false;
-    for (size_t i = 0; i < 3U && part->bytes[0] == DATA && part->size >= DATA_HEADER; i++) {
+    for (size_t i = 0; i < 3U && begins_a_sample(part); i++) {
         found = found || memcmp(part->bytes + DATA_WRITER_AT, writers[i], sizeof writers[i]) == 0;
     }
     return found;
@@ -34,11 +45,11 @@ static size_t walk(uint8_t *bytes, size_t size, size_t at, bool little, bool cha
         if (id == PID_SENTINEL) {
             return at + PARAMETER;
         }
-        if (length > size - at - PARAMETER) {
-            return 0;
-        }
         if (change && id >= PID_USER_DATA && id <= PID_TOPIC_DATA && length > ANNOUNCED_DATA_MAX) {
             rtps_write(PID_PAD, 2, little, bytes + at);
+        }
+        if (length > size - at - PARAMETER) { // Damaged, or it goes on in the next fragment.
+            return 0;
         }
         at += PARAMETER + length;
     }

@@ -3,7 +3,8 @@
 ///
 /// DDS stores the announcement of every participant, writer and reader of a domain, with the free data in it (user, group and topic data), up to
 /// 64 kB each. ROS puts less than 200 bytes there. More than ANNOUNCED_DATA_MAX becomes padding before CycloneDDS reads it, so that what a
-/// stranger announces costs little memory. An announcement in fragments stays as it is; the unit's MemoryMax bounds the process.
+/// stranger announces costs little memory. Of an announcement in fragments only what
+/// begins in the first one; the unit's MemoryMax bounds the process.
 #ifndef ROS2_ANNOUNCED_H
 #define ROS2_ANNOUNCED_H
 
