@@ -155,6 +155,36 @@ static void tell_unmatched(const ros_unmatched_t *unmatched, ros_status_t *statu
     }
 }
 
+/// What came, or why nothing comes.
+static void tell_flow(const ros_commands_t *commands, int64_t lease_ms, ros_status_t *status) {
+    if (commands->coming && commands->unusable) {
+        say(status, ROS_WARN,
+            "the commands that come are no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, "
+            "%" PRIu64 " so far; fix what publishes them",
+            commands->bad);
+    } else if (commands->coming && commands->refusal[0] != '\0') {
+        say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
+    } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {
+        say(status, ROS_WARN,
+            "%" PRIu64
+            " commands of publishers on other machines were dropped because their clocks are not known yet: publish "
+            "zeros for a second first, at 2 Hz or more; a publisher for each command never becomes known",
+            commands->unknown);
+    } else if (commands->publishers == 0U && commands->unmatched.elsewhere[0] != '\0') {
+        say(status, ROS_OK, "no publisher of %s, but %s has one: remap it if it is meant for this machine",
+            commands->unmatched.topic, commands->unmatched.elsewhere);
+    } else if (commands->late > 0 || commands->bad > 0) {
+        say(status, ROS_WARN,
+            "%" PRIu64 " commands came too late, %" PRIu64
+            " were no usable numbers: dropped; see the network, and what publishes them",
+            commands->late, commands->bad);
+    } else {
+        say(status, ROS_OK,
+            "send cmd_vel at %" PRId64 " Hz or more: a pause above %" PRId64 " ms stops the wheels, then arm again",
+            (3000 + lease_ms - 1) / lease_ms, lease_ms);
+    }
+}
+
 static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     const ros_commands_t *commands = &facts->commands;
     const int64_t lease_ms = (facts->machine.lease_ms > 0) ? facts->machine.lease_ms : 200;
@@ -181,31 +211,8 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             "%u publishers of cmd_vel: only the one that drives first after arm is obeyed until the wheels stop; put "
             "twist_mux in between",
             commands->publishers);
-    } else if (commands->coming && commands->unusable) {
-        say(status, ROS_WARN,
-            "the commands that come are no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, "
-            "%" PRIu64 " so far; fix what publishes them",
-            commands->bad);
-    } else if (commands->coming && commands->refusal[0] != '\0') {
-        say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
-    } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {
-        say(status, ROS_WARN,
-            "%" PRIu64
-            " commands of publishers on other machines were dropped because their clocks are not known yet: publish "
-            "zeros for a second first, at 2 Hz or more; a publisher for each command never becomes known",
-            commands->unknown);
-    } else if (commands->publishers == 0U && commands->unmatched.elsewhere[0] != '\0') {
-        say(status, ROS_OK, "no publisher of %s, but %s has one: remap it if it is meant for this machine",
-            commands->unmatched.topic, commands->unmatched.elsewhere);
-    } else if (commands->late > 0 || commands->bad > 0) {
-        say(status, ROS_WARN,
-            "%" PRIu64 " commands came too late, %" PRIu64
-            " were no usable numbers: dropped; see the network, and what publishes them",
-            commands->late, commands->bad);
     } else {
-        say(status, ROS_OK,
-            "send cmd_vel at %" PRId64 " Hz or more: a pause above %" PRId64 " ms stops the wheels, then arm again",
-            (3000 + lease_ms - 1) / lease_ms, lease_ms);
+        tell_flow(commands, lease_ms, status);
     }
 }
 
