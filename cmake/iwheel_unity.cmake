@@ -144,6 +144,10 @@ function(iwheel_shared_support file)
     endif()
 endfunction()
 
+# `main`, for those that have none of their own.
+add_library(iwheel_unit_main STATIC "${PROJECT_SOURCE_DIR}/test/support/unit_main.c")
+target_link_libraries(iwheel_unit_main PRIVATE iwheel_unity iwheel_gnu)
+
 add_custom_target(iwheel_unit_tests) # All of them, and what they need.
 
 function(iwheel_unit_test name)
@@ -157,7 +161,7 @@ function(iwheel_unit_test name)
     endforeach()
     add_executable(unit_${name} ${sources})
     target_include_directories(unit_${name} PRIVATE "${PROJECT_SOURCE_DIR}/test/support")
-    target_link_libraries(unit_${name} PRIVATE iwheel::core iwheel_unity iwheel_gnu)
+    target_link_libraries(unit_${name} PRIVATE iwheel::core iwheel_unit_main iwheel_unity iwheel_gnu)
     add_dependencies(iwheel_unit_tests unit_${name})
     add_test(NAME unit.${name} COMMAND unit_${name})
     set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 1200) # Some steps of ./check get little of the processor.

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The structure of the sources: what docs/architecture.md, docs/how-to-add.md and the indexes promise of it. Fails where that is not so.
+"""The structure of the sources: what docs/developer/architecture.md, docs/developer/how-to-add.md and the indexes promise of it. Fails where that is not so.
 
 usage: house.py facts|layers|pages|pins [ROOT]
 
-facts    the table of facts in docs/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
+facts    the table of facts in docs/developer/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
          with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
-layers   who may include whom: every include from one library or program into another must be in the table of docs/architecture.md.
-pages    the lists of docs/how-to-add.md, and the indexes of test/, scripts/ and docs/. A list stands below a comment
+layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md. And the name
+         of a source or header file belongs to one file of core, lib, port and app.
+pages    the lists of docs/developer/how-to-add.md, the indexes of test/, scripts/ and docs/, links of Markdown and names of pages in every file. A list stands below a comment
          `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have the pattern are those whose names stand in the list, each
          after its number. A file of test/ may be named too, and must have it then.
 pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
@@ -34,6 +35,8 @@ TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "lib", "port", "app")
 DEPTH = {"core": 4, "app/bridge/ros2": 6}  # Of any other: 5.
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
+# Names that several files may have. CMakeLists.txt, help.txt and README.md are neither source nor header, and are found by their folder.
+SEVERAL = {"main.c": "one for each program", "board.h": "one for each board; the build chooses the folder"}
 
 
 def sources(*folders):
@@ -181,7 +184,7 @@ def facts():
 
 # ---- layers ---------------------------------------------------------------------------------------------------------
 
-ARCHITECTURE = "docs/architecture.md"
+ARCHITECTURE = "docs/developer/architecture.md"
 ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|nobody) \|$", re.MULTILINE)
 
 
@@ -200,20 +203,22 @@ def layers():
     table = permitted()
     files = [path.relative_to(ROOT) for path in sources(*PRODUCTION)]
     owners = {path: owner(path, table) for path in files}
-    headers = {}
+    named = {}
     for path in files:
-        headers.setdefault(path.name, []).append(path)
+        named.setdefault(path.name, []).append(path)
     wrong, used = [], set()
     for path in files:
         for included in INCLUDE.findall((ROOT / path).read_text()):
             plain = re.sub(r"^(?:.*/)?\.\./", "", included)  # However it gets there, it ends in the name of a file.
-            there = {owners[other] for other in headers.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
+            there = {owners[other] for other in named.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
             if there and owners[path] not in there:
-                there = there & table.get(owners[path], set()) or there  # Of several headers of that name it is the one in reach.
+                there = there & table.get(owners[path], set()) or there  # Of several files of that name it is the one in reach.
                 used |= {(owners[path], other) for other in there}
                 wrong += [f"{path} includes {included} of {other}" for other in sorted(there - table.get(owners[path], set()))]
     unused = sorted(f"{who} -> {whom}" for who, all_of in table.items() for whom in all_of if (who, whom) not in used)
     strangers = sorted(set(owners.values()) - set(table))
+    wrong += [f"rename one of these: {', '.join(map(str, same))}" for one, same in named.items() if len(same) > 1 and one not in SEVERAL]
+    wrong += [f"take {one} out of SEVERAL: no two files have this name" for one in SEVERAL if len(named.get(one, ())) < 2]
     wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [
         f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused
     ]
@@ -223,7 +228,7 @@ def layers():
 
 # ---- pages ----------------------------------------------------------------------------------------------------------
 
-PAGE = "docs/how-to-add.md"
+PAGE = "docs/developer/how-to-add.md"
 MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
 
 
@@ -271,19 +276,45 @@ def judge_how_to_add():
     return found if sections else [f"{PAGE}: no list is found"], len(sections)
 
 
-def judge_index(folder):
+def entry(parts, deep):
+    """What an index has of a path below its folder: a file, or the folder that it is in; of the folders in `deep` each entry."""
+    depth = 2 if parts[0] in deep else 1
+    return "/".join(parts[:depth]) + ("/" if len(parts) > depth else "")
+
+
+def judge_index(folder, deep=()):
     page = f"{folder}/README.md"
     indexed = re.findall(r"^\| `([^`]+)` \|", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
-    parts = [name.split("/")[1:] for name in files(folder)]
-    entries = {part[0] + ("/" if len(part) > 1 else "") for part in parts} - {"README.md"}
+    entries = {entry(name.split("/")[1:], deep) for name in files(folder)} - {"README.md"}
     wrong = [f"{page}: add a line `| \\`{name}\\` | what it is for |`" for name in sorted(entries - set(indexed))]
     return wrong + [f"{page}: take the line of `{name}` out: it is not there" for name in sorted(set(indexed) - entries)], len(entries)
 
 
+PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
+LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
+PLANTS = "test/gates/test_planted_faults.py"  # Names pages that must not exist.
+
+
+def judge_names():
+    """Pages that a file names from the root, and links of Markdown relative to their page, that do not exist."""
+    wrong, count = [], 0
+    for file in files("."):
+        text = (ROOT / file).read_text(errors="replace") if file != PLANTS else ""
+        named = [(found, ROOT / found[0]) for found in PAGE_NAMED.finditer(text)]
+        if file.endswith(".md"):
+            named += [(found, (ROOT / file).parent / found[1]) for found in LINK.finditer(text)]
+        count += len(named)
+        wrong += [f"{file}:{text.count(chr(10), 0, found.start()) + 1}: {there} does not exist" for found, there in named if not there.exists()]
+    return [line.replace(f"{ROOT}/", "") for line in wrong], count
+
+
 def pages():
     findings, lists = judge_how_to_add()
-    for folder in ("test", "scripts", "docs"):
-        more, entries = judge_index(folder)
+    more, names = judge_names()
+    findings += more
+    print(f"{names} names of pages and links")
+    for folder, deep in {"test": (), "scripts": (), "docs": ("user", "developer")}.items():
+        more, entries = judge_index(folder, deep)
         findings += more
         print(f"index of {folder}/: {entries} entries")
     print(f"{PAGE}: {lists} lists")

@@ -18,7 +18,7 @@ The form of the description: `requests`, `events` and `objects` have `fields`, e
 `extends` names an object whose fields come before. `reply` of a request and `topic` of an event say the rest. What is sent beside that is
 `cmd` and `id` of a request, `id` and `ok` of a reply, `event` of an event. A refusal is the object `refusal`.
 
-Its form, docs/northbound.md and the words of the C sources are judged by test/northbound, the gateway by python/tests/test_protocol.py. No tool
+Its form, docs/user/northbound.md and the words of the C sources are judged by test/northbound, the gateway by python/tests/test_protocol.py. No tool
 does it: JSON Schema has neither units nor words with a meaning, and datamodel-code-generator (PyPI), which writes TypedDicts from it, writes no C.
 """
 

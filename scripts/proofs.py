@@ -21,7 +21,7 @@ TABLE = ROOT / "docs/developer/proofs.csv"
 TESTS = ROOT / "test/all/steps.cmake"
 FIELDS = ("id", "what", "command", "number", "list")
 LISTS = ("quick", "check", "ci", "full")
-TIMEOUT_S = 60
+TIMEOUT_S = 600
 # Proofs inside steps: (what, command of the runner that lists them) or (what, files, what begins each single test in them).
 LISTED = {
     "system.scenarios": ("scenarios on the local bus", "-m pytest --collect-only -q test/system/test_scenarios.py"),
@@ -36,15 +36,15 @@ LISTED = {
     "service.tests": ("tests of the service", "-m pytest --collect-only -q test/service"),
 }
 COUNTED = {
-    "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^ *RUN_TEST\("),
-    "unit.ctl": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"),
+    "unit.functions": ("unit test functions in C", "test/unit/*.c", r"^TEST\(|^ *RUN_TEST\("),
+    "ctl.tests": ("tests of iwheelctl and ./demo", "test/ctl/test_*.py", r"^    def test_"),
     "unit.client": ("tests of the C client's example", "test/client/test_*.py", r"^    def test_"),
     "faults.table": ("seeded faults", "test/faults/*.faults", r"^@@ .* \| "),
-    "target.driver": ("tests of the STM32 driver", "test/target/*.c", r"^ *RUN_TEST\("),
+    "unit.driver": ("tests of the STM32 driver", "test/target/*.c", r"^TEST\(|^ *RUN_TEST\("),
     "kernel.verdicts": ("tests of the kernel's runner", "test/kernel/test_*.py", r"^    def test_"),
     "fuzz.targets": ("fuzz targets", "test/fuzz/fuzz_*.c", r"^int LLVMFuzzerTestOneInput"),
     "dbc.tests": ("tests of the DBC file", "test/dbc/test_*.py", r"^    def test_"),
-    "gates.faults": ("faults for gates", "test/gates/planted_faults.py", r"^    \("),
+    "gates.faults": ("faults for gates", "test/gates/test_planted_faults.py", r"^    \("),
     "verdicts.tests": ("tests of the verdicts", "test/support/test_*verdict.py", r"^    def test_"),
 }
 

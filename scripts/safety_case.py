@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
+"""Is docs/developer/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
 And the threat model in docs/developer/threat-model.md: each interface has tests, and they exist.
 
 usage: safety_case.py [--update]
@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "docs/developer/threat-model.md"
+PAGE, THREATS = ROOT / "docs/developer/safety-case.md", ROOT / "docs/developer/threat-model.md"
 sys.path.insert(0, str(ROOT / "test/faults"))
 import table
 
@@ -42,7 +42,7 @@ def defined_tests():
     """Every test's name, in C and in Python."""
     names = set()
     for path in (ROOT / "test").rglob("*.c"):
-        names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
+        names.update(re.findall(r"^(?:static void |TEST\()(test_\w+)(?:\(void)?\) \{", path.read_text(), re.M))
     for path in [*(ROOT / "test").rglob("*.py"), *(ROOT / "test").glob("*/run")]:
         names.update(re.findall(r"^ *def (\w+)\(|^(\w+)\(\) \{$", path.read_text(), re.M))
     return {name for found in names for name in ([found] if isinstance(found, str) else found)}
@@ -102,7 +102,7 @@ def findings(text, tests, bugs, rules):
     for rule, entry in found.items():
         yield from rule_findings(rule, entry, tests, bugs)
     for bug in bugs:
-        if bug.rule not in found and not (ROOT / f"docs/{bug.rule}.md").exists():
+        if bug.rule not in found and not any(ROOT.glob(f"docs/*/{bug.rule}.md")):
             yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither here nor a page of docs/"
     told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
     yield from (f"rule {number} of the oracle belongs to no rule here" for number in sorted(rules - told))

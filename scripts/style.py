@@ -93,7 +93,7 @@ def known_names(root):
     paths = sources(root, CODE)
     code = "".join(STRING_OR_COMMENT.sub(" ", path.read_text()) for path in paths)
     documents = [str(path.relative_to(root)) for path in (root / "docs").rglob("*.md")]
-    safety_case = root / "docs/safety-case.md"
+    safety_case = root / "docs/developer/safety-case.md"
     rules = re.findall(r"^### (R\d+) ", safety_case.read_text(), re.MULTILINE) if safety_case.is_file() else []
     return set(re.findall(r"\w+", code)), {path.name for path in paths} | set(documents), set(rules)
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// What was learnt of the wheels, from one run of the board to the next: evidence of the ledger, and the zeros of the
-/// force. The rules are the daemon's (docs/ledger.md): what was found for other settings is forgotten, a zero of before
+/// force. The rules are the daemon's (docs/developer/ledger.md): what was found for other settings is forgotten, a zero of before
 /// gives way to whatever this run measures, a tare only to a tare.
 ///
 ///     start: record --> the core

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The host on the other end of the serial line: several clients on numbered channels (docs/serial.md), each with
+/// The host on the other end of the serial line: several clients on numbered channels (docs/user/serial.md), each with
 /// its own requests, replies and events of the northbound protocol, and one lease among them.
 ///
 ///     CLOSED --open--> OPEN --close | link | relay silent--> CLOSED

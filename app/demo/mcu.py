@@ -77,7 +77,7 @@ class Story:
             raise Failed(f"the wheels did not turn: {turned}")
         self.tell(f"the bus saw the left wheel at {max(turned):.0f} mm/s")
         self.ctl("why")
-        self.tell("no Linux decided any of it: lease, ramps and stop are the board's. docs/serial.md: the same with a Nucleo")
+        self.tell("no Linux decided any of it: lease, ramps and stop are the board's. docs/user/serial.md: the same with a Nucleo")
 
     def end(self):
         for _, process, _ in reversed(self.processes):

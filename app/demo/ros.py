@@ -146,7 +146,7 @@ def main():
         bridge = Process([os.path.join(options.build, "app/bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
         rig.processes.append(bridge)
         tell(rig, Peer(domain), view)
-        print("The page: docs/ros2.md")
+        print("The page: docs/user/ros2.md")
         return 0
     except (Failed, OSError, RuntimeError, TimeoutError) as error:
         print(f"\nFAILED: {error}", file=sys.stderr)

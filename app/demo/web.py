@@ -18,8 +18,8 @@ from harness import Process, Rig, find_program
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 
 
-def bridge(rig, port):
-    """The bridge, allowed to drive, and the page's address."""
+def bridge(rig, port, lan):
+    """Starts the bridge, allowed to drive simulated wheels, and prints the page's address; with `lan` for phones of this network, as a QR code too."""
     settings = rig.path("web.conf")
     page = Path(rig.build, "app/bridge/web/page").resolve()
     Path(settings).write_text(
@@ -28,32 +28,36 @@ def bridge(rig, port):
         encoding="utf-8",
     )
     program = find_program(rig.build, "iwheel-web")
-    process = Process([program, "-c", settings], rig.path("web.out"))
+    print("\nThe page of two simulated wheels, which may be driven from it:\n", flush=True)
+    process = Process([program, "-c", settings, *(["--lan"] if lan else [])], rig.path("web.out"), **({"stdout": None} if lan else {}))
     rig.processes.append(process)
     time.sleep(0.5)
     if process.child.poll() is not None:
         sys.exit(f"demo: iwheel-web ended: {process.text()}")
-    return subprocess.run([program, "-c", settings, "--url"], check=True, capture_output=True, text=True).stdout.strip()
+    if not lan:
+        subprocess.run([program, "-c", settings, "--url"], check=True)
 
 
 def main():
     parser = argparse.ArgumentParser(prog="./demo --web")
     parser.add_argument("--build", required=True)
     parser.add_argument("--port", type=int, default=8470)
+    parser.add_argument("--lan", action="store_true")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     rig = Rig(options.build, CONFIG)
     try:
         rig.start_gateway()
-        url = bridge(rig, options.port)
+        bridge(rig, options.port, options.lan)
         sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
+        phone = (
+            "The browser warns once, because this machine made its certificate itself."
+            if options.lan
+            else f"From a phone: ./demo --web --lan, or  ssh -L {options.port}:127.0.0.1:{options.port} THIS-MACHINE"
+        )
         print(
             f"""
-The page of two simulated wheels, which may be driven from it:
-
-    {url}
-
-From a phone, forward the port:  ssh -L {options.port}:127.0.0.1:{options.port} THIS-MACHINE
+{phone}
 Faults, in another terminal:     {sim} --control {rig.path("control")} estop press
                                  {sim} --control {rig.path("control")} help
 

@@ -11,7 +11,7 @@
 /// so that the wheels come before everybody who talks about them. The second order is taken while the wheels are driven, the holder has
 /// said something, and neither a step nor an edge of the e-stop is due: its command is judged by the look at bus and e-stop that follows
 /// and leaves after one look instead of two. That saves two system calls before the command is on the bus (2.16 instead of 2.23 per frame
-/// of docs/speed.md, with 20 commands/s). Work per cycle is bounded in each of these places.
+/// of docs/developer/speed.md, with 20 commands/s). Work per cycle is bounded in each of these places.
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
 

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// Items for which the document names a value. All others are not even documented.
+/// The document names a value for these items. It does not mention the others.
 static const iw_assumption_item_t documented[] = {
     IW_ASSUMPTION_FORCE_UNIT_LEFT,
     IW_ASSUMPTION_FORCE_UNIT_RIGHT,
@@ -19,8 +19,8 @@ void iw_assumption_init(iw_assumption_store_t *self) {
     }
 }
 
-/// Motion would be unpredictable: another motor command than meant, or another direction. A wrong force unit or radius
-/// only makes numbers wrong.
+/// A contradiction of these items makes motion unpredictable: another motor command than intended, or another
+/// direction. A wrong force unit or radius only makes displayed values wrong.
 bool iw_assumption_guards_motion(iw_assumption_item_t item) {
     switch (item) {
     case IW_ASSUMPTION_SETPOINT_TYPE:
@@ -35,7 +35,7 @@ bool iw_assumption_guards_motion(iw_assumption_item_t item) {
     }
 }
 
-/// The first contradicted item that guards motion.
+/// Returns the first contradicted item that prevents motion.
 static iw_assumption_item_t find_doubt(const iw_assumption_store_t *self) {
     uint32_t item = 0;
     while (item < IW_ASSUMPTION_ITEMS &&
@@ -64,7 +64,7 @@ void iw_assumption_assume(iw_assumption_store_t *self, iw_assumption_item_t item
 void iw_assumption_confirm(iw_assumption_store_t *self, iw_assumption_item_t item, iw_source_t source, int32_t figure) {
     const iw_assumption_entry_t next = {IW_CONFIRMED, source, figure};
     const iw_assumption_entry_t *const entry = &self->entry[item];
-    // Evidence of the bus that comes and goes must not hide a contradiction, nor overrule the operator.
+    // An intermittent observation must neither hide a contradiction nor overrule the operator.
     const bool settled = entry->state == IW_CONTRADICTED || entry->source == IW_SOURCE_OPERATOR;
     if (source == IW_SOURCE_OPERATOR || !settled) {
         change(self, item, &next);

@@ -17,8 +17,8 @@ iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_
     return achieved;
 }
 
-/// The split of `quanta` nearest to the wanted sample point; returns its error in permille, UINT32_MAX if there is
-/// none.
+/// Finds the split of `quanta` that is nearest to the wanted sample point. Returns its error in permille, or UINT32_MAX
+/// if there is none.
 static uint32_t split(const iw_bit_timing_limits_t *limits, uint32_t quanta, uint32_t permille,
                       iw_bit_timing_t *out_timing) {
     uint32_t best = UINT32_MAX;

@@ -5,8 +5,8 @@
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
-/// One row per cause: effect, level or event, without a ramp, refusal while present. R2, R7 and R13 say which of them
-/// latch.
+/// One row per cause: effect, level or event, with or without a ramp, and refusal while present. R2, R7 and R13 define
+/// which causes latch.
 const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_NONE] = {IW_STOPS, false, false, IW_REFUSE_NONE},
     [IW_CAUSE_ESTOP_LINE] = {IW_ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},
@@ -31,7 +31,7 @@ const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_RESTART] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
 };
 
-/// Those that latch: they come first in iw_cause_t.
+/// The latching causes come first in iw_cause_t.
 #define FIRST IW_CAUSE_ESTOP_LINE
 #define LAST  IW_CAUSE_INTERNAL
 
@@ -50,8 +50,8 @@ uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], 
     return present;
 }
 
-/// Of several at once the first one refuses: iw_cause_t has first what explains those behind it (a bus that is down
-/// also loses echoes and wheels).
+/// The first of several causes determines the refusal. The order of iw_cause_t puts a cause before its consequences:
+/// for example, a bus that is down also loses echoes and wheels.
 iw_refusal_t iw_cause_refusal(uint32_t present) {
     for (uint32_t cause = FIRST; cause <= LAST; cause++) {
         if ((present & IW_CAUSE_BIT(cause)) != 0U) {

@@ -6,10 +6,10 @@
 
 #include <string.h>
 
-/// What an id word has beyond a number of 11 bits: the format.
+/// Bits of the id word besides the 11-bit id: the format.
 #define FORMAT_BITS (IW_CAN_EXTENDED | IW_CAN_REMOTE | IW_CAN_ERROR | IW_CAN_FD)
 
-/// The one bit in which the ids of both wheels differ.
+/// The only bit that differs between the ids of the two wheels.
 #define SIDE_BIT 0x20U
 
 const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS] = {
@@ -52,17 +52,17 @@ const iw_codec_row_t *iw_codec_find(uint32_t id) {
     return NULL;
 }
 
-/// `least`..8 bytes: one comparison for both ends.
+/// Returns true if `length` is in `least`..8. One comparison covers both limits.
 static bool fits(uint32_t length, uint32_t least) {
     return length - least <= IW_CAN_DATA_MAX - least;
 }
 
-/// Of a length that does not fit, the frame's format bits in it.
+/// Reason for a length that does not fit; it includes the format bits of the frame.
 static iw_codec_kind_t refusal(uint32_t length) {
     return ((length & FORMAT_BITS) != 0U) ? IW_CODEC_BAD_FORMAT : IW_CODEC_BAD_LENGTH;
 }
 
-/// The odometry lies across both words.
+/// The odometry spans both words.
 static iw_codec_kind_t read_status(const iw_can_frame_t *frame, uint32_t length, iw_codec_status_t *out_status) {
     if (!fits(length, IW_DLC_STATUS)) {
         return refusal(length);
@@ -118,13 +118,14 @@ static iw_codec_kind_t read_offset(const iw_can_frame_t *frame, uint32_t length,
     return IW_CODEC_OFFSET;
 }
 
-/// Any message but a good speed, the most frequent first. Kept apart, so that four frames of five save no registers; it
-/// is given both wheels, so that those four need no pointer to theirs before they are known to be good.
+/// Decodes every message except a valid speed, the most frequent first. It is a separate function so that the speed
+/// message, four frames of five, saves no registers. It receives both wheels, so that the caller needs no pointer to
+/// one of them before the frame is valid.
 static IW_APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *wheel) {
     iw_codec_wheel_t *const self = &wheel[iw_codec_side(frame->id)];
     const uint32_t number = frame->id & ~(FORMAT_BITS | SIDE_BIT);
-    // With a format bit in the length no length fits: a remote or extended frame with a known number is found and
-    // refused by the same comparison, without a second way through the table.
+    // A format bit in the length makes every length invalid: the same comparison refuses a remote or extended frame
+    // with a known id, without a second search of the table.
     const uint32_t length = frame->dlc | (frame->id & FORMAT_BITS);
     if (number == IW_ID_LEFT_STATUS) {
         return read_status(frame, length, &self->status);
@@ -146,9 +147,9 @@ static IW_APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec
 
 iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]) {
     const uint32_t id = frame->id;
-    if ((id & ~SIDE_BIT) == IW_ID_LEFT_SPEED && fits(frame->dlc, IW_DLC_SPEED)) { // Four frames of five.
+    if ((id & ~SIDE_BIT) == IW_ID_LEFT_SPEED && fits(frame->dlc, IW_DLC_SPEED)) { // Four of five frames.
         const uint32_t word = iw_be_word(frame, 0);
-        // Whole, as it stands in memory: then it is one store, by gcc as by clang.
+        // Assigned as a whole, in its memory layout: gcc and clang make one store of it.
         const iw_codec_speed_t speed = {iw_be_low_i16(word), iw_be_low_i16(word >> 16)};
         wheel[iw_codec_side(id)].speed = speed;
         return IW_CODEC_SPEED;
@@ -201,7 +202,7 @@ iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec
 
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame) {
-    // The last line of defence: limits and envelope have judged it already.
+    // The last check of the current: limits and envelope have checked it before.
     int32_t current_mA = setpoint->current_mA;
     const bool clamped = current_mA < -IW_CURRENT_LIMIT_mA || current_mA > IW_CURRENT_LIMIT_mA;
     if (clamped) {

@@ -37,7 +37,7 @@ static const iw_config_t standard = {
 
 #define RADIUS_MAX_MM 400
 
-/// Ranges of the numbers of iw_config_t, in its order: so one loop checks all of them. Indexed by
+/// Ranges of the numeric fields in the order of iw_config_t, so that one loop checks all of them. The index is
 /// iw_config_fault_t - IW_CONFIG_PERIOD.
 static const iw_config_range_t ranges[] = {
     {5, 50},                            // period_ms
@@ -80,7 +80,7 @@ IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (FIELDS - 1U) * 
 /// 1 rpm at a radius of 1 mm is 0.10472 mm/s: 2618 / 25000.
 #define RPM_TERM  2618U
 #define MM_S_TERM 25000U
-// A rotor turns at least as often as its wheel (check_relations): then its rpm are more, not fewer.
+// A rotor turns at least as often as its wheel (check_relations), so its rpm are not fewer.
 IW_STATIC_ASSERT(REST_STANDARD_MM_S *MM_S_TERM >= RPM_TERM * RADIUS_MAX_MM, one_rpm_is_rest_with_every_wheel);
 
 static uint32_t divide_up(uint32_t numerator, uint32_t denominator) {
@@ -91,7 +91,7 @@ iw_config_range_t iw_config_range(iw_config_fault_t field) {
     return ranges[field - IW_CONFIG_PERIOD];
 }
 
-/// The largest whole rpm of telemetry that is no faster at the wheel.
+/// Returns the largest whole rpm of telemetry that is not faster than `speed_mm_s` at the wheel.
 static uint32_t slowest_rpm(const iw_config_t *config, uint32_t speed_mm_s) {
     const uint32_t turns = config->rpm_of_rotor ? config->gear_turns : 1U;
     const uint32_t per = config->rpm_of_rotor ? config->gear_per : 1U;
@@ -108,13 +108,13 @@ void iw_config_default(iw_config_t *out_config) {
     memcpy(out_config, &standard, sizeof standard);
 }
 
-/// From the client's last command until the wheels are told to stand, at most: lease, period and ramp.
+/// Longest time from the last command of a client until the output is zero: lease, period and ramp.
 static uint32_t client_lost_ms(const iw_config_t *config) {
     return (uint32_t)config->lease_ms + config->period_ms +
            divide_up(config->max_speed_mm_s * 1000U, config->decel_mm_s2);
 }
 
-/// R1: that must end before the wheel's own watchdog would.
+/// R1: the stop must end before the watchdog of the wheel.
 static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->current_role > IW_ROLE_SETPOINT) {
         return IW_CONFIG_CURRENT_ROLE;
@@ -122,7 +122,7 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->force_unit[IW_LEFT] > IW_FORCE_DN || config->force_unit[IW_RIGHT] > IW_FORCE_DN) {
         return IW_CONFIG_FORCE_UNIT;
     }
-    // A gearbox that speeds the wheel up is a swapped pair of numbers.
+    // A gearbox that makes the wheel faster than the rotor is a swapped pair of numbers.
     if (config->gear_turns < config->gear_per || config->gear_turns > GEAR_MAX * config->gear_per) {
         return IW_CONFIG_GEAR_RATIO;
     }
@@ -149,7 +149,7 @@ iw_config_fault_t iw_config_check(const iw_config_t *config) {
     return check_relations(config);
 }
 
-/// A way by setpoints, at the configured radius.
+/// Converts a distance by setpoints to the configured radius.
 static uint32_t real_mm(const iw_config_t *config, uint32_t way_mm) {
     return divide_up(way_mm * config->radius_mm, IW_SETPOINT_RADIUS_MM);
 }
@@ -158,7 +158,7 @@ iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
     iw_stop_budget_t budget;
-    // Worst case: the lease ends right after a pair was sent, at full speed on both wheels. v*v/2a is the ramp's way.
+    // Worst case: the lease ends directly after a pair, with both wheels at the maximum speed. The ramp takes v*v/2a.
     budget.client_lost_ms = client_lost_ms(config);
     const uint32_t lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
     budget.client_lost_mm = real_mm(config, lost_mm);

@@ -11,8 +11,8 @@ void iw_confirmation_clear(iw_confirmation_t *self) {
     }
 }
 
-/// R6: one setpoint without echo, and one zero behind it. A longer queue would be played to a wheel that
-/// regains power; without the second place a stop would wait for an echo that may never come.
+/// R6: one setpoint without echo, and one zero after it. A longer queue would reach a wheel that gets power again.
+/// Without the second place a stop would wait for an echo that may never arrive.
 uint32_t iw_confirmation_may_send(const iw_confirmation_t *self, bool zero) {
     const uint32_t places = zero ? 2U : 1U;
     const uint32_t left = (self->pending[IW_LEFT] < places) ? IW_SIDES_LEFT : IW_SIDES_NONE;
@@ -20,14 +20,14 @@ uint32_t iw_confirmation_may_send(const iw_confirmation_t *self, bool zero) {
     return left + right;
 }
 
-/// Speed and current as they stand in the frame: the four bytes behind the type tell one setpoint from the next.
+/// Speed and current as bytes of the frame: these four bytes identify a setpoint.
 IW_BE_INLINE uint32_t value_of(const iw_can_frame_t *frame) {
     return (iw_be_word(frame, 0) << 8) | (iw_be_word(frame, 1) >> 24);
 }
 
 void iw_confirmation_sent(iw_confirmation_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
                           bool accepted) {
-    // A refused frame starts the clock too: a port that takes nothing for `echo_ms` is a stalled send.
+    // A refused frame also starts the timer: a port that accepts nothing for `echo_ms` is a stalled send.
     if (self->waiting_us[side] == IW_NEVER) {
         self->waiting_us[side] = now_us;
     }

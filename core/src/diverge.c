@@ -7,13 +7,13 @@
 
 /// Shares are in 1/2^16.
 #define SHARE_ONE 65536U
-/// More time than this between two steps does not count: the steps would be late, and late ones do not compare.
+/// Longest time between two steps that counts. Later steps are late and do not compare.
 #define ELAPSED_MAX_US 50000U
-/// No speed and no deviation counts beyond these: far more than is configurable.
+/// Speeds and deviations are limited to these values, far above every configurable value.
 #define SPEED_MAX_MM_S 40000
 #define PATH_MAX_UM    1000000
 
-/// 1 rpm of a wheel of IW_SETPOINT_RADIUS_MM, in um/s: 2 pi x 192 mm / 60 s.
+/// 1 rpm of a wheel with IW_SETPOINT_RADIUS_MM, in um/s: 2 pi x 192 mm / 60 s.
 #define UM_S_PER_RPM 20106U
 
 void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config) {
@@ -49,12 +49,12 @@ void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us) {
     self->expected_um_s[IW_RIGHT] = self->measured_mm_s[IW_RIGHT] * 1000;
 }
 
-/// elapsed / span, at most one.
+/// Returns elapsed / span, at most one.
 static IW_APART uint32_t share_of(uint32_t elapsed_us, uint32_t span_us) {
     return (elapsed_us < span_us) ? (elapsed_us * SHARE_ONE + span_us / 2U) / span_us : SHARE_ONE;
 }
 
-/// By the middle of the time that has passed, so that long steps and short ones lead to the same.
+/// Uses the midpoint of the elapsed time, so that long and short steps have the same result.
 static uint32_t lag_share(uint32_t elapsed_us, uint32_t constant_ms) {
     return share_of(elapsed_us, constant_ms * IW_US_PER_MS + elapsed_us / 2U);
 }
@@ -71,7 +71,8 @@ static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t per
     return progress / percent < iw_abs(expected) / 100;
 }
 
-/// How much faster (slower: negative) a wheel is than it should be by now, beyond what is ordinary.
+/// Returns the difference between measured and expected speed beyond ordinary differences; negative if the wheel is
+/// slower.
 static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     const int32_t expected = self->expected_um_s[side];
     const int32_t difference = self->measured_mm_s[side] * 1000 - expected;

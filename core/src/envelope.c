@@ -4,24 +4,24 @@
 #include "arithmetic.h"
 #include "iwheel/codec.h"
 
-/// Both speeds are cut off to whole mm/s: so far may the difference of a pair seem to grow by that alone.
+/// The speeds of a pair are rounded to whole mm/s. Rounding alone can increase their difference by this.
 #define TURN_ROUNDING_MM_S 2U
-/// A setpoint means its speed at this radius: written here again, so that no error is shared.
+/// Radius of setpoints. It is defined again here, so that this file shares no error with others.
 #define SETPOINT_RADIUS_MM 192U
 
-/// How much of the time since then counts.
+/// Longest elapsed time that counts.
 static IW_APART uint32_t counted_us(iw_time_us_t last_us, iw_time_us_t now_us) {
     const uint32_t elapsed_us = iw_age_us(last_us, now_us);
     return (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
 }
 
-/// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
+/// Returns the largest change in mm/s that `slope` allows in that time, plus 1 mm/s for the rounding of both speeds.
 static uint32_t allowance(uint32_t slope_mm_s2, uint32_t elapsed_us) {
     const uint32_t change_um_s = slope_mm_s2 * (elapsed_us / 1000U) + slope_mm_s2 * (elapsed_us % 1000U) / 1000U;
     return 1U + change_um_s / 1000U;
 }
 
-/// A reversal must pass through a zero that was sent, even where both slopes together would allow the step.
+/// A reversal must pass through a zero that was sent, even if both slopes together would allow the step.
 static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t now_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = (uint32_t)iw_abs(last_mm_s);
@@ -38,7 +38,7 @@ static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t now_
     return change <= allowance(slope_mm_s2, elapsed_us);
 }
 
-/// Read as the wheel reads it, byte by byte, and not with our own codec: an error in that would judge itself right.
+/// Reads the bytes like the wheel, without the core's codec, because an error of the codec would hide itself.
 static iw_codec_setpoint_t as_the_wheel_reads(const uint8_t *data) {
     const iw_codec_setpoint_t setpoint = {
         .speed_mm_s = (int16_t)(uint16_t)(data[1] * 256U + data[2]),
@@ -48,7 +48,7 @@ static iw_codec_setpoint_t as_the_wheel_reads(const uint8_t *data) {
     return setpoint;
 }
 
-/// In the role of a limit a zero keeps its current: with a limit of 0 mA a motor has no torque to stop with.
+/// With IW_ROLE_LIMIT a zero has a current: with a limit of 0 mA a motor has no torque to stop with.
 static bool is_zero(const iw_config_t *config, const iw_codec_setpoint_t *setpoint) {
     return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
 }
@@ -58,7 +58,7 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 }
 
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
-    // A wheel with a limit near 0 has no torque; the document does not say what a limit below zero means.
+    // A wheel with a limit near 0 has no torque. The document does not define a limit below zero.
     const bool low_limit = config->current_role == IW_ROLE_LIMIT && current_mA < (int32_t)config->min_current_mA;
     return !low_limit && (uint32_t)iw_abs(current_mA) <= config->max_current_mA;
 }
@@ -75,7 +75,7 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
     if ((uint32_t)iw_abs(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_ENVELOPE_SPEED;
     }
-    // R8: a stop is never held up by its own slope.
+    // R8: the slope never delays a stop.
     if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us, setpoint->speed_mm_s)) {
         return IW_ENVELOPE_SLEW;
     }
@@ -99,15 +99,15 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_
     return verdict;
 }
 
-/// Right minus left in the machine's frame, without sign.
+/// Returns |right - left| in the machine's frame.
 static uint32_t turn_of(const iw_config_t *config, int32_t left_mm_s, int32_t right_mm_s) {
     const int32_t left = config->invert[IW_LEFT] ? -left_mm_s : left_mm_s;
     const int32_t right = config->invert[IW_RIGHT] ? -right_mm_s : right_mm_s;
     return (uint32_t)iw_abs(right - left);
 }
 
-/// R17, with both sides multiplied by what would be divided by: mrad/s = mm/s x radius x 1000 / (192 mm x track). A
-/// pair that turns no more than the last one passes, as every stop does.
+/// R17 without division: mrad/s = mm/s x radius x 1000 / (192 mm x track). A pair with no larger yaw rate than the last
+/// one passes, like every stop.
 static bool turn_ok(const iw_envelope_t *self, iw_time_us_t now_us, uint32_t turn_mm_s) {
     const iw_config_t *const config = self->config;
     const uint32_t span_mm2 = config->track_mm * SETPOINT_RADIUS_MM;
@@ -118,7 +118,7 @@ static bool turn_ok(const iw_envelope_t *self, iw_time_us_t now_us, uint32_t tur
     if (turn_mm_s <= most) {
         return true;
     }
-    // A zero may have passed for one wheel alone: what the pair does counts from the later of both.
+    // A zero may have passed for one wheel alone. The time of the pair counts from the later frame.
     const iw_time_us_t last_us =
         (self->last_us[IW_LEFT] > self->last_us[IW_RIGHT]) ? self->last_us[IW_LEFT] : self->last_us[IW_RIGHT];
     return (uint64_t)((turn_mm_s - most) * config->radius_mm) * 1000000000U <=

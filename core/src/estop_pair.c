@@ -12,7 +12,7 @@ static bool has_differed(const iw_estop_pair_t *self, iw_time_us_t now_us) {
     return self->differ_us != IW_NEVER && iw_age_us(self->differ_us, now_us) > self->limit_us;
 }
 
-/// Only a press that both have seen, and its end, shows that both contacts work again.
+/// Only a press of both contacts and its end show that both contacts work again.
 static void follow(iw_estop_pair_t *self, bool one, bool both) {
     if (both) {
         self->proven = true;

@@ -3,7 +3,7 @@
 
 #include "arithmetic.h"
 
-/// The bit of a verdict in `running`.
+/// Returns the bit of a verdict in `running`.
 #define BIT(verdict) (1U << (uint32_t)(verdict))
 
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
@@ -11,7 +11,8 @@ void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     iw_follow_restart(self);
 }
 
-/// Starts the clocks of what holds since now, stops those of what holds no more. The gravest verdict that is due.
+/// Starts the timers of conditions that begin to hold, stops those of conditions that end, and returns the most severe
+/// verdict that is due.
 static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, uint32_t holds) {
     const uint32_t for_us[IW_FOLLOW_VERDICTS] = {
         [IW_FOLLOW_SIGN] = IW_FOLLOW_SIGN_US,
@@ -21,7 +22,7 @@ static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, ui
     const uint32_t begun = holds & ~(uint32_t)self->running;
     iw_follow_verdict_t verdict = IW_FOLLOW_OK;
     self->running = (uint8_t)holds;
-    // All clocks run on, also behind a graver verdict: each condition must be timed by itself.
+    // All timers run, also after a more severe verdict, because each condition is timed on its own.
     for (uint32_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
         if ((begun & BIT(i)) != 0U) {
             self->since_us[i] = now_us;

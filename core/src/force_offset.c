@@ -5,12 +5,12 @@
 
 #include <string.h>
 
-/// Samples in one half of the window; the means of both halves show drift.
+/// Number of samples in one half of the window. The means of both halves show drift.
 #define HALF (IW_FORCE_WINDOW_SAMPLES / 2U)
-/// Deviations of one sample are capped here (raw), so that the sum of their squares fits 32 bits. Far beyond quiet in
-/// either unit.
+/// Limit of the deviation of one sample (raw), so that the sum of squares fits 32 bits. It is far above a quiet sensor
+/// in both units.
 #define SPREAD_MAX 8191
-/// A variance up to this (raw) can be scaled to mN before the root without leaving 32 bits.
+/// Largest variance (raw) that fits 32 bits after scaling to mN.
 #define VARIANCE_FINE 400000U
 
 IW_STATIC_ASSERT(IW_FORCE_WINDOW_SAMPLES <= UINT8_MAX, ring_index_fits);
@@ -20,7 +20,7 @@ static int32_t scale_mN(const iw_force_t *self) {
     return (self->unit == IW_FORCE_CN) ? 10 : 100;
 }
 
-/// The ends of 16 bits are the sensor's limit, not a force.
+/// The limits of 16 bits are the sensor's limits, not a force.
 static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
@@ -43,7 +43,7 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->observation = IW_UNIT_UNKNOWN;
     self->observed_permille = 0;
     memset(&self->quality, 0, sizeof self->quality);
-    // The wheel will measure its offset anew; until then the old one is only a memory. A tare survives a reboot.
+    // The wheel measures its offset again; until then the old one is only stored. A tare survives a reboot.
     if (self->provenance == IW_OFFSET_WHEEL || self->provenance == IW_OFFSET_ESTIMATED) {
         self->provenance = IW_OFFSET_STORED;
     }
@@ -61,7 +61,7 @@ void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32
     }
 }
 
-/// Bit by bit: the core has neither floating point nor libm.
+/// Integer square root, bit by bit: the core has neither floating point nor libm.
 static uint32_t square_root(uint32_t value) {
     uint32_t root = 0;
     for (uint32_t bit = 1U << 15; bit != 0U; bit >>= 1) {
@@ -81,14 +81,14 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
         sum += capped * capped;
     }
     const uint32_t variance = sum / IW_FORCE_WINDOW_SAMPLES;
-    // Scaled before the root where 32 bits allow it: else a deviation below one raw unit (0.1 N in dN) would round to
-    // 0.
+    // Scales before the root if 32 bits allow it. Otherwise a deviation below one raw unit (0.1 N in dN) would be
+    // rounded to 0.
     const bool fine = variance <= VARIANCE_FINE;
     const uint32_t root = square_root(fine ? variance * scale * scale : variance);
     return fine ? root : root * scale;
 }
 
-/// Of several faults the first of moving, noisy, drift is told: each would cause those behind it.
+/// Returns the first of the faults moving, noisy and drift, because each causes the following ones.
 static iw_window_t judge_quality(const iw_force_t *self, const iw_force_quality_t *quality) {
     if (self->still < IW_FORCE_WINDOW_SAMPLES) {
         return IW_WINDOW_MOVING;
@@ -99,8 +99,8 @@ static iw_window_t judge_quality(const iw_force_t *self, const iw_force_quality_
     return (iw_abs(quality->drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) ? IW_WINDOW_DRIFT : IW_WINDOW_GOOD;
 }
 
-/// The ring is full, so the oldest sample stands at `next`: the first half is the older one. A saturated sample comes
-/// before every other fault.
+/// The ring is full, so `next` is the index of the oldest sample and the first half is the older one. A saturated
+/// sample takes precedence over every other fault.
 static void measure(const iw_force_t *self, iw_force_quality_t *out_quality) {
     const int32_t scale = scale_mN(self);
     bool any_saturated = false;
@@ -137,8 +137,8 @@ static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) 
     return iw_abs(difference) * 100 <= whole * percent;
 }
 
-/// At rest raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
-/// since each is narrower than the gap to the next; a ratio that fits none of them is unclear.
+/// At rest, raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
+/// since each is narrower than the gap to the next. A ratio outside all of them is unclear.
 static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_abs(offset_dN);
     if (within(mean_raw - 10 * offset_dN, 10 * offset, IW_FORCE_OBSERVED_PERCENT)) {
@@ -150,9 +150,8 @@ static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
     return within(mean_raw, offset, IW_FORCE_REMOVED_PERCENT) ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
 }
 
-/// Compares our own mean with the wheel's offset, once there are both and the window was good. Too small an offset
-/// cannot tell units apart (0 in cN is 0 in dN), but a mean far from it still shows a load in one of the two
-/// measurements.
+/// Compares the mean of a good window with the wheel's offset. A small offset cannot decide the unit (0 in cN is 0 in
+/// dN), but a mean far from it still shows a load in one of the two measurements.
 static void judge_evidence(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
@@ -167,8 +166,8 @@ static void judge_evidence(iw_force_t *self) {
     }
 }
 
-/// Puts the wheel's own offset in force, unless we saw it being measured under load ("only has sense if you don't apply
-/// any force to the shaft during the first two seconds"). A start that nobody saw gets the benefit of the doubt.
+/// Uses the wheel's offset, unless the window shows a load during its measurement ("only has sense if you don't apply
+/// any force to the shaft during the first two seconds"). If the start was not observed, the offset is used.
 static void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
     judge_evidence(self);
@@ -179,7 +178,7 @@ static void settle(iw_force_t *self, iw_time_us_t now_us) {
 
 static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     measure(self, &self->quality);
-    // A steady load looks like a quiet sensor: only an offset trusted before shows it.
+    // A steady load looks like a quiet sensor; only a trusted offset reveals it.
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
     if (self->quality.window == IW_WINDOW_GOOD && known &&
         far_from_offset(self, self->quality.mean_mN, IW_FORCE_SHIFT_mN)) {
@@ -191,7 +190,7 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     settle(self, now_us);
 }
 
-/// Counted up to a full ring.
+/// Counts up to a full ring.
 static uint8_t one_more(uint8_t samples) {
     return (samples < IW_FORCE_WINDOW_SAMPLES) ? (uint8_t)(samples + 1U) : samples;
 }
@@ -223,7 +222,7 @@ iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us) {
     }
     iw_force_quality_t quality;
     measure(self, &quality);
-    // An offset that is itself in doubt must not veto the tare that would replace it.
+    // An offset in doubt must not refuse the tare that would replace it.
     const bool doubted = self->observation == IW_UNIT_UNCLEAR || self->observation == IW_UNIT_OFFSET_REMOVED;
     const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
     if (quality.window == IW_WINDOW_SATURATED) {
@@ -260,12 +259,12 @@ iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_u
     if (self->provenance == IW_OFFSET_NONE) {
         return IW_FORCE_NO_OFFSET;
     }
-    // Before the tare: no offset mends a wrong unit.
+    // The tare comes after this check: no offset corrects a wrong unit.
     if (unit_contradicted(self)) {
         return IW_FORCE_UNIT_CONTRADICTED;
     }
     if (self->provenance == IW_OFFSET_OPERATOR) {
-        return IW_FORCE_VALID; // Measured on what the wheel sends, whatever it subtracts.
+        return IW_FORCE_VALID; // The tare includes what the wheel subtracts.
     }
     if (self->observation == IW_UNIT_OFFSET_REMOVED) {
         return IW_FORCE_OFFSET_REMOVED;

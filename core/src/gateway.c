@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-/// Where each assumption comes from before anything is measured.
+/// Sources of the assumptions before any measurement.
 static void assume(iw_gateway_t *self) {
     const iw_config_t *const config = &self->config;
     iw_assumption_store_t *const assumptions = &self->assumptions;
@@ -40,7 +40,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     if (fault != IW_CONFIG_OK) {
         return fault;
     }
-    // Copied before any part is initialised: the parts keep pointers to this copy, not to the caller's.
+    // Copies the configuration before it initializes the parts, because they point to the copy.
     memset(self, 0, sizeof *self);
     memcpy(&self->config, config, sizeof self->config);
     memcpy(&self->hal, hal, sizeof self->hal);
@@ -67,20 +67,21 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 }
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
-    // The latch is reported first: it must be reset before anything else can be mended.
+    // A latch is reported first: it must be reset before anything else can be fixed.
     if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->assumptions.doubt != IW_ASSUMPTION_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
     const bool held = self->permit.holder == client;
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
     if (refusal == IW_REFUSE_NONE && !held) {
-        // R3: what was commanded before counts no more, even if no step has come between.
+        // R3: an earlier command has no effect, even without a step in between.
         iw_setpoint_collapse(&self->setpoint, now_us);
     }
     return refusal;
 }
 
-/// Scales both values by one factor, so that the larger is `limit`: the curve stays the same. True if they had to be.
+/// Scales both values by one factor, so that the larger one is `limit` and the curve remains. Returns true if it scaled
+/// them.
 static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     const int32_t left = iw_abs(values[IW_LEFT]);
     const int32_t right = iw_abs(values[IW_RIGHT]);
@@ -93,7 +94,7 @@ static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     return true;
 }
 
-/// What is wrong with the values of a request, whoever sends it.
+/// Checks the values of a request, independent of its client.
 static IW_APART iw_refusal_t refuse_values(const iw_config_t *config, const iw_drive_t *request) {
     // A current limit has no sign.
     const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
@@ -117,7 +118,8 @@ static IW_APART bool drive_nonzero(const iw_config_t *config, const iw_drive_t *
     return speed || (current && config->current_role == IW_ROLE_SETPOINT);
 }
 
-/// Too fast is scaled, not refused: the client's direction is right, and a refusal would let the lease run out.
+/// Scales a command that is too fast instead of refusing it: its direction is right, and a refusal would let the lease
+/// run out.
 static iw_applied_t limit_drive(const iw_config_t *config, const iw_yaw_t *yaw, const iw_drive_t *request) {
     iw_drive_t drive = *request;
     iw_applied_t applied;
@@ -145,7 +147,8 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_clien
     const bool nonzero = drive_nonzero(config, request);
     const iw_refusal_t wrong = refuse_values(config, request);
     if (wrong != IW_REFUSE_NONE) {
-        // Refused for its values, it still shows that somebody wants motion: arm and reset are refused for a while.
+        // A request that is refused for its values still shows that a client wants motion: arm and reset are refused
+        // for some time.
         if (nonzero) {
             iw_permit_remember(&self->permit, sent_us, client);
         }
@@ -181,14 +184,15 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
     iw_permit_disconnect(&self->permit, now_us, client);
 }
 
-/// Whether one wheel could be tared (`judging`), or its tare.
+/// Checks whether a wheel can be tared (`judging`), or tares it.
 static IW_APART iw_tare_t tare_wheel(iw_gateway_t *self, iw_side_t side, iw_time_us_t now_us, bool judging) {
     iw_force_t *const force = &self->force[side];
     return judging ? iw_force_may_tare(force, now_us) : iw_force_tare(force, now_us);
 }
 
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
-    // R9: a request is applied whole or not at all. So twice over the wheels: both are judged before one is changed.
+    // R9: a request is applied as a whole or not at all. The first pass checks both wheels, the second one changes
+    // them.
     for (uint32_t i = 0; i < 2U * IW_SIDES; i++) {
         const uint32_t side = i % IW_SIDES;
         const bool wanted = (sides & (1U << side)) != 0U;

@@ -6,9 +6,9 @@
 
 #include <string.h>
 
-/// |permille - 1000| up to which the figure is stored as it is; beyond, it would not fit 32 bits.
+/// Largest |permille - 1000| that is stored as it is. A larger value would not fit 32 bits.
 #define FIGURE_OFF_MAX (INT32_MAX / 2)
-/// The largest step that a pose can make: half of 16 bits in X, Y and PSI.
+/// Largest step of a pose: half of 16 bits in X, Y and PSI.
 #define POSE_STEP_MAX (3 * 32768)
 
 IW_STATIC_ASSERT((int64_t)(IW_OBSERVATION_POSE_FAR + 2 * POSE_STEP_MAX) * 1000 <= INT32_MAX, figure_of_the_pose_fits);
@@ -18,7 +18,7 @@ void iw_observation_init(iw_observation_t *self) {
     self->pose_us = IW_NEVER;
 }
 
-/// What is no longer only assumed needs no more evidence for it.
+/// Only an assumption with the state ASSUMED needs observations.
 static void confirm(iw_gateway_t *gateway, const iw_snapshot_t *seen, iw_assumption_item_t item, int32_t figure) {
     const iw_assumption_entry_t entry = {IW_CONFIRMED, IW_SOURCE_BUS, figure};
     if (seen->assumed[item].state == IW_ASSUMED) {
@@ -31,7 +31,7 @@ static void contradict(iw_gateway_t *gateway, iw_assumption_item_t item, int32_t
     iw_gateway_set_assumption(gateway, item, &entry);
 }
 
-/// Adds what it turned since the last speed frame. A gap, a slow wheel or a new direction ends the stretch.
+/// Adds the turn since the last speed message. A gap, a slow wheel or a new direction ends the stretch.
 static void add_turn(iw_observation_wheel_t *self, const iw_snapshot_wheel_t *wheel) {
     const iw_time_us_t elapsed_us = wheel->speed_us - self->speed_us;
     const int16_t rpm = wheel->told->speed.speed_rpm;
@@ -46,7 +46,7 @@ static void add_turn(iw_observation_wheel_t *self, const iw_snapshot_wheel_t *wh
     self->rpm = rpm;
 }
 
-/// One rotor rpm is one tick per second, since 60 ticks are one turn.
+/// One rotor rpm is one tick per second, because 60 ticks are one turn.
 static int64_t expected_ticks(const iw_observation_wheel_t *self, const iw_config_t *config) {
     const int64_t turned = self->turned / 1000000;
     return config->rpm_of_rotor ? turned : turned * config->gear_turns / config->gear_per;
@@ -56,7 +56,7 @@ static int64_t absolute(int64_t value) {
     return (value < 0) ? -value : value;
 }
 
-/// `moved`: the way the rpm say.
+/// `moved`: ticks that the rpm predict.
 static void judge_ratio(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen, int64_t moved,
                         int64_t expected) {
     const int64_t permille = moved * 1000 / expected;
@@ -73,7 +73,7 @@ static void judge_ratio(iw_observation_wheel_t *self, iw_gateway_t *gateway, con
     }
 }
 
-/// Stretches begin and end with a status frame, which brings the ticks.
+/// A stretch begins and ends with a status message, which has the ticks.
 static void compare_ticks(iw_observation_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
                           int64_t ticks) {
     if (self->open) {
@@ -129,7 +129,7 @@ static iw_codec_pose_t reversed_pose(const iw_codec_pose_t *pose) {
     return other;
 }
 
-/// The shorter way round 16 bits: X, Y and PSI wrap.
+/// Returns the shorter distance modulo 16 bits, because X, Y and PSI wrap.
 static int32_t way(int16_t from, int16_t to) {
     return iw_abs((int16_t)(uint16_t)((uint16_t)to - (uint16_t)from));
 }
@@ -138,7 +138,7 @@ static int32_t pose_step(const iw_codec_pose_t *from, const iw_codec_pose_t *to)
     return way(from->x_mm, to->x_mm) + way(from->y_mm, to->y_mm) + way(from->psi_mrad, to->psi_mrad);
 }
 
-/// `moved` is not 0: every step that was counted moved.
+/// `moved` is not 0, because every counted step moved.
 static void judge_pose(iw_observation_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
     const int32_t figure = self->reversed * 1000 / self->moved;
     if (self->reversed >= IW_OBSERVATION_POSE_FACTOR * self->moved) {

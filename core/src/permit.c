@@ -7,11 +7,11 @@
 
 #include <string.h>
 
-/// What a phase is called outside, and what it demands of the scheduler.
+/// State that clients see in a phase, and its demand on the scheduler.
 typedef struct {
     uint8_t state;   ///< An iw_state_t.
     uint8_t demand;  ///< An iw_demand_t.
-    uint8_t at_once; ///< The same where zero is wanted without a ramp.
+    uint8_t at_once; ///< The demand if zero without a ramp is required.
 } phase_row_t;
 
 static const phase_row_t phases[IW_PHASES] = {
@@ -30,7 +30,7 @@ IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_permit);
 
 #define US_PER_S 1000000U
 
-/// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
+/// Setpoints without echo that a dying process can leave in its controller: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U
 
 iw_state_t iw_permit_state(const iw_permit_t *self) {
@@ -50,7 +50,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->diverged_us[1] = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
     self->keeps = config->hold;
-    // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
+    // Fault 25: after a crash in ARMED the wheels hold the last command until their own watchdog ends it.
     if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
@@ -67,13 +67,13 @@ static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, uint32_t span_us
     self->lease_until_us = now_us + span_us;
 }
 
-/// From now on the holder drives: ARMED begins, or the lease changes hands.
+/// Gives the lease to `client`: ARMED begins, or the lease is taken over.
 static IW_APART void begin_driving(iw_permit_t *self, iw_time_us_t now_us) {
     self->armed_us = now_us;
     grant_lease(self, now_us, IW_FIRST_LEASE_US);
 }
 
-/// How long ago the lease was last renewed.
+/// Returns the time since the last renewal of the lease.
 static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
     return iw_age_us(self->lease_from_us, now_us) / IW_US_PER_MS;
 }
@@ -82,7 +82,7 @@ uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
     return iw_cause_present(self->present | self->raised, self->seen_us, now_us);
 }
 
-/// Arming failed: back to the phase it was asked from. `hold_us` tells BRAKING from HOLDING.
+/// Ends a failed arming: returns to the phase before it. `hold_us` distinguishes BRAKING from HOLDING.
 static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     const iw_phase_t zeros = (self->hold_us == IW_NEVER) ? IW_PHASE_BRAKING : IW_PHASE_HOLDING;
     if (iw_permit_arming(self)) {
@@ -92,12 +92,13 @@ static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     }
 }
 
-/// Without a ramp: as the event says, else as its cause always does.
+/// Returns true for a stop without a ramp, as the event or else its cause requires.
 static bool is_at_once(const iw_event_t *event) {
     return (event->react == IW_REACT_BY_CAUSE) ? iw_cause_rows[event->cause].at_once : event->react == IW_REACT_ZERO;
 }
 
-/// Records why the wheels stop. Before the phase changes: `from`, holder and applied speeds are those of the moment.
+/// Records the stop. It runs before the phase changes, so that `from`, holder and applied speeds are those of the
+/// moment.
 static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     iw_stop_t *const stop = &self->stop;
     stop->at_us = now_us;
@@ -112,7 +113,7 @@ static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_
     stop->at_once = is_at_once(event);
 }
 
-/// Release: a ramp, because a hard stop topples whoever leans on the machine. `at_once` where waiting is the greater
+/// Stops by a ramp, because a hard stop topples a person who leans on the machine. `at_once` if waiting is the greater
 /// risk.
 static IW_APART void brake(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
@@ -123,27 +124,27 @@ static IW_APART void brake(iw_permit_t *self, const iw_event_t *event, iw_time_u
     self->holder = IW_CLIENT_NONE;
 }
 
-/// A stop with nothing more to tell than its cause and a time.
+/// Records a stop that has only a cause and a time.
 static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us, uint32_t detail) {
     const iw_event_t event = {cause, IW_SIDES_NONE, detail, IW_REACT_BY_CAUSE};
     brake(self, &event, now_us);
 }
 
-/// From LISTENING no zeros are sent: nothing of ours moves the wheels, and another master may be driving them.
+/// From LISTENING no zeros are sent: the core does not move the wheels, and another master may drive them.
 static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
     self->stop.latched = true;
     const bool silent = self->phase == IW_PHASE_LISTENING;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
-    // Who released the hold before did not know of it.
+    // The client that released the hold before did not know of this latch.
     self->kept = self->keeps;
     self->at_once = is_at_once(event);
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
 }
 
-/// ARMING and RESTARTING send nothing but zeros: a fault there refuses arm, and needs no latch.
+/// ARMING and RESTARTING send only zeros, so a fault there refuses arm and needs no latch.
 static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     switch (self->phase) {
     case IW_PHASE_LISTENING:
@@ -155,19 +156,19 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     }
 }
 
-/// A setpoint of another sender in RESTARTING. The first few may be the dead process's own, still in its controller;
-/// more than it can have left there means a second master that drives, to whom the hold gives way (fault 25).
+/// Counts a setpoint of another sender in RESTARTING. The first ones may be those of the dead process in its
+/// controller. More of them show a second master that drives, and the hold ends (fault 25).
 static void count_stranger(iw_permit_t *self) {
     self->strangers++;
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
-/// A cause that neither latches nor stops a holder: it ends arming.
+/// Handles a cause that neither latches nor stops a holder: it ends arming.
 static void bear(iw_permit_t *self, iw_cause_t cause) {
     end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
 }
 
-/// A pair that diverges again and again has a fault that arming anew does not end: the third time latches.
+/// A pair that diverges repeatedly has a fault that another arm does not end, so the third time latches.
 static bool diverges_again(iw_permit_t *self, iw_time_us_t now_us) {
     const bool again = iw_age_us(self->diverged_us[1], now_us) < IW_PERMIT_DIVERGED_US;
     self->diverged_us[1] = self->diverged_us[0];
@@ -175,7 +176,7 @@ static bool diverges_again(iw_permit_t *self, iw_time_us_t now_us) {
     return again;
 }
 
-/// ARMED: the wheels stop, and mostly that is all.
+/// Handles a cause in ARMED: the wheels stop.
 static void stop_holder(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     if (event->cause == IW_CAUSE_PAIR_DIVERGES && diverges_again(self, now_us)) {
         latch(self, event, now_us);
@@ -184,13 +185,13 @@ static void stop_holder(iw_permit_t *self, const iw_event_t *event, iw_time_us_t
     }
 }
 
-/// LATCHED keeps its first cause: what follows is mostly a consequence of it.
+/// LATCHED retains its first cause, because later causes are mostly consequences of it.
 void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     const iw_cause_t cause = event->cause;
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     self->quiet = false;
-    // A ramp that is going on ends with whatever allows none.
+    // A cause without a ramp ends a ramp that is active.
     self->at_once = self->at_once || is_at_once(event);
     if (iw_refuse_latched(self)) {
         return;
@@ -213,7 +214,7 @@ void iw_permit_keep_present(iw_permit_t *self) {
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     const uint32_t limit_us = self->config->echo_ms * IW_US_PER_MS;
     const uint32_t waited_us = iw_age_us(self->arming_us, now_us);
-    // An echo that comes too late does not arm, even if no step has ended the wait yet.
+    // A late echo does not arm, even if no step has ended the wait yet.
     if (self->view.proven && waited_us <= limit_us) {
         self->phase = IW_PHASE_ARMED;
         begin_driving(self, now_us);
@@ -222,39 +223,39 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// Whether the hold ends by time alone: the wheels stand, or nobody can wait for that. After a restart they may not
-/// even be heard, and the wheel's own watchdog (1 s) is shorter than the hold.
+/// Returns true if the hold ends by time alone: the wheels are at standstill, or it cannot wait for that. After a
+/// restart there may be no telemetry, and the wheel's own watchdog (1 s) is shorter than the hold.
 static bool time_is_enough(const iw_permit_t *self) {
     return self->view.settled || self->phase == IW_PHASE_RESTARTING;
 }
 
-/// One wheel offline, latched: the ramp goes on, and zeros are held from its end.
+/// Returns true while the ramp of a latch with one wheel offline continues. The zeros are counted from its end.
 static bool is_ramping(const iw_permit_t *self) {
     return self->phase == IW_PHASE_CUT && !self->at_once && !self->view.output_zero;
 }
 
-/// A second master who moves the wheels is not fought for longer than needed.
+/// The core does not send zeros against a second master for longer than needed.
 static IW_APART bool is_contested(const iw_permit_t *self) {
     const iw_time_us_t other_us = self->seen_us[IW_CAUSE_SECOND_MASTER];
     return other_us != IW_NEVER && other_us >= self->hold_us;
 }
 
-/// The longest time that zeros are held.
+/// Returns the longest duration of the zeros.
 static uint32_t longest_us(const iw_permit_t *self) {
     return is_contested(self) ? IW_PERMIT_CONTESTED_US : self->config->hold_max_s * US_PER_S;
 }
 
-/// Zeros are held.
+/// Returns true in phases that send zeros until a time or an event.
 static bool is_holding(iw_phase_t phase) {
     return phase >= IW_PHASE_HOLDING && phase <= IW_PHASE_CUT;
 }
 
-/// R19: a machine on a slope does not roll because time has passed.
+/// R19: a machine on a slope must not roll because time has passed.
 bool iw_permit_holding(const iw_permit_t *self) {
     return self->kept && (self->phase == IW_PHASE_HOLDING || self->phase == IW_PHASE_CUT) && !is_contested(self);
 }
 
-/// What follows when zeros are no longer held.
+/// Returns the phase after the zeros.
 static iw_phase_t after_hold(const iw_permit_t *self) {
     if (self->phase == IW_PHASE_CUT) {
         return IW_PHASE_LATCHED;
@@ -262,26 +263,26 @@ static iw_phase_t after_hold(const iw_permit_t *self) {
     return (self->phase == IW_PHASE_RESTARTING && self->kept) ? IW_PHASE_HOLDING : IW_PHASE_LISTENING;
 }
 
-/// Zeros for `zero_hold_ms` and until the wheels stand, but at most `hold_max_s`: a wheel that is pushed or has a fault
-/// would otherwise be fed for ever.
+/// Sends zeros for `zero_hold_ms` and until the wheels are at standstill, but at most `hold_max_s`. Otherwise a wheel
+/// that is pushed or faulty would receive zeros without end.
 static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
     if (is_ramping(self)) {
         self->hold_us = now_us;
     }
     if (iw_permit_holding(self)) {
-        // Released, the zeros for a wheel that turns have all their time.
+        // After a release, the zeros for a turning wheel have their full time.
         if (!time_is_enough(self)) {
             self->hold_us = now_us;
         }
         return;
     }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
-    // Silence with a moving wheel is an event that the operator must hear of.
+    // The end of zeros for a moving wheel is an event that the operator must see.
     const bool gives_up = held_us >= longest_us(self) && !self->view.settled;
     self->still_moving += gives_up ? 1U : 0U;
     if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
         self->phase = after_hold(self);
-        // What the dead process had left in its controller is no second master to the hold that follows.
+        // Setpoints that the dead process left in its controller do not count as a second master in the next hold.
         self->hold_us = now_us;
     }
 }
@@ -327,7 +328,7 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     if (self->holder == client) {
-        // The lease is not renewed: only drive commands do that.
+        // Arm does not extend the lease; only drive commands do.
         return IW_REFUSE_NONE;
     }
     const iw_refusal_t refusal = iw_refuse_arm(self, now_us, takeover);
@@ -343,7 +344,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     return IW_REFUSE_NONE;
 }
 
-/// Commands of several clients need not come in the order in which they were sent: the latest counts.
+/// Commands of several clients may arrive in another order than they were sent: the latest one counts.
 void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     if (self->stale_us == IW_NEVER || now_us >= self->stale_us) {
         self->stale_us = now_us;
@@ -352,7 +353,7 @@ void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t clie
 }
 
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {
-    // A refused one too: it shows that somebody wants motion.
+    // A refused command counts too: it shows that a client wants motion.
     if (nonzero) {
         iw_permit_remember(self, sent_us, client);
     }
@@ -363,7 +364,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
     return refusal;
 }
 
-/// Whoever drives or arms does so no longer.
+/// Ends the lease and the arming of a client.
 static IW_APART void end_holder(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us) {
     if (self->phase == IW_PHASE_ARMED) {
         brake_after(self, cause, now_us, 0);

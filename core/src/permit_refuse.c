@@ -20,17 +20,17 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
     return iw_cause_refusal(iw_permit_present(self, now_us));
 }
 
-/// The button comes first: no reset helps while it is pressed, and that is the one cure the user can see.
+/// The button takes precedence: no reset helps while it is pressed, and it is the only fix that the user can see.
 static iw_refusal_t refuse_latched(iw_refusal_t present) {
     return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
 }
 
-/// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
+/// R3: a deflected joystick at arm or reset must not set the machine in motion.
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return iw_age_us(self->stale_us, now_us) < IW_STALE_COMMAND_US;
 }
 
-/// Reasons against sending at all: configuration and latch first, since what comes after them may pass by itself.
+/// Reasons against any sending. Configuration and latch come first, because the other reasons may end on their own.
 static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
     if (self->config->listen_only) {
@@ -67,7 +67,7 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, b
     if (!self->view.at_rest || !self->view.output_zero) {
         return IW_REFUSE_NOT_AT_REST;
     }
-    // Out of silence a frame still in the controller is an old one: arming behind it would send it first.
+    // In LISTENING a frame that is still in the controller is an old one. A pair after it would send it first.
     if (self->phase == IW_PHASE_LISTENING && !self->view.can_send) {
         return IW_REFUSE_SEND_STALLED;
     }
@@ -79,12 +79,12 @@ iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, bool ta
     return (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
 }
 
-/// ARMED: only the holder drives, and only while the lease lasts, even if no step has ended it yet.
+/// In ARMED only the holder drives, and only while the lease lasts, even if no step has ended it yet.
 static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
     if (self->holder != client) {
         return IW_REFUSE_NOT_HOLDER;
     }
-    // It waited in a queue since before arm: not fresh (R3).
+    // The command waited in a queue since before arm, so it is not fresh (R3).
     if (sent_us < self->armed_us) {
         return IW_REFUSE_STALE_COMMAND;
     }
@@ -118,7 +118,7 @@ iw_refusal_t iw_refuse_reset(const iw_permit_t *self, iw_time_us_t now_us) {
     if (!self->view.heard) {
         return IW_REFUSE_WHEEL_LOST;
     }
-    // The ramp of one wheel offline goes on in LATCHED, and may end below what counts as rest.
+    // In LATCHED the ramp with one wheel offline continues, and it may end below `rest_rpm`.
     if (!self->view.at_rest || !self->view.output_zero) {
         return IW_REFUSE_NOT_AT_REST;
     }

@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: MIT
-/// Why a request is refused: every reason against arm, drive and reset, judged by the permission as it is. Nothing is
-/// changed here.
+/// Reasons to refuse arm, drive and reset in the present state of the permission. These functions change nothing.
 #ifndef IW_PERMIT_REFUSE_H
 #define IW_PERMIT_REFUSE_H
 
 #include "iwheel/private/permit.h"
 
-/// True if the configuration allows sending at all. Zeros of a restart need no track: no stop depends on it.
+/// Returns true if the configuration allows sending. Zeros after a restart do not need the track: no stop depends on
+/// it.
 bool iw_refuse_may_send(const iw_config_t *config);
 
-/// The wheels did not follow: whoever drove is refused for that until the hold ends.
+/// Returns true for causes by which wheels do not follow: the client that drove them is refused for it until the
+/// hold ends.
 bool iw_refuse_not_followed(iw_cause_t cause);
 
-/// The last phases: CUT and LATCHED.
+/// Returns true in the latched phases CUT and LATCHED.
 bool iw_refuse_latched(const iw_permit_t *self);
 
-/// Why a client that is not the holder is not armed now.
+/// Returns the reason why a client that is not the holder cannot be armed now.
 iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, bool takeover);
 
-/// Why a well-formed drive command is not accepted now.
+/// Returns the reason why a well-formed drive command is not accepted now.
 iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client);
 
-/// Why the latch stays. Only while latched.
+/// Returns the reason why the latch remains. Call it only while latched.
 iw_refusal_t iw_refuse_reset(const iw_permit_t *self, iw_time_us_t now_us);
 
 #endif

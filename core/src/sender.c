@@ -14,13 +14,13 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     iw_confirmation_clear(&self->confirmation);
 }
 
-/// A nonzero pair leaves whole or not at all (R5); a zero must not wait for the other wheel's echo (R6).
+/// A nonzero pair is sent as a whole or not at all (R5). A zero must not wait for the echo of the other wheel (R6).
 bool iw_sender_ready(const iw_sender_t *self, bool zero) {
     const uint32_t sides = iw_confirmation_may_send(&self->confirmation, zero);
     return zero ? sides != IW_SIDES_NONE : sides == IW_SIDES_BOTH;
 }
 
-/// The frame for one wheel, in the wheel's own direction.
+/// Encodes the frame for one wheel, in the wheel's own direction.
 static void prepare(iw_sender_t *self, iw_side_t side, const iw_command_t *command) {
     iw_can_frame_t *const frame = &self->frame[side];
     const iw_config_t *const config = self->config;
@@ -29,14 +29,14 @@ static void prepare(iw_sender_t *self, iw_side_t side, const iw_command_t *comma
     if (invert) {
         setpoint.speed_mm_s = (int16_t)-setpoint.speed_mm_s;
     }
-    // A limit has no direction: what a wheel makes of a negative one is not documented.
+    // A limit has no direction, and the document does not define a negative one.
     if (invert && config->current_role == IW_ROLE_SETPOINT) {
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
     self->sent.clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
 }
 
-/// The pair together, then each frame. False, with the reason in `verdict`, if the envelope stops one of them.
+/// Checks the pair, then each frame. Returns false and sets `verdict` if the envelope stops one of them.
 static bool is_within(iw_sender_t *self, iw_time_us_t now_us) {
     iw_envelope_verdict_t verdict = iw_envelope_check_pair(&self->envelope, self->frame, now_us);
     if (verdict == IW_ENVELOPE_PASS) {
@@ -57,14 +57,14 @@ static bool account(iw_sender_t *self, iw_side_t side, iw_time_us_t now_us, bool
     return accepted;
 }
 
-/// One wheel alone: only a zero leaves like that.
+/// Sends to one wheel alone, which only a zero may do.
 static bool hand_over(iw_sender_t *self, iw_side_t side, iw_time_us_t now_us) {
     const iw_can_frame_t *const frame = &self->frame[side];
     return account(self, side, now_us, self->hal->send(self->hal->context, frame, 1U) > 0);
 }
 
-/// The pair leaves as one: both frames in one call, so that the process cannot be stopped or killed between them. What
-/// the port refuses on the left does not leave on the right either, unless it is a zero.
+/// Sends both frames in one call, so that the process cannot be stopped or killed between them. If the port refuses the
+/// left frame, the right one is not sent either, unless it is a zero.
 static bool hand_over_as_one(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     const int accepted = self->hal->send(self->hal->context, self->frame, IW_SIDES);
     if (account(self, IW_LEFT, now_us, accepted > 0)) {
@@ -86,7 +86,7 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     self->sent.pairs++;
 }
 
-/// Both, or of a zero pair the one that may leave (`iw_sender_ready`).
+/// Sends to both wheels, or a zero pair to the wheel that may receive it (`iw_sender_ready`).
 static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     const uint32_t sides = iw_confirmation_may_send(&self->confirmation, zero);
     bool accepted = true;
@@ -103,7 +103,7 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     return accepted;
 }
 
-/// Both frames are judged before the first one leaves, else a stopped right frame would leave the left one alone.
+/// Checks both frames before it sends the first one. Otherwise a stopped right frame would leave the left one alone.
 iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_time_us_t now_us, bool zero) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         prepare(self, (iw_side_t)side, &pair->wheel[side]);
@@ -119,7 +119,7 @@ void iw_sender_rest(iw_sender_t *self) {
     iw_confirmation_rest(&self->confirmation);
 }
 
-/// Forgets only if the port is sure: behind a frame that may still leave no second one must be queued (R6).
+/// Clears the list only if the port is certain: no second frame may be queued after one that may still be sent (R6).
 int iw_sender_purge(iw_sender_t *self) {
     const int answer = self->hal->purge(self->hal->context);
     if (answer > 0) {

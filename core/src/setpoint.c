@@ -14,15 +14,15 @@
 /// A speed and a current for each wheel.
 #define AXES (2 * IW_SIDES)
 
-/// Where each quantity goes in this step, and how much of its way: a share of those that do not brake, and one of those
-/// that do.
+/// Change of each quantity in this step, and the share of it that applies: one share for quantities that brake, and one
+/// for the others.
 typedef struct {
     int32_t aim[AXES];
     uint32_t share[2];
-    bool braking[AXES]; ///< Towards zero.
+    bool braking[AXES]; ///< The quantity moves towards zero.
 } step_t;
 
-/// The command is zero from now on.
+/// Sets the command to zero.
 static void forget_command(iw_setpoint_t *self) {
     const bool limit = self->config->current_role == IW_ROLE_LIMIT;
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -31,7 +31,7 @@ static void forget_command(iw_setpoint_t *self) {
     }
 }
 
-/// So is the output.
+/// Sets the output to zero.
 static void clear(iw_setpoint_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->speed_um_s[side] = 0;
@@ -102,7 +102,7 @@ void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us) {
     iw_setpoint_hasten(self, now_us);
 }
 
-/// part / whole for part < whole < 2^24.
+/// Returns part / whole for part < whole < 2^24.
 static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     uint32_t fraction = 0;
     uint32_t rest = part;
@@ -114,25 +114,25 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     return fraction;
 }
 
-/// The same for any part, and 1 for what is no part.
+/// Returns part / whole for any part; 1 if part is not smaller than whole.
 static uint32_t portion_of(uint32_t part, uint32_t whole) {
     return (part < whole) ? fraction_of(part, whole) : FRACTION_ONE;
 }
 
-/// slope x time in thousandths of the slope's unit, for at most a second.
+/// Returns slope x time in thousandths of the unit of the slope, for at most a second.
 static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
-/// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
-/// bits suffice.
+/// Converts a speed step to the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a
+/// second, so 32 bits suffice.
 static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) {
     const uint32_t speed = config->max_speed_mm_s;
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
-/// Where a quantity goes: not past zero in one step. All get one common share of their ways; braking ones do not wait
-/// for accelerating ones. `allowed`: how much it may go now, away from zero and towards it.
+/// Computes the change of each quantity; none passes zero in one step. All have one common share of their changes, but
+/// braking quantities do not wait for accelerating ones. `allowed`: largest change now, away from zero and towards it.
 static void plan(step_t *step, size_t i, int32_t value, int32_t target, const uint32_t allowed[2]) {
     const bool through_zero = value != 0 && (target < 0) != (value < 0);
     const int32_t aim = through_zero ? 0 : target;
@@ -154,24 +154,24 @@ static IW_APART int32_t part_of_way(const step_t *step, size_t i, int32_t value)
     return (int32_t)((int64_t)step->share[step->braking[i] ? 1U : 0U] * way / (int64_t)FRACTION_ONE);
 }
 
-/// What wheels that brake, or those that do not, would do to the difference of both: right minus left.
+/// Returns the change of the difference right minus left by the wheels that brake, or by those that do not.
 static IW_APART int32_t turn_by(const step_t *step, const int32_t *speed, bool braking) {
     const int32_t left = (step->braking[IW_LEFT] == braking) ? part_of_way(step, IW_LEFT, speed[IW_LEFT]) : 0;
     const int32_t right = (step->braking[IW_RIGHT] == braking) ? part_of_way(step, IW_RIGHT, speed[IW_RIGHT]) : 0;
     return right - left;
 }
 
-/// Only a part of their step for the quantities that brake, or for those that do not. Currents go with their speeds.
+/// Reduces the share of the quantities that brake, or of those that do not. Currents follow their speeds.
 static IW_APART void cut_step(step_t *step, bool braking, uint32_t fraction) {
     uint32_t *const share = &step->share[braking ? 1U : 0U];
     const uint32_t whole = *share;
     const uint32_t cut = (uint32_t)((uint64_t)whole * fraction / FRACTION_ONE);
-    *share = (cut < whole) ? cut : whole; // A share of a share is never larger, which Eva cannot see by itself.
+    *share = (cut < whole) ? cut : whole; // A share of a share is never larger; Eva cannot derive that.
 }
 
-/// R17: under a drive command yaw grows no faster than it may. `us`: the time of the step that counts. Wheels that
-/// become faster wait first: one that brakes is on its way to what was commanded, whose yaw is within the limit, so
-/// it gets there. A stop is not slowed: towards 0/0 all speeds brake by one share, and yaw only falls.
+/// R17: under a drive command the yaw rate grows no faster than allowed. `us`: time of the step that counts. Wheels
+/// that become faster wait first. A braking wheel approaches its command, whose yaw rate is within the limit, so it
+/// reaches it. A stop is not slowed: towards 0/0 all speeds brake by one share, and the yaw rate only falls.
 static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     const int32_t from = self->speed_um_s[IW_RIGHT] - self->speed_um_s[IW_LEFT];
     const int32_t bound = iw_yaw_bound(&self->yaw, from, ramp_step(self->yaw.growth_mm_s2, us));
@@ -189,7 +189,7 @@ static void limit_yaw(const iw_setpoint_t *self, step_t *step, uint32_t us) {
     }
 }
 
-/// True if this wheel's speed and current are where they should be.
+/// Returns true if the wheel's speed and current have reached the command.
 static IW_APART bool arrived(const iw_setpoint_t *self, iw_side_t side) {
     const iw_command_t *const target = &self->target.wheel[side];
     const bool ramps_current = self->config->current_role == IW_ROLE_SETPOINT;

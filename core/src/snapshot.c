@@ -19,8 +19,8 @@ bool iw_gateway_is_sending(const iw_gateway_t *self) {
     return iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE;
 }
 
-/// The operator has settled the unit or the offset against the evidence of the bus. Then the wheel's offset cannot be
-/// right, and only a tare gives a force that means anything.
+/// Returns true if the operator has decided the unit or the offset against the observation. Then the wheel's offset
+/// cannot be right, and only a tare gives a valid force.
 static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
     const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
     if (!judged) {
@@ -35,7 +35,8 @@ iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_sid
     const iw_assumption_entry_t *const included = &self->assumed[IW_ASSUMPTION_OFFSET_INCLUDED];
     const iw_assumption_entry_t *const asked = (force->observation == IW_UNIT_OFFSET_REMOVED) ? included : unit;
     iw_force_validity_t validity = iw_force_validity(force, self->at_us);
-    // The ledger decides over the force module: it also holds what the operator said and what earlier runs found.
+    // The assumption store decides, not the force module: it also has the decisions of the operator and of earlier
+    // runs.
     if (asked->source == IW_SOURCE_OPERATOR) {
         validity = overruled(force, validity);
     }
@@ -51,7 +52,7 @@ iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_sid
 static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side,
                           iw_snapshot_wheel_t *out_wheel) {
     const iw_wheel_t *const wheel = &self->wheel[side];
-    const uint32_t rest_us = iw_wheel_rest_us(wheel, now_us); // More than 0 only if it is heard.
+    const uint32_t rest_us = iw_wheel_rest_us(wheel, now_us); // More than 0 only if the wheel is online.
     out_wheel->told = &self->told[side];
     out_wheel->force = &self->force[side];
     out_wheel->speed_us = wheel->speed_us;
@@ -73,7 +74,7 @@ static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_sn
     out_snapshot->stale_us = permit->stale_us;
     out_snapshot->holder = permit->holder;
     out_snapshot->stale_client = permit->stale_client;
-    // `quiet` spares the loop over all causes in a step in which nothing is wrong.
+    // `quiet` avoids the loop over all causes in a step without a fault.
     out_snapshot->present = permit->quiet ? 0U : iw_permit_present(permit, now_us);
     out_snapshot->still_moving = permit->still_moving;
     out_snapshot->holding = iw_permit_holding(permit);

@@ -13,7 +13,7 @@ static void raise_cause(iw_gateway_t *self, iw_cause_t cause, uint8_t sides, uin
     iw_permit_raise(&self->permit, &event, self->now_us);
 }
 
-/// A cause whose detail is a time.
+/// Raises a cause whose detail is a time.
 static IW_APART void raise_after(iw_gateway_t *self, iw_cause_t cause, uint32_t span_us) {
     raise_cause(self, cause, IW_SIDES_NONE, span_us / IW_US_PER_MS);
 }
@@ -24,7 +24,8 @@ static uint8_t side_bit(size_t side) {
     return (uint8_t)(IW_SIDES_LEFT << side);
 }
 
-/// A wheel that was lost before our own stall began stays lost: judged at `promised_us`, not now.
+/// Returns true if a wheel is lost. In a stalled step it judges at `promised_us`: a wheel that was lost before the
+/// stall remains lost.
 static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
     if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
         iw_wheel_excuse(&self->wheel[side], self->now_us);
@@ -32,8 +33,8 @@ static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
     iw_follow_restart(&self->follow[side]);
 }
 
-/// Our clock may stand still while the system is suspended; the wheels do not: a suspend counts as
-/// lateness. UINT32_MAX at the most.
+/// Returns the lateness of the step, at most UINT32_MAX. A suspend of the system counts, because the clock may stop
+/// while the wheels do not.
 static uint32_t take_lateness(iw_gateway_t *self) {
     const iw_time_us_t late_us = (self->now_us > self->promised_us) ? self->now_us - self->promised_us : 0U;
     const iw_time_us_t both_us = self->suspended_us + late_us;
@@ -41,8 +42,8 @@ static uint32_t take_lateness(iw_gateway_t *self) {
     return (both_us < UINT32_MAX) ? (uint32_t)both_us : UINT32_MAX;
 }
 
-/// R7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
-/// be judged, since telemetry of a late step has no known time of reception.
+/// R7: judges one long stall and a run of late steps. Both count by the time in which no fault could be judged, because
+/// telemetry in a late step has no known reception time.
 static void watch_loop(iw_gateway_t *self) {
     const uint32_t late_us = take_lateness(self);
     const bool late = late_us > IW_GATEWAY_LATE_US;
@@ -68,7 +69,7 @@ static void watch_loop(iw_gateway_t *self) {
     }
 }
 
-/// Our own lateness, the e-stop line, the state of the bus.
+/// Judges lateness, the e-stop and the state of the bus.
 static void begin(iw_gateway_t *self) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
@@ -77,14 +78,14 @@ static void begin(iw_gateway_t *self) {
     }
     watch_loop(self);
     self->bus = self->hal.bus_state(self->hal.context);
-    // The port's contract (hal.h): after a loss of the bus nothing sent before it is queued, so no echo is outstanding.
+    // Contract of the port (hal.h): after a loss of the bus no earlier frame is queued, so no echo is expected.
     if (self->bus < IW_BUS_PASSIVE) {
         iw_confirmation_clear(&self->sender.confirmation);
         raise_cause(self, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
     }
 }
 
-/// The bus has shown that an assumption holds, or that it does not.
+/// Confirms or contradicts an assumption by an observation on the bus.
 static IW_APART void note(iw_gateway_t *self, iw_assumption_item_t item, bool holds, int32_t figure) {
     if (holds) {
         iw_assumption_confirm(&self->assumptions, item, IW_SOURCE_BUS, figure);
@@ -93,8 +94,8 @@ static IW_APART void note(iw_gateway_t *self, iw_assumption_item_t item, bool ho
     }
 }
 
-/// What the force module found out about units, as entries of the ledger. IW_UNIT_UNCLEAR is no entry: it makes this
-/// force doubtful (force_offset.h), but it proves no other unit.
+/// Enters the unit observations of the force module into the assumption store. IW_UNIT_UNCLEAR is not entered: it makes
+/// the force doubtful (force_offset.h), but it does not prove another unit.
 static void note_force_observation(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
     const iw_unit_observation_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
@@ -112,7 +113,7 @@ static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side)
     iw_force_t *const force = &self->force[side];
     const iw_unit_observation_t before = force->observation;
     if (kind == IW_CODEC_FORCE) {
-        // By its last speed, however old: our own stall does not mean that the wheel moved.
+        // Uses the last speed at any age: a stall of the gateway does not mean that the wheel moved.
         const bool still = iw_abs(told->speed.speed_rpm) <= self->config.rest_rpm;
         iw_force_receive(force, self->now_us, told->force.force_raw, still);
     } else {
@@ -123,15 +124,16 @@ static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side)
     }
 }
 
-/// Only the first one: each entry is a change that is reported and stored, and frames come 500 times a second.
+/// Enters only the first observation, because each entry is a change that is reported and stored, and frames arrive 500
+/// times a second.
 static void contradict_length(iw_gateway_t *self, uint8_t length) {
     if (self->assumptions.entry[IW_ASSUMPTION_DLC].state != IW_CONTRADICTED) {
         note(self, IW_ASSUMPTION_DLC, false, length);
     }
 }
 
-/// The document lists bytes and states no DLC. A status frame as long as the table confirms the table's lengths; a
-/// message of another length contradicts them.
+/// The document lists bytes but no DLC. A status frame with the length of the table confirms the lengths of the table.
+/// A message with another length contradicts them.
 static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length) {
     if (length != iw_codec_length(kind)) {
         contradict_length(self, length);
@@ -140,8 +142,8 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
     }
 }
 
-/// Telemetry. A reboot is acted upon first: the frame that revealed it may be the first force or offset of the new run,
-/// which belongs into a new window.
+/// Handles telemetry. A reboot is handled first: the frame that reveals it may be the first force or offset of the new
+/// run, which belongs to a new window.
 static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
@@ -163,7 +165,7 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     }
 }
 
-/// Two masters on one bus: the wheels obey whoever sent last (fault 19).
+/// With two masters on one bus, the wheels follow the last sender (fault 19).
 static void hear_foreign(iw_gateway_t *self, iw_side_t side, uint32_t id) {
     self->counters.foreign++;
     raise_cause(self, IW_CAUSE_SECOND_MASTER, side_bit(side), id);
@@ -173,7 +175,7 @@ static bool is_setpoint_id(uint32_t id) {
     return id == IW_ID_LEFT_SETPOINT || id == IW_ID_RIGHT_SETPOINT;
 }
 
-/// An echo is our own frame, confirmed by the controller; anything else with a setpoint's id has another sender.
+/// Separates an echo, which is the core's own frame confirmed by the controller, from a setpoint of another sender.
 static void take_setpoint(iw_gateway_t *self, iw_side_t side, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
@@ -185,7 +187,7 @@ static void take_setpoint(iw_gateway_t *self, iw_side_t side, const iw_can_frame
 
 static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
     const iw_side_t side = iw_codec_side(frame->id);
-    // Before decoding: a foreign setpoint of any length must latch, also one that decodes to nothing.
+    // Checked before decoding: a foreign setpoint of any length must latch, even if it cannot be decoded.
     if (is_setpoint_id(frame->id)) {
         take_setpoint(self, side, frame);
         return;
@@ -209,7 +211,8 @@ static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
     }
 }
 
-/// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
+/// Receives everything before any age is judged (R7), but with a limit: a babbling node must not keep the step from
+/// ending.
 static IW_APART void receive(iw_gateway_t *self) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
@@ -220,7 +223,7 @@ static IW_APART void receive(iw_gateway_t *self) {
     self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
 }
 
-/// How long a wheel that is lost has been silent; 0: it is not lost.
+/// Returns the time for which a lost wheel has sent nothing; 0 if it is not lost.
 static IW_APART uint32_t lost_for_ms(const iw_gateway_t *self, iw_side_t side) {
     const iw_wheel_t *const wheel = &self->wheel[side];
     if (!iw_wheel_lost(wheel, self->now_us)) {
@@ -235,7 +238,7 @@ static void watch_silence(iw_gateway_t *self) {
     const uint32_t left = (left_ms > 0U) ? IW_SIDES_LEFT : IW_SIDES_NONE;
     const uint32_t right = (right_ms > 0U) ? IW_SIDES_RIGHT : IW_SIDES_NONE;
     const uint32_t sides = left | right;
-    // One of them may have been without power for long, and coasts: zero at once would turn the machine around it.
+    // One of the wheels may have had no power for long and coasts: zero without ramp would turn the machine around it.
     const iw_event_t event = {IW_CAUSE_WHEEL_LOST, (uint8_t)sides, (right_ms > 0U) ? right_ms : left_ms,
                               (sides == IW_SIDES_BOTH) ? IW_REACT_ZERO : IW_REACT_RAMP};
     if (sides != IW_SIDES_NONE) {
@@ -243,7 +246,7 @@ static void watch_silence(iw_gateway_t *self) {
     }
 }
 
-/// How long a setpoint has waited for its echo, if too long; else 0.
+/// Returns the time for which a setpoint has waited for its echo if that is too long; otherwise 0.
 static IW_APART uint32_t overdue_us(const iw_gateway_t *self) {
     const iw_time_us_t since_us = iw_confirmation_waiting_us(&self->sender.confirmation);
     const uint32_t waited_us = (since_us == IW_NEVER) ? 0U : iw_age_us(since_us, self->now_us);
@@ -256,8 +259,8 @@ static IW_APART int ask_back(iw_gateway_t *self) {
     return answer;
 }
 
-/// A missing echo latches. The zeros of that stop would wait behind the stuck frame, so the port is asked to purge it:
-/// once per stop, because a purge may take the link down. (IW_CAUSE_SEND_STALLED leaves nothing but zeros to send.)
+/// A missing echo latches. The zeros of that stop would wait after the stuck frame, so the core calls `purge`, once per
+/// stop, because a purge may take the link down. (After IW_CAUSE_SEND_STALLED there are only zeros to send.)
 static void watch_echo(iw_gateway_t *self) {
     const uint32_t waited_us = overdue_us(self);
     if (waited_us == 0U) {
@@ -281,7 +284,7 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
         (side == IW_LEFT) ? IW_ASSUMPTION_FEEDBACK_SIGN_LEFT : IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT;
     const int32_t measured_mm_s = self->diverge.measured_mm_s[side];
     const iw_follow_verdict_t verdict = iw_follow_step(follow, self->now_us, applied_mm_s, measured_mm_s);
-    // As at a positive command.
+    // Stored as if the command were positive.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     if (verdict != IW_FOLLOW_OK) {
         raise_cause(self, (iw_cause_t)causes[verdict], side_bit(side), (uint32_t)iw_abs(measured_mm_s));
@@ -294,8 +297,8 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
     }
 }
 
-/// Only while we command: a machine that is pushed by hand in LISTENING is faster than its command of zero. Asked for
-/// each wheel anew: what the left one did may have ended our command.
+/// Judges only while the core commands: a machine that is pushed by hand in LISTENING is faster than its command of
+/// zero. It is judged for each wheel, because the result for the left wheel may have ended the command.
 static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
@@ -311,14 +314,14 @@ static bool turns(const iw_gateway_t *self, iw_side_t side) {
     return iw_abs(wheel->speed_mm_s) > IW_ROLLING_MM_S && iw_wheel_online(wheel, self->now_us);
 }
 
-/// A machine that rolls away, or is pushed by hand. Not while setpoints are sent: a zero is a command too, and wheels
-/// that brake still turn.
+/// Detects a machine that rolls away or is pushed by hand. Not while setpoints are sent: a zero is a command too, and
+/// braking wheels still turn.
 static IW_APART void watch_rolling(iw_gateway_t *self) {
     const bool alone = self->setpoint.demand == IW_DEMAND_SILENCE;
     iw_rolling_step(&self->rolling, self->now_us, alone && (turns(self, IW_LEFT) || turns(self, IW_RIGHT)));
 }
 
-/// How long both wheels, which are heard, have been at rest; 0: one turns.
+/// Returns the time for which both wheels have been at rest; 0 if one turns. Both wheels must be online.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
     const iw_time_us_t left_us = self->wheel[IW_LEFT].rest_since_us;
     const iw_time_us_t right_us = self->wheel[IW_RIGHT].rest_since_us;
@@ -326,20 +329,20 @@ static uint32_t both_rest_us(const iw_gateway_t *self) {
     return (since_us == IW_NEVER) ? 0U : iw_age_us(since_us, self->now_us);
 }
 
-/// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
-/// is found out once.
+/// Judges telemetry, reboots, echoes and wheels that do not follow; then steps the permission. Values that several
+/// rules need are computed once.
 static void judge_wheels(iw_gateway_t *self) {
     iw_permit_view_t *const view = &self->permit.view;
     const bool heard =
         iw_wheel_online(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_online(&self->wheel[IW_RIGHT], self->now_us);
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
-    // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
+    // A stalled step neither raises nor clears causes that depend on an age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
         iw_diverge_restart(&self->diverge, self->now_us);
     } else {
         watch_echo(self);
-        if (!heard) { // Who is heard is not lost.
+        if (!heard) { // A wheel that is online is not lost.
             watch_silence(self);
         }
         watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
@@ -355,14 +358,14 @@ static void judge_wheels(iw_gateway_t *self) {
     view->output_zero = iw_setpoint_is_zero(&self->setpoint);
     view->timing_ok = !self->facts.timing_contradicted;
     view->can_send = iw_confirmation_may_send(&self->sender.confirmation, true) == IW_SIDES_BOTH;
-    // Sent at or after the request: the echo of an older zero pair does not arm.
+    // The pair must be sent at or after the request: the echo of an older zero pair does not arm.
     view->proven = iw_permit_arming(&self->permit) &&
                    iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
     iw_permit_step(&self->permit, self->now_us);
 }
 
-/// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
-/// followed by zeros for both wheels.
+/// Takes the pair that is due and sends it. R5 (both or none): after a pair of which the port refused one frame, both
+/// wheels receive zeros.
 static iw_send_result_t send_pair(iw_gateway_t *self) {
     if (!iw_setpoint_due(&self->setpoint, self->now_us)) {
         return IW_SEND_DONE;
@@ -379,10 +382,10 @@ static iw_send_result_t send_pair(iw_gateway_t *self) {
     return result;
 }
 
-/// While nothing is sent, no old setpoint may wait in a controller either: unacknowledged, it is repeated there until
-/// a wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`: whether or not a wheel
-/// is heard, since it is stuck exactly when no wheel has power to acknowledge it. An echo may still come late
-/// (`echo_ms`) or stand in the backlog, so neither case counts as stuck yet.
+/// While nothing is sent, no old setpoint may remain in a controller: without acknowledgement the controller repeats it
+/// until a wheel gets power, and then it moves that wheel (fault 18). The core purges it, or reports `left_behind`,
+/// with or without telemetry, because a frame is stuck exactly when no wheel has power to acknowledge it. A late echo
+/// (`echo_ms`) or an echo in the backlog does not count as stuck yet.
 static void keep_silent(iw_gateway_t *self) {
     if (overdue_us(self) == 0U) {
         self->left_behind = false;
@@ -408,10 +411,10 @@ static void send_due(iw_gateway_t *self) {
         return;
     }
     self->rolling.setpoint_us = self->now_us;
-    // Nothing is left behind either: arm was refused until it was gone.
+    // Nothing is left in the controller: arm was refused until it was gone.
     self->purged_us = IW_NEVER;
     if (self->bus >= IW_BUS_PASSIVE && send_pair(self) == IW_SEND_STOPPED) {
-        // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
+        // R12: scheduler and envelope disagree, so one of them is wrong. This step sends zeros.
         raise_cause(self, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
         iw_setpoint_demand(&self->setpoint, self->now_us, iw_permit_demand(&self->permit));
         (void)send_pair(self);
@@ -422,7 +425,7 @@ static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
     return (a < b) ? a : b;
 }
 
-/// When to call again: not later than one period from now.
+/// Returns the time of the next call, at most one period from now.
 static iw_time_us_t next_step_us(const iw_gateway_t *self) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
     iw_time_us_t next_us =
@@ -430,16 +433,15 @@ static iw_time_us_t next_step_us(const iw_gateway_t *self) {
     if (self->backlog) {
         return self->now_us;
     }
-    // A pair that is overdue could not be sent (no echo yet, bus down): asking to be called at once would be a busy
-    // loop.
+    // A pair that is overdue could not be sent (no echo yet, bus down). Returning a past time would cause a busy loop.
     if (due_us > self->now_us) {
         next_us = sooner(next_us, due_us);
     }
     return (next_us > self->now_us) ? next_us : self->now_us;
 }
 
-/// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
-/// before anything is sent, so that a fault of this step stops this step's pair.
+/// The order is a safety rule. The step receives everything before it judges an age (R7), and judges everything before
+/// it sends, so that a fault of this step stops the pair of this step.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     self->now_us = now_us;
     begin(self);

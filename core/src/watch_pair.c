@@ -23,7 +23,7 @@ static void compare(iw_gateway_t *self, const iw_pair_t *applied) {
     }
 }
 
-/// A ramp that has ended, as silence and zero at once, leaves nothing that a reaction could change.
+/// Returns true if a reaction can change nothing: nothing is sent, zeros are sent, or a ramp has ended.
 static bool has_ended(const iw_gateway_t *self) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
     return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));

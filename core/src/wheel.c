@@ -37,7 +37,7 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->us_per_tick_min = nm_per_tick / FASTEST_NM_PER_US;
 }
 
-/// `status_us` is reset because the wheel's odometry begins anew: the next status frame is a start, not a step.
+/// Resets `status_us` because the wheel's odometry restarts: the next status message is a start, not a step.
 static IW_APART void rebooted(iw_wheel_t *self, iw_reboot_t source, iw_time_us_t now_us) {
     self->pending_reboot = source;
     self->reboots++;
@@ -46,7 +46,7 @@ static IW_APART void rebooted(iw_wheel_t *self, iw_reboot_t source, iw_time_us_t
     self->status_us = IW_NEVER;
 }
 
-/// Any frame of the wheel: was it away for so long that it may have been without power?
+/// Handles any frame: detects a wheel that has sent nothing for so long that it may have had no power.
 static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     const bool was_away = iw_age_us(self->any_us, now_us) >= IW_WHEEL_REBOOT_SILENCE_US;
     self->any_us = now_us;
@@ -59,7 +59,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// Rest is a run of frames without a gap: one frame at rest behind a silence says nothing of the time between.
+/// Rest is a run of messages without a gap: one message at rest after a gap says nothing about the time between.
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
@@ -77,8 +77,8 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_spe
     }
 }
 
-/// True if no wheel can have turned so far in that time. `delta` is modulo 2^32, as odometry wraps: the shorter way
-/// counts.
+/// Returns true if no wheel can turn so far in that time. `delta` is modulo 2^32, because odometry wraps; the shorter
+/// direction counts.
 static bool tick_jump(const iw_wheel_t *self, uint32_t delta, uint32_t elapsed_us) {
     const uint32_t limit = elapsed_us / self->us_per_tick_min;
     const uint32_t moved = (delta > INT32_MAX) ? 0U - delta : delta;
@@ -98,7 +98,7 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_st
     self->status_us = now_us;
 }
 
-/// Judged after our own stall too: a wheel that rebooted meanwhile shows it by nothing else.
+/// Judged after a stall of the gateway too: for a wheel that rebooted in the meantime there is no other sign.
 static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
     if (iw_age_us(self->offset_us, now_us) >= IW_WHEEL_OFFSET_BACK_US) {
         rebooted(self, IW_REBOOT_OFFSET_FRAMES, now_us);
@@ -119,7 +119,7 @@ void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kin
 }
 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
-    // One excuse per fresh frame: late steps in a row must not keep a dead wheel alive.
+    // One excuse per fresh message: a run of late steps must not keep a dead wheel online.
     if (self->received_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;

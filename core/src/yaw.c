@@ -4,10 +4,10 @@
 #include "arithmetic.h"
 #include "iwheel/diverge.h"
 
-/// Each wheel's part is cut off to whole um/s, so both together may be beyond by less than this.
+/// Rounding of each wheel's part to whole um/s can exceed the limit by less than this for both together.
 #define ROUNDING_UM_S 2
 
-/// A yaw in mrad as the difference of setpoints in mm; the same for their rates.
+/// Converts a yaw angle in mrad to the difference of setpoints in mm, and their rates.
 static IW_APART uint32_t difference_of(uint32_t mrad, const iw_yaw_machine_t *machine) {
     return mrad * machine->track_mm * IW_SETPOINT_RADIUS_MM / (machine->radius_mm * 1000U);
 }

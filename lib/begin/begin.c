@@ -13,7 +13,7 @@ static void secure_streams(void) {
     (void)signal(SIGPIPE, SIG_IGN);
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
         if (fcntl(fd, F_GETFD) < 0 && freopen("/dev/null", "r+", streams[fd]) == NULL) {
-            return; // Without /dev/null there are worse troubles.
+            return; // Without /dev/null there are worse problems.
         }
     }
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-/// How the keys of the e-stop's two contacts must fit together.
+/// Relations between the keys of the two e-stop contacts.
 #ifndef CONFIG_CONTACTS_H
 #define CONFIG_CONTACTS_H
 
 #include "config/gateway_config.h"
 #include "config/settings.h"
 
-/// The lines of the file on which `line2` and `estop_discrepancy_ms` stand; 0: not given. Two names of one line are found out when
-/// it is opened.
+/// Reports relations that do not hold. `lines`: line numbers of `line2` and `estop_discrepancy_ms` in the file; 0 if
+/// not given. Two names of the same line are detected when it is opened.
 void config_relate_contacts(const gateway_config_t *config, settings_report_t *report, unsigned line2_at,
                             unsigned limit_at);
 

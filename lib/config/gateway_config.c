@@ -176,7 +176,7 @@ static unsigned line_of(const char *key, const unsigned *lines) {
     return lines[settings_find(&form, NULL, key) - keys];
 }
 
-/// Of the last key of the stop budget that was given.
+/// Returns the line of the last given key of the stop budget.
 static unsigned last_line(const unsigned *lines) {
     static const char *const budget[] = {"period_ms", "lease_ms", "decel_mm_s2", "max_speed_mm_s"};
     unsigned last = 0;
@@ -189,7 +189,7 @@ static unsigned last_line(const unsigned *lines) {
     return last;
 }
 
-/// Each way of mending the budget alone, as far as its key's range allows.
+/// Lists each fix of the budget alone, as far as the range of its key allows.
 static void budget_cures(const iw_config_t *core, char *out, size_t size) {
     const uint32_t spent = (uint32_t)core->lease_ms + core->period_ms;
     const uint32_t ramp_ms = ((uint32_t)core->max_speed_mm_s * 1000U + core->decel_mm_s2 - 1U) / core->decel_mm_s2;
@@ -206,7 +206,7 @@ static void budget_cures(const iw_config_t *core, char *out, size_t size) {
     }
 }
 
-/// Without a value standstill follows from radius and gear.
+/// Sets the standstill values from radius and gear if they are not given.
 static void complete(void *values, const unsigned *lines) {
     iw_config_t *core = &((gateway_config_t *)values)->core;
     if (line_of("rest_rpm", lines) == 0U) {
@@ -272,7 +272,7 @@ void gateway_config_default(gateway_config_t *out_config) {
     iw_config_default(&out_config->core);
 }
 
-/// Stores what was read without an error. Returns `result`.
+/// Stores the values if there was no error. Returns `result`.
 static int store_good(int result, const gateway_config_t *read, gateway_config_t *out_config) {
     if (result == 0) {
         *out_config = *read;

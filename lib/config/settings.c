@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// inih reads lines into a buffer of 200 bytes with line end and terminator; longer ones it would cut.
+/// inih reads lines into a buffer of 200 bytes with line end and terminator, and would truncate longer ones.
 #define LINE_MAX_LENGTH 197U
 
 typedef struct {
@@ -21,10 +21,10 @@ typedef struct {
     const char *text;
     size_t size;
     size_t at;
-    const char *pending; ///< A line that must become a value; null once it has.
+    const char *pending; ///< Line that must become a value; NULL once it has.
     size_t pending_length;
     unsigned line;
-    bool section_bad; ///< The section's name was refused: its keys are not judged.
+    bool section_bad; ///< The name of the section was refused, so its keys are not judged.
     unsigned lines[SETTINGS_KEYS_MAX];
     void *values;
 } loader_t;
@@ -45,7 +45,7 @@ void settings_complain(settings_report_t *report, unsigned line, const char *for
     va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    iwn_plain_copy(text, plain, sizeof plain); // It quotes the file.
+    iwn_plain_copy(text, plain, sizeof plain); // The message quotes the file.
     (void)fprintf(report->err, "%s\n", plain);
 }
 
@@ -67,7 +67,7 @@ const settings_key_t *settings_find(const settings_form_t *form, const char *sec
     return NULL;
 }
 
-/// The row of this section whose key looks most like it, or a null pointer if none comes close.
+/// Returns the row of this section with the most similar key, or NULL if none is similar.
 static const settings_key_t *find_similar(const settings_form_t *form, const char *section, const char *key) {
     const settings_key_t *best = NULL;
     size_t best_distance = SETTINGS_WORD_STRANGE;
@@ -83,7 +83,8 @@ static const settings_key_t *find_similar(const settings_form_t *form, const cha
     return best;
 }
 
-/// Writes the names of the sections (`section` null) or of a section's keys, separated by commas; false if there are none.
+/// Writes the names of the sections (`section` NULL) or of a section's keys, separated by commas. Returns false if
+/// there are none.
 static bool list_names(const settings_form_t *form, const char *section, char *out, size_t size) {
     const char *last = "";
     size_t used = 0;
@@ -104,7 +105,7 @@ static bool is_section(const settings_form_t *form, const char *name) {
     return list_names(form, name, keys, sizeof keys);
 }
 
-/// The line promised to become a value, but inih made none of it.
+/// Reports a line that should have become a value, but inih has not passed one.
 static void settle_pending(loader_t *loader) {
     if (loader->pending != NULL) {
         const int length = (loader->pending_length > 40U) ? 40 : (int)loader->pending_length;
@@ -135,7 +136,7 @@ static bool fit_line(loader_t *loader, const char *line, size_t length) {
     return true;
 }
 
-/// `[name]`, then nothing or a comment. Anything else leaves no section to speak of.
+/// Checks `[name]`, followed by nothing or a comment. After anything else there is no valid section.
 static void check_section(loader_t *loader, const char *line, size_t length) {
     char name[LINE_MAX_LENGTH + 1U];
     char known[SETTINGS_MESSAGE_SIZE];
@@ -162,7 +163,7 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
     }
 }
 
-/// The next line of the text without what surrounds it; moves on.
+/// Returns the next line of the text without blanks around it, and advances.
 static const char *cut_line(loader_t *loader, size_t *out_length) {
     const char *line = loader->text + loader->at;
     const char *newline = memchr(line, '\n', loader->size - loader->at);
@@ -184,8 +185,8 @@ static const char *cut_line(loader_t *loader, size_t *out_length) {
     return line;
 }
 
-/// fgets for inih: the next line without leading blanks, since inih would take an indented line for the last value's
-/// continuation. A line that was refused here is handed on as an empty one.
+/// Replaces fgets for inih: returns the next line without leading blanks, because inih would append an indented line to
+/// the last value. A refused line becomes an empty one.
 static char *next_line(char *out, int size, void *context) {
     loader_t *loader = context;
     size_t length = 0;
@@ -236,7 +237,7 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
     }
 }
 
-/// inih's handler. Always 1: errors are counted by us, so that one does not hide the next.
+/// Handler of inih. It always returns 1: this file counts the errors, so that one does not hide the next.
 static int take_value(void *context, const char *section, const char *key, const char *value) {
     loader_t *loader = context;
     char why[SETTINGS_MESSAGE_SIZE];
@@ -278,7 +279,7 @@ int settings_parse(const settings_form_t *form, settings_report_t *report, const
     return finish(report);
 }
 
-/// The file's bytes in `out`, of SETTINGS_FILE_MAX bytes; false after a complaint.
+/// Reads the file into `out`, of SETTINGS_FILE_MAX bytes. Returns false and reports the error if it cannot.
 static bool read_file(settings_report_t *report, const char *program, int file, char *out, size_t *out_size) {
     struct stat status;
     if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {

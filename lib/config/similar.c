@@ -11,7 +11,7 @@ static size_t least(size_t a, size_t b) {
     return (a < b) ? a : b;
 }
 
-/// Levenshtein's distance; `width` is the length of `b`, at most LETTERS_MAX.
+/// Levenshtein distance. `width` is the length of `b`, at most LETTERS_MAX.
 static size_t distance(const char *a, const char *b, size_t width) {
     size_t row[LETTERS_MAX + 1U];
     for (size_t j = 0; j <= width; j++) {

@@ -74,7 +74,7 @@ static void find_range(const settings_form_t *form, const settings_key_t *row, u
     }
 }
 
-/// The values that a person may write: "20..500 ms", "cN or dN"; empty where the help names them.
+/// Lists the values that may be written: "20..500 ms", "cN or dN". Empty if the help lists them.
 static void settings_value_choices(const settings_form_t *form, const settings_key_t *row, char *out, size_t size) {
     uint32_t min = 0;
     uint32_t max = 0;
@@ -140,7 +140,7 @@ static bool parse_mode(const settings_key_t *row, const char *text, uint32_t *ou
     return true;
 }
 
-/// What makes a text unfit to be written into the file and read again, or shown; a null pointer if nothing.
+/// Returns why a text cannot be written to the file, read again, or shown; NULL if it can.
 static const char *unfit(const char *text) {
     const size_t length = strlen(text);
     if (length == 0 || text[0] == ' ' || text[length - 1U] == ' ') {
@@ -232,7 +232,7 @@ bool settings_value_parse(const settings_form_t *form, const settings_key_t *row
     return good;
 }
 
-/// As the file has it. False if the key is unset.
+/// Writes the value as in the file. Returns false if the key is not set.
 static bool settings_value_format(const settings_key_t *row, const void *values, char out[SETTINGS_MESSAGE_SIZE]) {
     out[0] = '\0';
     switch (row->kind) {
@@ -263,7 +263,7 @@ static bool settings_value_format(const settings_key_t *row, const void *values,
     return false;
 }
 
-/// Where the remark after a value begins.
+/// Column of the remark after a value.
 #define REMARK_COLUMN 34
 
 static const char *help_of(const settings_form_t *form, const settings_key_t *row) {

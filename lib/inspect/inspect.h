@@ -27,7 +27,7 @@ typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL, INSPECT_SKIP } inspec
 #define INSPECT_VERDICTS 4U
 
 typedef struct {
-    const char *check; ///< What was looked at: a word of a closed list (docs/doctor.md).
+    const char *check; ///< What was looked at: a word of a closed list (docs/user/doctor.md).
     inspect_verdict_t verdict;
     char text[INSPECT_TEXT_SIZE]; ///< What is.
     char cure[INSPECT_CURE_SIZE]; ///< What mends it; empty if there is nothing to mend.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// One thing that went into the core, or that it decided. All of them in order, with their times, are enough to let the
-/// same core decide the same again.
+/// One input or decision of the core. All entries in order, with their times, suffice to make the same core decide the
+/// same again.
 ///
-/// Frames of one step have its time. A step is written down only if it took no frame: each group of frames with one time and
-/// nothing between them is a step. What the port answered is written down when it changes; once a second answers and state are
-/// written down again, so that a recording can begin there.
+/// The frames of a step have its time. A step has an entry of its own only if it received no frame: each group of
+/// frames with one time and nothing between them is a step. Results of the port are recorded when they change. Once a
+/// second results and state are recorded again, so that a recording can begin there.
 #ifndef BLACKBOX_ENTRY_H
 #define BLACKBOX_ENTRY_H
 
@@ -12,37 +12,37 @@
 #include "iwheel/types.h"
 
 typedef enum {
-    BLACKBOX_FRAME = 0, ///< number: id with flags; a: dlc; b: iw_can_kind_t; as.data.
-    BLACKBOX_STEP,      ///< A step without frames.
-    BLACKBOX_START,     ///< The core began. a: restarted; b: listen only.
-    BLACKBOX_ESTOP,     ///< The e-stop's answer from now on. as.value.
-    BLACKBOX_BUS,       ///< The bus's state from now on. a: iw_bus_state_t.
-    BLACKBOX_FACTS,     ///< a: timing contradicted; b: echo proven.
-    BLACKBOX_SUSPENDED, ///< The machine slept. as.value: for how many us.
-    BLACKBOX_NOT_SENT,  ///< The port did not take a frame in this step. number: id; as.value: its answer.
-    BLACKBOX_PURGE,     ///< The port was asked to purge in this step. as.value: its answer.
-    BLACKBOX_ARM,       ///< number: client; a: takeover; b: iw_refusal_t.
-    BLACKBOX_DRIVE,     ///< number: client; a: currents are given; b: iw_refusal_t; as.drive.
-    BLACKBOX_STOP,      ///< number: client; a: iw_cause_t.
-    BLACKBOX_ESTOPPED,  ///< Software e-stop. number: client.
-    BLACKBOX_RESET,     ///< b: iw_refusal_t.
-    BLACKBOX_RELEASE,   ///< b: iw_refusal_t.
-    BLACKBOX_GONE,      ///< A client's connection ended. number: client.
-    BLACKBOX_TARE,      ///< a: iw_side_t; b: iw_tare_t.
-    BLACKBOX_ASSUMPTION, ///< Told of an assumption. a: item; b: iw_assumption_state_t; number: iw_source_t; as.value: figure.
-    BLACKBOX_STATE,   ///< Decided: a: state now; b: before. number: who holds the lease; as.drive: applied.
-    BLACKBOX_STOPPED, ///< Decided: number: of the stop; a: iw_cause_t; b: sides; as.value: detail.
+    BLACKBOX_FRAME = 0,  ///< Frame. number: id with flags; a: dlc; b: iw_can_kind_t; as.data.
+    BLACKBOX_STEP,       ///< Step without frames.
+    BLACKBOX_START,      ///< Start of the core. a: restarted; b: listen only.
+    BLACKBOX_ESTOP,      ///< New result of the e-stop. as.value.
+    BLACKBOX_BUS,        ///< New state of the bus. a: iw_bus_state_t.
+    BLACKBOX_FACTS,      ///< New facts about the bus. a: timing contradicted; b: echo proven.
+    BLACKBOX_SUSPENDED,  ///< Suspend of the machine. as.value: duration in us.
+    BLACKBOX_NOT_SENT,   ///< Frame that the port refused in this step. number: id; as.value: result.
+    BLACKBOX_PURGE,      ///< Purge in this step. as.value: result.
+    BLACKBOX_ARM,        ///< Arm request. number: client; a: takeover; b: iw_refusal_t.
+    BLACKBOX_DRIVE,      ///< Drive request. number: client; a: currents are given; b: iw_refusal_t; as.drive.
+    BLACKBOX_STOP,       ///< Stop. number: client; a: iw_cause_t.
+    BLACKBOX_ESTOPPED,   ///< Software e-stop. number: client.
+    BLACKBOX_RESET,      ///< Reset request. b: iw_refusal_t.
+    BLACKBOX_RELEASE,    ///< Release request. b: iw_refusal_t.
+    BLACKBOX_GONE,       ///< End of a client's connection. number: client.
+    BLACKBOX_TARE,       ///< Tare. a: iw_side_t; b: iw_tare_t.
+    BLACKBOX_ASSUMPTION, ///< New assumption. a: item; b: iw_assumption_state_t; number: iw_source_t; as.value: figure.
+    BLACKBOX_STATE,      ///< Decision: new state. a: state; b: state before. number: lease holder; as.drive: applied.
+    BLACKBOX_STOPPED,    ///< Decision: stop. number: number of the stop; a: iw_cause_t; b: sides; as.value: detail.
     BLACKBOX_KINDS,
 } blackbox_kind_t;
 
 typedef struct {
     int32_t speed_mm_s[2];
-    int16_t current_mA[2]; ///< What does not fit is out of range as well at the end of int16.
-    uint32_t age_us;       ///< How long before its time the command was sent.
+    int16_t current_mA[2]; ///< Clamped to int16: a value beyond it is out of range as well.
+    uint32_t age_us;       ///< Time between sending the command and the entry.
 } blackbox_drive_t;
 
 typedef struct {
-    uint64_t at_us; ///< CLOCK_MONOTONIC.
+    uint64_t at_us; ///< CLOCK_MONOTONIC in us.
     union {
         uint8_t data[IW_CAN_DATA_MAX];
         int64_t value;
@@ -55,10 +55,10 @@ typedef struct {
 } blackbox_entry_t;
 IW_STATIC_ASSERT(sizeof(blackbox_entry_t) <= 40U, entries_are_small);
 
-/// The kind's name in the file beside the frames; "unknown" for what is none.
+/// Returns the name of the kind in the file of decisions; "unknown" for an invalid one.
 const char *blackbox_kind_name(blackbox_kind_t kind);
 
-/// BLACKBOX_KINDS if no kind has that name.
+/// Returns the kind with that name, or BLACKBOX_KINDS.
 blackbox_kind_t blackbox_kind_of(const char *name);
 
 #endif

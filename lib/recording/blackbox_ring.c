@@ -3,17 +3,17 @@
 
 #include <string.h>
 
-/// An entry: tag, a, b; time since the block's begin unless it is that of the entry before; number; what `as` holds. The tag is the kind
-/// and these bits.
+/// Form of an entry: tag, a, b; time since the begin of the block, unless it is that of the entry before; number; the
+/// contents of `as`. The tag is the kind and these bits.
 #define KIND      0x1FU
 #define SAME_TIME 0x20U
 #define LONG      0x40U ///< The number has four bytes, not two.
-#define FILLED    0x80U ///< `as` follows whole. Of a frame as many bytes follow as it has, without this bit.
-/// In the place of a tag: the rest of the block is empty.
+#define FILLED    0x80U ///< All of `as` follows. Without this bit, a frame is followed by as many bytes as it has.
+/// Tag that marks the rest of the block as empty.
 #define END KIND
 IW_STATIC_ASSERT(BLACKBOX_KINDS <= END, end_is_no_kind);
 
-#define OFFSET_MAX 0xFFFFFFU ///< Three bytes of time.
+#define OFFSET_MAX 0xFFFFFFU ///< The time has three bytes.
 #define PACKED_MIN 5U
 #define PACKED_MAX (PACKED_MIN + 3U + 2U + sizeof(((blackbox_entry_t *)0)->as))
 
@@ -31,7 +31,7 @@ void blackbox_ring_init(blackbox_ring_t *self, uint32_t seconds) {
     self->last_us = 0;
 }
 
-/// How many bytes of `as` follow.
+/// Returns the number of bytes of `as` that follow.
 static size_t filling(const blackbox_entry_t *entry, uint8_t tag) {
     if (entry->kind == (uint8_t)BLACKBOX_FRAME) {
         return (entry->a < sizeof entry->as.data) ? entry->a : sizeof entry->as.data;
@@ -52,7 +52,7 @@ static bool is_filled(const blackbox_entry_t *entry) {
     return any != 0U;
 }
 
-/// Writes four bytes, whose first `size` count: compilers make one store of them.
+/// Writes four bytes, of which the first `size` count: compilers make one store of them.
 static size_t put_number(uint8_t *to, uint32_t number, size_t size) {
     to[0] = (uint8_t)number;
     to[1] = (uint8_t)(number >> 8);
@@ -69,7 +69,8 @@ static uint32_t take_number(const uint8_t *from, size_t size) {
     return number;
 }
 
-/// Bytes that count of those written: what is behind them, up to PACKED_MAX, is written again by the next entry, or never read.
+/// Returns the number of bytes that count. The bytes after them, up to PACKED_MAX, are overwritten by the next entry or
+/// never read.
 static size_t pack(const blackbox_entry_t *entry, bool same_time, uint32_t offset_us, uint8_t *to) {
     const bool is_long = entry->number > UINT16_MAX;
     size_t at = 3;
@@ -83,7 +84,7 @@ static size_t pack(const blackbox_entry_t *entry, bool same_time, uint32_t offse
     return at + filling(entry, to[0]);
 }
 
-/// Bytes read. `*out` is the entry before.
+/// Returns the number of bytes read. `*out` is the entry before.
 static size_t unpack(const uint8_t *from, uint64_t begin_us, blackbox_entry_t *out) {
     const uint8_t tag = from[0];
     const uint64_t before_us = out->at_us;
@@ -100,7 +101,7 @@ static size_t unpack(const uint8_t *from, uint64_t begin_us, blackbox_entry_t *o
     return at + filling(out, tag);
 }
 
-/// Ends the block and begins the next one. Bytes used with it.
+/// Ends the block and begins the next one. Returns the bytes used with it.
 static uint64_t begin_block(blackbox_ring_t *self, uint64_t used, uint64_t number, uint64_t at_us) {
     const uint64_t index = (used + BLACKBOX_BLOCK - 1U) / BLACKBOX_BLOCK;
     blackbox_block_t *block = &self->block[index % self->blocks];
@@ -119,7 +120,7 @@ void blackbox_ring_put(blackbox_ring_t *self, const blackbox_entry_t *entry) {
     uint64_t used = atomic_load_explicit(&self->used, memory_order_relaxed);
     const size_t room = BLACKBOX_BLOCK - used % BLACKBOX_BLOCK;
     const uint64_t begun_us = self->block[used / BLACKBOX_BLOCK % self->blocks].at_us;
-    // One byte more: for the end.
+    // One byte more, for the end.
     if (number == 0U || room <= PACKED_MAX || entry->at_us - begun_us > OFFSET_MAX) {
         used = begin_block(self, used, number, entry->at_us);
     }
@@ -139,7 +140,7 @@ size_t blackbox_ring_most(const blackbox_ring_t *self) {
     return (size_t)self->blocks * sizeof self->block[0].packed / PACKED_MIN;
 }
 
-/// Index of the oldest block that is surely whole: the writer may be at the next one already.
+/// Returns the index of the oldest block that is certainly complete: the writer may already write the next one.
 static uint64_t oldest(const blackbox_ring_t *self) {
     const uint64_t next = atomic_load_explicit(&self->used, memory_order_acquire) / BLACKBOX_BLOCK + 1U;
     return (next >= self->blocks) ? next - self->blocks + 1U : 0U;
@@ -149,7 +150,7 @@ bool blackbox_ring_is_whole(const blackbox_ring_t *self) {
     return oldest(self) == 0U;
 }
 
-/// Index of the block that has the entry with this number; of the oldest one if that is gone.
+/// Returns the index of the block with this entry, or of the oldest block if that is overwritten.
 static uint64_t find(const blackbox_ring_t *self, uint64_t used, uint64_t number) {
     const uint64_t least = oldest(self);
     uint64_t index = used / BLACKBOX_BLOCK;
@@ -159,7 +160,7 @@ static uint64_t find(const blackbox_ring_t *self, uint64_t used, uint64_t number
     return index;
 }
 
-/// Unpacks the entries from..to of the first `size` bytes of a block. How many there were.
+/// Unpacks the entries from..to of the first `size` bytes of a block. Returns their number.
 static size_t take_block(const blackbox_block_t *block, size_t size, uint64_t from, uint64_t to,
                          blackbox_entry_t *out) {
     const uint8_t *bytes = (const uint8_t *)block;
@@ -185,7 +186,8 @@ uint64_t blackbox_ring_copy(const blackbox_ring_t *self, uint64_t from, uint64_t
         const blackbox_block_t block = self->block[index % self->blocks];
         const uint64_t left = used - index * BLACKBOX_BLOCK;
         atomic_thread_fence(memory_order_acquire);
-        if (index < oldest(self)) { // Overwritten meanwhile, it may be torn: what is copied begins behind it.
+        if (index <
+            oldest(self)) { // The block was overwritten in the meantime and may be torn: copying starts after it.
             begun = false;
             count = 0;
             continue;

@@ -8,19 +8,19 @@
 #include <string.h>
 
 #define ERROR_FLAG 0x20000000U
-/// Beyond the year 30000; and the sum in microseconds stays far inside 64 bits.
+/// Seconds beyond the year 30000; the sum in microseconds still fits 64 bits.
 #define SECONDS_DIGITS  12U
 #define FRACTION_DIGITS 9U
 #define STANDARD_DIGITS 3U
 #define EXTENDED_DIGITS 8U
 
-/// The part of a line that is still to be read.
+/// The unread part of a line.
 typedef struct {
     const char *at;
     const char *end;
 } cursor_t;
 
-/// 0..15, or -1 if it is no hexadecimal digit.
+/// Returns the value 0..15 of a hexadecimal digit, or -1.
 static int hex(char digit) {
     if (digit >= '0' && digit <= '9') {
         return digit - '0';
@@ -35,7 +35,7 @@ static int next_hex(const cursor_t *cursor, size_t ahead) {
     return ((size_t)(cursor->end - cursor->at) > ahead) ? hex(cursor->at[ahead]) : -1;
 }
 
-/// True, and moved on, if the next character is this one.
+/// Returns true and advances if the next character is `wanted`.
 static bool take(cursor_t *cursor, char wanted) {
     if (cursor->at == cursor->end || *cursor->at != wanted) {
         return false;
@@ -56,12 +56,12 @@ static const char *parse_bytes(cursor_t *cursor, size_t most, candump_t *frame) 
         frame->data[frame->length] = (uint8_t)(next_hex(cursor, 0) * 16 + low);
         frame->length++;
         cursor->at += 2;
-        (void)take(cursor, '.'); // cansend's way of writing it.
+        (void)take(cursor, '.'); // The form of cansend.
     }
     return NULL;
 }
 
-/// `_9`.. `_F` behind 8 bytes: the length code as it was on the bus. It means 8 all the same.
+/// Parses `_9`.. `_F` after 8 bytes: the length code on the bus. The length is 8.
 static const char *parse_raw_dlc(cursor_t *cursor, const candump_t *frame) {
     if (!take(cursor, '_')) {
         return NULL;
@@ -97,7 +97,7 @@ static const char *parse_fd(cursor_t *cursor, candump_t *frame) {
     return parse_bytes(cursor, CANDUMP_DATA_MAX, frame);
 }
 
-/// From behind the first `#`. NULL, or what is wrong.
+/// Parses the part after the first `#`. Returns NULL, or what is wrong.
 static const char *parse_data(cursor_t *cursor, candump_t *frame) {
     if (take(cursor, '#')) {
         return parse_fd(cursor, frame);
@@ -121,7 +121,7 @@ static bool skip_blanks(cursor_t *cursor) {
     return cursor->at > begin;
 }
 
-/// How many decimal digits were taken into `*value`, of which no more than `counted` count.
+/// Reads decimal digits into `*value` and returns their number. Only the first `counted` digits count.
 static unsigned take_digits(cursor_t *cursor, unsigned counted, int64_t *value) {
     unsigned digits = 0;
     for (; cursor->at < cursor->end && *cursor->at >= '0' && *cursor->at <= '9'; cursor->at++) {
@@ -236,7 +236,7 @@ candump_result_t candump_parse(const char *line, size_t length, candump_t *out_f
     return CANDUMP_FRAME;
 }
 
-/// cantools takes letters and digits only.
+/// cantools accepts letters and digits only.
 static void plain_name(const char *name, char out[CANDUMP_INTERFACE_SIZE]) {
     size_t length = 0;
     for (size_t i = 0; name[i] != '\0' && length + 1U < CANDUMP_INTERFACE_SIZE; i++) {

@@ -44,7 +44,7 @@ static bool begins(const char *bytes, size_t size, const char *begin, size_t len
     return size >= length && memcmp(bytes, begin, length) == 0;
 }
 
-/// `... 10A   [4]  01 00`, with or without a time: what candump prints without -L.
+/// Recognises `... 10A   [4]  01 00`, with or without a time: the output of candump without -L.
 static bool is_screen(const char *line, size_t length) {
     for (size_t i = 1; i + 2U < length; i++) {
         if (line[i] == '#') {

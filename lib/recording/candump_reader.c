@@ -33,7 +33,7 @@ static void fill(candump_reader_t *self) {
     self->failed = got < 0;
 }
 
-/// Where the newline of the next line is, at most CANDUMP_READ_MAX ahead; NULL: there is none in what can be had.
+/// Returns the newline of the next line, at most CANDUMP_READ_MAX ahead, or NULL if there is none yet.
 static const char *find_newline(candump_reader_t *self) {
     for (;;) {
         const size_t there = self->end - self->begin;
@@ -62,7 +62,7 @@ static candump_read_t tell_bad(candump_reader_t *self, const char *why) {
     return CANDUMP_READ_BAD;
 }
 
-/// What is left has no newline: too long, cut, or the end.
+/// Handles a rest without newline: too long, cut, or the end.
 static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
     const size_t there = self->end - self->begin;
     if (self->failed || there == 0U) {
@@ -82,7 +82,7 @@ static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
                                 "if it is whole, add the line end");
 }
 
-/// Passes over a byte order mark. False, with `why`, if the first line is in another form.
+/// Skips a byte order mark. Returns false and sets `why` if the first line is in another form.
 static bool begin(candump_reader_t *self) {
     self->begun = true;
     (void)find_newline(self);

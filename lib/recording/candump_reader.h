@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: MIT
-/// A recording read line by line from a file or pipe of any length, in constant memory, and never waiting for more than
-/// the next line. Nothing is lost: a line that cannot be understood is told with its number, and the next one is read.
+/// Reads a recording line by line from a file or pipe of any length, in constant memory, and never waits for more than
+/// the next line. A line that cannot be parsed is reported with its number, and reading continues.
 #ifndef CANDUMP_READER_H
 #define CANDUMP_READER_H
 
 #include "candump.h"
 
-/// A longer line is told as bad, once.
+/// A longer line is reported as bad once.
 #define CANDUMP_READ_MAX 1024U
 
 typedef enum {
     CANDUMP_READ_FRAME = 0,
-    CANDUMP_READ_BAD,     ///< `line` and `why` tell where and what.
-    CANDUMP_READ_FOREIGN, ///< Not in candump's log form: `why` names form and converter. Then CANDUMP_READ_END.
+    CANDUMP_READ_BAD,     ///< `line` and `why` have the place and the reason.
+    CANDUMP_READ_FOREIGN, ///< Another form: `why` has the form and the converter. CANDUMP_READ_END follows.
     CANDUMP_READ_END,
-    CANDUMP_READ_FAILED, ///< errno tells why the file cannot be read.
+    CANDUMP_READ_FAILED, ///< errno is the reason why the file cannot be read.
 } candump_read_t;
 
 typedef struct {
-    uint64_t line; ///< Number of the last line read; the first is 1.
+    uint64_t line; ///< Number of the last line; the first is 1.
     const char *why;
-    size_t begin; ///< Unread bytes are [begin, end) of `buffer`.
+    size_t begin; ///< The unread bytes are [begin, end) of `buffer`.
     size_t end;
     int fd;
     bool begun; ///< The first bytes were compared with the forms of other programs.
@@ -31,8 +31,8 @@ typedef struct {
 
 void candump_reader_init(candump_reader_t *self, int fd);
 
-/// The next frame or bad line; blank lines and comments are passed over. A last line without its line end may be cut,
-/// and a frame cut in its data looks like a shorter one: it is told as bad.
+/// Returns the next frame or bad line; skips blank lines and comments. A last line without line end may be cut, and a
+/// frame that is cut in its data looks like a shorter one, so it is reported as bad.
 candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame);
 
 #endif

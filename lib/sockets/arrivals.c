@@ -11,19 +11,19 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// A connection that has just been accepted.
+/// A connection that was just accepted.
 typedef struct {
     int fd;
     struct ucred peer;
 } newcomer_t;
 
-/// The socket by which a client beyond the maximum has come.
+/// Returns the socket at which a client beyond the maximum arrived.
 static sock_right_t door_of(const sock_clients_t *self, const sock_client_t *client) {
     const uint32_t place = (uint32_t)(client - self->client) - sock_parts[SOCK_STOP].first;
     return (place < SOCK_STOP_SLOTS) ? SOCK_DRIVE : SOCK_WATCH;
 }
 
-/// False: it cannot be watched, and is closed.
+/// Adds the connection. Returns false if it cannot be watched; then it is closed.
 static bool admit(sock_clients_t *self, sock_client_t *client, const newcomer_t *newcomer, sock_right_t right) {
     const size_t slot = (size_t)(client - self->client);
     struct epoll_event interest = {.events = EPOLLIN | EPOLLRDHUP, .data = {.u64 = SOCK_TAG_CLIENT + slot}};
@@ -57,7 +57,7 @@ void sock_service_refuse_crowd(const sock_clients_t *self, const sock_client_t *
                    (door == SOCK_DRIVE) ? "max_clients" : "max_watchers");
 }
 
-/// Its time is over, and it has said no stop.
+/// Closes a connection whose time has expired without a stop.
 static void turn_away(sock_clients_t *self, sock_client_t *client) {
     const iwn_id_t nobody = {.kind = IWN_ID_NONE};
     sock_listener_t *listener = &self->listener[door_of(self, client)];
@@ -68,7 +68,7 @@ static void turn_away(sock_clients_t *self, sock_client_t *client) {
     if (!listener->full_told) {
         sock_log(self->log, SOCK_LOG_WARNING, "a client was turned away: %s", refusal.message);
     }
-    listener->full_told = listener->config.right == SOCK_WATCH; // A flood of these must not crowd out other messages.
+    listener->full_told = listener->config.right == SOCK_WATCH; // A flood of these must not displace other messages.
 }
 
 static sock_client_t *free_slot(sock_clients_t *self, sock_right_t right) {
@@ -81,12 +81,12 @@ static sock_client_t *free_slot(sock_clients_t *self, sock_right_t right) {
     return NULL;
 }
 
-/// What there is among a socket's places beyond the maximum, for one user.
+/// Occupancy of a socket's places beyond the maximum, for one user.
 typedef struct {
     sock_client_t *free_one;
-    sock_client_t *oldest; ///< Of those that have said nothing.
-    sock_client_t *own;    ///< The same of this user's.
-    unsigned held;         ///< By this user.
+    sock_client_t *oldest; ///< Oldest one that has sent nothing.
+    sock_client_t *own;    ///< Oldest one of this user that has sent nothing.
+    unsigned held;         ///< Number of places of this user.
 } places_t;
 
 static sock_client_t *older(sock_client_t *known, sock_client_t *other) {
@@ -116,8 +116,8 @@ static places_t look_over(sock_client_t *first, uid_t uid) {
     return seen;
 }
 
-/// A place for this user: a free one, or the one that has been silent for longest, if that is long enough. Whoever has its share
-/// makes room in it. NULL: there is none.
+/// Returns a place for this user: a free one, or the one that has sent nothing for longest, if that is long enough. A
+/// user who has a full share replaces one of its own. Returns NULL if there is none.
 static sock_client_t *stop_place(sock_clients_t *self, sock_client_t *first, uid_t uid) {
     const places_t seen = look_over(first, uid);
     const bool has_share = uid != 0U && seen.held >= SOCK_STOP_PLACES / 2U;
@@ -134,7 +134,8 @@ static sock_client_t *stop_place(sock_clients_t *self, sock_client_t *first, uid
     return room;
 }
 
-/// All places of its socket are taken: its first line is looked for at once, and awaited if there is a place to wait in.
+/// All places of the socket are taken. Reads the first line of the connection immediately, and waits for it if a place
+/// to wait in is free.
 static void hear_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_right_t door, bool may_wait) {
     sock_client_t *first = &self->client[sock_parts[SOCK_STOP].first + door * SOCK_STOP_SLOTS];
     sock_client_t *place = may_wait ? stop_place(self, first, newcomer->peer.uid) : NULL;
@@ -154,7 +155,7 @@ static void hear_stop(sock_clients_t *self, const newcomer_t *newcomer, sock_rig
     }
 }
 
-/// Whether a listening socket wakes the loop.
+/// Sets whether a listening socket wakes the loop.
 static void listen_to_newcomers(sock_clients_t *self, const sock_listener_t *listener, bool wanted) {
     const uint64_t tag = (listener->config.right == SOCK_DRIVE) ? SOCK_TAG_LISTENER : SOCK_TAG_WATCH_LISTENER;
     struct epoll_event interest = {.events = wanted ? EPOLLIN : 0U, .data = {.u64 = tag}};
@@ -166,7 +167,7 @@ static void pause_listening(sock_clients_t *self, sock_listener_t *listener, iw_
     listen_to_newcomers(self, listener, false);
 }
 
-/// Takes one newcomer. False: there is none, or none for now.
+/// Accepts one connection. Returns false if there is none, or none can be accepted now.
 static bool accept_one(sock_clients_t *self, sock_listener_t *listener) {
     newcomer_t newcomer = {.peer = {0}};
     socklen_t length = sizeof newcomer.peer;
@@ -191,7 +192,7 @@ static bool accept_one(sock_clients_t *self, sock_listener_t *listener) {
     return true;
 }
 
-/// True if there was one.
+/// Accepts connections. Returns true if there was one.
 static bool accept_some(sock_clients_t *self, sock_listener_t *listener) {
     const iw_time_us_t until_us = iwl_clock_now_us() + SOCK_ROUND_US;
     bool some = false;

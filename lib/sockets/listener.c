@@ -19,7 +19,7 @@ static const char *option_of(const sock_listener_t *self) {
     return (self->config.right == SOCK_DRIVE) ? "--socket" : "--watch-socket";
 }
 
-/// `cure` ends where the option's name belongs.
+/// `cure` ends at the place of the option's name.
 static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *cure) {
     (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, cure,
                   option_of(self));
@@ -76,8 +76,8 @@ int sock_listener_prepare(sock_listener_t *self, const sock_listener_config_t *c
 
 // In the folder -------------------------------------------------------------------------------------------------------
 
-/// A socket's address has no "relative to a descriptor": the process stands in the folder meanwhile. The descriptor leads
-/// back; -1: from a place that we may not even look at.
+/// Changes to the folder, because the address of a socket cannot be relative to a descriptor. `*out_back` is a
+/// descriptor of the folder before; -1 if the process has no rights to open it.
 static bool enter(const sock_listener_t *self, int *out_back) {
     *out_back = open(".", O_PATH | O_DIRECTORY | O_CLOEXEC);
     return fchdir(self->folder.fd) == 0;
@@ -112,7 +112,8 @@ static int remove_name(const sock_listener_t *self, bool stranger, FILE *err) {
     return complain_errno(self, err, errno);
 }
 
-/// Reads what has the name of the socket; `st_mode` 0: nothing. A link and a file are refused.
+/// Reads the status of the file with the name of the socket; `st_mode` is 0 if there is none. A link and a regular file
+/// are refused.
 static int read_name(const sock_listener_t *self, struct stat *out_status, FILE *err) {
     *out_status = (struct stat){.st_mode = 0};
     if (fstatat(self->folder.fd, self->name, out_status, AT_SYMLINK_NOFOLLOW) != 0) {
@@ -132,7 +133,7 @@ int sock_listener_judge(const sock_listener_t *self, FILE *err) {
     return read_name(self, &status, err);
 }
 
-/// Makes the name free, if it is safe to.
+/// Removes the file with the name of the socket if that is safe.
 static int clear_name(const sock_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     struct stat status;
     const int result = read_name(self, &status, err);
@@ -146,7 +147,7 @@ static int clear_name(const sock_listener_t *self, const struct sockaddr_un *add
     return remove_name(self, stranger, err);
 }
 
-/// Nobody but us can have put it there; if somebody has, it is not served.
+/// Checks that the gateway itself has created the socket. Another one is not used.
 static int verify(sock_listener_t *self, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
@@ -158,14 +159,13 @@ static int verify(sock_listener_t *self, FILE *err) {
     }
     self->device = status.st_dev;
     self->inode = status.st_ino;
-    const bool right =
-        (status.st_mode & 0777U) == self->config.mode; // Not so where the folder has access control lists.
+    const bool right = (status.st_mode & 0777U) == self->config.mode; // Not if the folder has access control lists.
     return (right || fchmodat(self->folder.fd, self->name, self->config.mode, AT_SYMLINK_NOFOLLOW) == 0)
                ? 0
                : complain_errno(self, err, errno);
 }
 
-/// Has its mode from the first moment; nobody is let in before it listens.
+/// The socket has its mode from the beginning, and accepts no connection before it listens.
 static int bind_socket(sock_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (self->fd < 0) {
@@ -199,7 +199,7 @@ static void give_to_group(const sock_listener_t *self, sock_log_t *log) {
     const struct group *group = getgrnam(name);
     if (group != NULL && fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) == 0 &&
         status.st_gid == group->gr_gid) {
-        return; // As a service, which may not call chown.
+        return; // As a service, which must not call chown.
     }
     if (group == NULL) {
         sock_log(log, SOCK_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)",
@@ -210,7 +210,7 @@ static void give_to_group(const sock_listener_t *self, sock_log_t *log) {
     }
 }
 
-/// Takes the reserved descriptor again.
+/// Opens the reserved descriptor again.
 static void restore(sock_listener_t *self) {
     if (self->reserve_fd < 0) {
         self->reserve_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);

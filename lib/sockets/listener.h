@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-/// A northbound socket, the one to drive by or the one to watch by: made safely, accepted from without ever spinning, removed at the end.
+/// Listening socket for clients that drive, or for watchers: safe creation, accepting without a busy loop, and removal.
 ///
-/// Its folder must belong to somebody who may run a gateway (owners.h), and nobody else may write there; one like
-/// /tmp is used with a warning. It is opened once, and the socket is made, changed and removed in it by name, never by a
-/// path that somebody could turn elsewhere meanwhile. A name that is taken is replaced only if it is a socket on which
-/// nobody answers, or a stranger's. Accepting needs a descriptor: one
-/// is kept in reserve, so that with none left a newcomer can still be taken, told and closed instead of waking the
-/// loop for ever.
+/// The owner of its folder must be a user who may run a gateway (owners.h), and no other user may write to the folder;
+/// a folder like /tmp is used with a warning. The folder is opened once, and the socket is created, changed and removed
+/// by its name in that folder, never by a path that another user could redirect. An existing name is replaced only if
+/// it is a socket that does not answer, or that another user owns. Accepting needs a descriptor. One is reserved, so
+/// that without free descriptors a connection can still be accepted, reported and closed, instead of waking the loop
+/// again and again.
 #ifndef GATEWAY_LISTENER_H
 #define GATEWAY_LISTENER_H
 
@@ -19,63 +19,66 @@
 
 struct sock_log;
 
-/// After an accept that failed for want of anything, the socket is left alone this long.
+/// After an accept that failed for lack of resources, the next attempt waits for this time.
 #define SOCK_LISTENER_PAUSE_US 200000U
 
-/// What a socket, and so who connects to it, may do.
+/// Rights of a socket and of its clients.
 typedef enum {
-    SOCK_DRIVE = 0,          ///< Everything.
-    SOCK_WATCH,              ///< Look, stop and e-stop.
-    SOCK_RIGHTS,             ///< Sockets: one for each right before.
-    SOCK_STOP = SOCK_RIGHTS, ///< Stop or e-stop, once: who comes when all places of its socket are taken.
+    SOCK_DRIVE = 0, ///< All requests.
+    SOCK_WATCH,     ///< Read, stop and e-stop.
+    SOCK_RIGHTS,    ///< Number of sockets, one for each right above.
+    SOCK_STOP =
+        SOCK_RIGHTS, ///< Stop or e-stop, once: for a client that arrives when all places of its socket are taken.
     SOCK_PARTS,
 } sock_right_t;
 
 typedef enum {
-    SOCK_ACCEPT_NONE = 0, ///< Nobody waits.
+    SOCK_ACCEPT_NONE = 0, ///< No connection waits.
     SOCK_ACCEPT_ONE,      ///< `*out_fd` is the connection.
-    SOCK_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: report it, close it. The next call makes room again.
+    SOCK_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: report it and close it. The next call makes room again.
     SOCK_ACCEPT_PAUSE,    ///< Out of resources: call again after SOCK_LISTENER_PAUSE_US.
 } sock_accept_t;
 
-/// What a socket is to be, by the configuration. The texts must outlive the listener.
+/// Configuration of a socket. The texts must exist as long as the listener.
 typedef struct {
-    const char *program; ///< Whose it is, for complaints.
+    const char *program; ///< Name of the program for messages.
     sock_right_t right;
-    const char *path;  ///< "none": there is none.
-    const char *group; ///< Owner group; "none": the gateway's own.
+    const char *path;  ///< Path; "none": no socket.
+    const char *group; ///< Group of the socket; "none": the group of the gateway.
     mode_t mode;
 } sock_listener_config_t;
 
 typedef struct {
     sock_listener_config_t config;
-    char name[SOCK_PATH_SIZE]; ///< In the folder.
+    char name[SOCK_PATH_SIZE]; ///< Name in the folder.
     sock_owners_t owners;
     sock_folder_t folder;
-    dev_t device; ///< Of the socket as we made it, so that nobody else's is removed.
+    dev_t device; ///< Device and inode of the created socket, so that only this socket is removed.
     ino_t inode;
-    iw_time_us_t from_us; ///< Nobody is accepted before.
-    bool full_told;       ///< That somebody was turned away, until the next is let in.
-    int fd;               ///< -1: not open.
+    iw_time_us_t from_us; ///< Earliest time of the next accept.
+    bool full_told;       ///< A rejection was logged, until the next client is accepted.
+    int fd;               ///< Descriptor; -1 if not open.
     int reserve_fd;
 } sock_listener_t;
 
-/// Makes the socket's folder if only that is missing, opens and judges it. 0, or a sysexits code after cause and cure have been
-/// printed on `err`.
+/// Creates the socket's folder if only that is missing, opens it and checks it. Returns 0, or a sysexits code after it
+/// has printed cause and fix to `err`.
 int sock_listener_prepare(sock_listener_t *self, const sock_listener_config_t *config, FILE *err);
 
-/// After sock_listener_prepare: whether sock_listener_open would refuse what has the socket's name. Changes nothing, and does not ask
-/// whether another program answers there. 0, or a sysexits code after cause and cure have been printed on `err`.
+/// Checks after sock_listener_prepare whether sock_listener_open would refuse the file with the socket's name. It
+/// changes nothing, and does not check whether another program answers there. Returns 0, or a sysexits code after it
+/// has printed cause and fix to `err`.
 int sock_listener_judge(const sock_listener_t *self, FILE *err);
 
-/// After sock_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
-/// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
+/// Creates the socket after sock_listener_prepare. Returns 0, or a sysexits code after it has printed cause and fix to
+/// `err`. If the group does not exist or must not be set, it logs a warning, and the socket is stricter than
+/// configured.
 int sock_listener_open(sock_listener_t *self, struct sock_log *log, FILE *err);
 
-/// Closes the socket and removes its file, if it is still ours; closes the folder.
+/// Closes the socket, removes its file if it is the created one, and closes the folder.
 void sock_listener_close(sock_listener_t *self);
 
-/// Takes one waiting connection. Never blocks.
+/// Accepts one waiting connection. Never blocks.
 sock_accept_t sock_listener_accept(sock_listener_t *self, int *out_fd);
 
 #endif

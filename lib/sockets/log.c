@@ -37,7 +37,7 @@ void sock_log_close(sock_log_t *self) {
     }
 }
 
-/// True if the whole line went out.
+/// Writes the line. Returns true if all of it was written.
 static bool put_line(const sock_log_t *self, const char *line, size_t length) {
     struct pollfd ready = {.fd = self->fd, .events = POLLOUT};
     if (self->socket) {
@@ -76,7 +76,7 @@ void sock_log(sock_log_t *self, sock_log_level_t level, const char *format, ...)
     va_start(arguments, format);
     (void)vsnprintf(&raw[length], sizeof raw - (size_t)length, format, arguments);
     va_end(arguments);
-    iwn_plain_copy(raw, line, sizeof line - 1U); // Cut anywhere, and with names that others chose.
+    iwn_plain_copy(raw, line, sizeof line - 1U); // The text may be cut anywhere, and has names from other programs.
     const size_t end = strlen(line);
     line[end] = '\n';
     self->credit--;

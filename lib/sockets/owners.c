@@ -26,7 +26,7 @@ bool sock_owners_wrote(const sock_owners_t *self, const struct stat *status) {
     return S_ISREG(status->st_mode) && status->st_nlink == 1U && sock_owners_have(self, status->st_uid);
 }
 
-/// With a slash behind its name, a symbolic link would be followed.
+/// Opens a path without a final slash, with which a symbolic link would be followed.
 static int open_unlinked(const char *path) {
     static char bare[4096]; // Too large for a stack.
     struct stat status;
@@ -41,7 +41,7 @@ static int open_unlinked(const char *path) {
     memcpy(bare, path, length);
     bare[length] = '\0';
     const int fd = open(bare, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0 && errno == ENOTDIR) { // That it is no directory would mislead.
+    if (fd < 0 && errno == ENOTDIR) { // "Not a directory" would be misleading.
         errno = (lstat(bare, &status) == 0 && S_ISLNK(status.st_mode)) ? ELOOP : ENOTDIR;
     }
     return fd;

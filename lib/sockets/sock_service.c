@@ -16,12 +16,12 @@ const sock_part_t sock_parts[SOCK_PARTS] = {
     [SOCK_STOP] = {SOCK_DRIVERS_MAX + SOCK_WATCHERS_MAX, SOCK_RIGHTS *SOCK_STOP_SLOTS},
 };
 
-/// A line of anything else is not worth reading any more.
+/// Returns true if the line may be a stop request. Other lines need not be read.
 static bool may_stop(const char *line, size_t length) {
     return memmem(line, length, "stop", 4U) != NULL || memmem(line, length, "disarm", 6U) != NULL;
 }
 
-/// What it had said already and nobody has looked at: of that the stops are carried out still.
+/// Executes the stop requests among the lines that were received but not read.
 static void hear_out(sock_clients_t *self, sock_client_t *client) {
     const char *line = client->in;
     size_t left = client->in_length;
@@ -73,13 +73,13 @@ static bool has_line(const sock_client_t *client) {
            sock_client_line(client, &length) != NULL;
 }
 
-/// A line of it may be carried out now. One that has hung up is done with at once.
+/// Returns true if a line of the client may be executed now. A client that has hung up is finished immediately.
 static bool has_turn(const sock_clients_t *self, const sock_client_t *client) {
     const bool in_time = client->right != SOCK_WATCH || client->hung_up || self->now_us >= client->line_us;
     return in_time && has_line(client);
 }
 
-/// After a pause as many as fit into one turn are carried out together.
+/// After a pause as many lines as fit into one turn are executed together.
 static void pace(sock_client_t *client, iw_time_us_t now_us) {
     const iw_time_us_t saved_us = (iw_time_us_t)(SOCK_LINES_PER_CYCLE - 1U) * SOCK_WATCHER_LINE_US;
     const bool rested = now_us >= client->line_us + saved_us;
@@ -97,7 +97,7 @@ static void carry_out_lines(sock_clients_t *self, sock_client_t *client) {
     }
 }
 
-/// Nothing of it is left to be done, but for a recording that it waits for and can take.
+/// Returns true if nothing is left to do, except for a recording that it waits for and can receive.
 static bool has_ended(const sock_client_t *client) {
     const bool waits = client->owed && !client->hung_up;
     return client->phase == SOCK_ENDED && (client->held || (!has_line(client) && !waits));
@@ -105,7 +105,7 @@ static bool has_ended(const sock_client_t *client) {
 
 void sock_service_serve(sock_clients_t *self, sock_client_t *client) {
     if (client->leaving) {
-        self->handler.leave(self->handler.context, client); // At once, whatever it has sent before.
+        self->handler.leave(self->handler.context, client); // Immediately, whatever it has sent before.
     }
     if (client->readable || client->hung_up) {
         sock_client_read(client);
@@ -120,23 +120,23 @@ void sock_service_serve(sock_clients_t *self, sock_client_t *client) {
         sock_service_finish(self, client);
     }
     if (client->hung_up && client->phase == SOCK_CLOSING) {
-        sock_client_break(client); // Nobody reads any more.
+        sock_client_break(client); // The peer no longer reads.
     }
     client->readable = false;
 }
 
-/// Somebody served in a round, and whether there was anything to do.
+/// Serves a client in a round. Returns whether there was anything to do.
 typedef bool (*service_t)(sock_clients_t *self, sock_client_t *client);
 
-/// One round of all, and how far it came.
+/// One round over all clients, and its progress.
 typedef struct {
     service_t service;
     const sock_client_t *holder;
-    iw_time_us_t end_us; ///< Of the time for all but the first; 0: nobody had anything to do yet.
+    iw_time_us_t end_us; ///< End of the time for all but the first; 0 until a client had anything to do.
 } round_t;
 
-/// Those with one right, from where their last round ended, until the time is up. At least one of them is served. True if all
-/// were.
+/// Serves the clients with one right, from the end of their last round, until the time has expired. At least one is
+/// served. Returns true if all were served.
 static bool go_among(sock_clients_t *self, round_t *round, sock_right_t right, uint32_t *next) {
     const uint64_t behind = UINT64_MAX << *next;
     uint64_t left = self->open[right];
@@ -158,11 +158,11 @@ static bool go_among(sock_clients_t *self, round_t *round, sock_right_t right, u
     return true;
 }
 
-/// Who has come only to stop first, then the holder of the lease, then who else may drive, then the watchers. True if all were
-/// served.
+/// Serves clients that may only stop, then the lease holder, then the others that may drive, then the watchers. Returns
+/// true if all were served.
 static bool go_round(sock_clients_t *self, iw_client_t holder_id, service_t service, uint32_t next[SOCK_PARTS]) {
     if ((self->open[SOCK_DRIVE] | self->open[SOCK_WATCH] | self->open[SOCK_STOP]) == 0U) {
-        return true; // Nobody is connected: most of a gateway's life.
+        return true; // No client is connected, which is the usual case.
     }
     sock_client_t *holder = sock_clients_find(self, holder_id);
     round_t round = {.service = service, .holder = holder};
@@ -197,8 +197,8 @@ void sock_service_clients(sock_clients_t *self, iw_client_t holder) {
     sock_service_poll_arrivals(self);
 }
 
-/// Reading is wanted unless there is no room or no use (a watcher whose next line has to wait wakes nobody with more of them);
-/// writing only while something waits.
+/// Watches for input unless there is no room or no use (a watcher whose next line must wait does not wake the loop with
+/// more), and for output only while something is queued.
 static void update_interest(sock_clients_t *self, sock_client_t *client) {
     const bool reading = client->phase == SOCK_OPEN && client->in_length < sizeof client->in &&
                          (client->right != SOCK_WATCH || !has_line(client));

@@ -18,15 +18,16 @@
 #ifdef SYS_epoll_pwait2
 #define WAIT_WITH_DEADLINE SYS_epoll_pwait2
 #else
-#define WAIT_WITH_DEADLINE 441 // The same number everywhere; headers older than Linux 5.11 do not name it.
+#define WAIT_WITH_DEADLINE 441 // The same number on all architectures; headers older than Linux 5.11 do not define it.
 #endif
 
-/// Not the C library's: it has had one since 2.35 only, and with 32 bits of time on small machines.
+/// Not the function of the C library, which has one only since 2.35, and with 32 bits of time on some machines.
 static int wait_with_deadline(int fd, struct epoll_event *events, int room, const struct __kernel_timespec *span) {
     return (int)syscall(WAIT_WITH_DEADLINE, fd, events, room, span, NULL, (size_t)0);
 }
 
-/// An old kernel says ENOSYS, a filter that does not know the number EPERM: neither is an answer of the call itself.
+/// Returns true if the system call is missing: an old kernel returns ENOSYS, a filter that does not know the number
+/// EPERM. The call itself returns neither.
 static bool is_missing(int fd) {
     struct epoll_event event;
     const struct __kernel_timespec none = {0};

@@ -49,7 +49,7 @@ void brd_report_start(bool restarted) {
     shown = 0;
 }
 
-/// The words are those of the gateway's protocol (docs/northbound.md), so that one manual serves both.
+/// The words are those of the gateway's protocol (docs/user/northbound.md), so that one manual serves both.
 static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     const iw_state_t state = seen->state;
     brd_console_text(iwn_state_name(state));

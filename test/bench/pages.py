@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""docs/speed.md, section by section, and the few of its rows that the README shows."""
+"""docs/developer/speed.md, section by section, and the few of its rows that the README shows."""
 
 import os
 import platform
@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAGE = ROOT / "docs" / "speed.md"
+PAGE = ROOT / "docs/developer/speed.md"
 README = ROOT / "README.md"
 PROCESS = "## The gateway as a process"
 TIMED = "## Beside floor and peers"

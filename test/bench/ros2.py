@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The bridge to ROS 2 beside a program in C: how soon a command is on the bus, what it costs. Prints; docs/speed.md has a paragraph of it.
+"""The bridge to ROS 2 beside a program in C: how soon a command is on the bus, what it costs. Prints; docs/developer/speed.md has a paragraph of it.
 
 usage: test/bench/ros2.py [--build DIR] [--rounds N]    with .venv's python
 

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The example of libiwheel-client drives simulated wheels through the real gateway; however it dies, they stop.
-
-usage: test_example.py BUILD [TEST...]
-"""
+"""The example of libiwheel-client drives simulated wheels through the real gateway; however it dies, they stop."""
 
 import os
 import shutil
@@ -13,7 +10,6 @@ import time
 import unittest
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-os.environ["IWHEEL_BUILD"] = os.path.abspath(sys.argv.pop(1))
 sys.path[:0] = [os.path.join(ROOT, "python", "tests"), os.path.join(ROOT, "python", "src")]
 
 from rig import BUILD, RigCase, now_us
@@ -133,7 +129,3 @@ class Example(RigCase):
         _, err = lost.communicate(timeout=10)
         self.assertEqual(1, lost.returncode)
         self.assertIn("nobody listens", err)
-
-
-if __name__ == "__main__":
-    unittest.main()

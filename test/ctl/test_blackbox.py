@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The black box, and record, why, replay and learn beside it, on the simulator's bus with a real gateway.
-
-Usage: test_blackbox.py BUILD [unittest's arguments]
-"""
+"""The black box, and record, why, replay and learn beside it, on the simulator's bus with a real gateway."""
 
 import base64
 import glob
@@ -20,22 +16,15 @@ import time
 import unittest
 import zlib
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
-import several
 from client import Streamer
-from harness import Rig, find_program
+from harness import Rig, children, find_program
 
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 
 
 def read(path):
     with open(path, encoding="utf-8") as file:
         return file.read()
-
-
-def children(pid):
-    pids = [int(word) for word in read(f"/proc/{pid}/task/{pid}/children").split()]
-    return {read(f"/proc/{child}/comm").strip(): child for child in pids}
 
 
 # A busy machine starves the simulated wheels now and then; that is not what is tried here.
@@ -518,8 +507,3 @@ class Learn(WithRig):
             "period     20 ms",
         ):
             self.assertIn(part, out)
-
-
-if __name__ == "__main__":
-    BUILD = os.path.abspath(sys.argv.pop(1))
-    several.main(BUILD)

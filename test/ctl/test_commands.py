@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""One grammar for all verbs of iwheelctl: durations, --json, help, what is nearly right, completion, 80 columns.
-
-Usage: test_commands.py BUILD [unittest's arguments]
-"""
+"""One grammar for all verbs of iwheelctl: durations, --json, help, what is nearly right, completion, 80 columns."""
 
 import json
 import os
@@ -16,10 +12,9 @@ import time
 import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "test", "system"))
 from harness import find_program
 
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 # Those that talk with a person.
 WITHOUT_JSON = {"top", "bringup", "help", "web"}
 
@@ -288,8 +283,3 @@ class Completion(unittest.TestCase):
             for word in listed(verb):
                 if word.startswith("--"):
                     self.assertIn(word, run("help", verb)[1] + "--help --json --socket", (verb, word))
-
-
-if __name__ == "__main__":
-    BUILD = sys.argv.pop(1)
-    unittest.main()

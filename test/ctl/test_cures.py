@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The cures that the programs print: every command in them exists, and those that can be carried out here clear the trouble.
-
-Usage: test_cures.py BUILD [unittest's arguments]
-"""
+"""The cures that the programs print: every command in them exists, and those that can be carried out here clear the trouble."""
 
 import glob
 import json
@@ -12,16 +8,13 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 import unittest
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
-sys.path.insert(0, os.path.join(ROOT, "test", "system"))
-import several
 from harness import Rig, find_program, read_only
 
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 # Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
 PROGRAMS = {
     "apt-get": ("apt", {"install"}),
@@ -635,8 +628,3 @@ class Check(unittest.TestCase):
         self.assertIn(code, (69, 1))
         self.assertTrue(any("e-stop unix:" in text and "released" in text for text in found["warn"]), done.stdout)
         self.assertTrue(any("record" in text for text in found["ok"]))
-
-
-if __name__ == "__main__":
-    BUILD = sys.argv.pop(1)
-    several.main(BUILD)

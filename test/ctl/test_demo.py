@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The demonstration, interrupted at any moment, leaves nothing behind: no file, no process.
-
-Usage: test_demo.py BUILD [unittest's arguments]
-"""
+"""The demonstration, interrupted at any moment, leaves nothing behind: no file, no process."""
 
 import concurrent.futures
 import contextlib
@@ -15,10 +11,9 @@ import tempfile
 import time
 import unittest
 
-import several
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 
 
 def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",), begun=True):
@@ -106,8 +101,3 @@ class Interrupted(unittest.TestCase):
         done = self.play_with("kill -INT $PPID\nexit 1\n")
         self.assertEqual(130, done.returncode, done.stdout + done.stderr)
         self.assertNotIn("FAILED", done.stderr)
-
-
-if __name__ == "__main__":
-    BUILD = os.path.abspath(sys.argv.pop(1))
-    several.main(BUILD)

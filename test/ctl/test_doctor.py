@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""iwheelctl doctor on the simulator's bus, with and without a gateway, as its user meets it.
-
-Usage: test_doctor.py BUILD [unittest's arguments]
-"""
+"""iwheelctl doctor on the simulator's bus, with and without a gateway, as its user meets it."""
 
 import bisect
 import json
@@ -12,14 +8,12 @@ import pty
 import select
 import signal
 import subprocess
-import sys
 import time
 import unittest
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
 from harness import Rig, find_program
 
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 
 
 def environment():
@@ -238,8 +232,3 @@ class Doctor(unittest.TestCase):
             )
             self.assertEqual(64, done.returncode, (words, done.stdout, done.stderr))
             self.assertIn(about, done.stderr)
-
-
-if __name__ == "__main__":
-    BUILD = sys.argv.pop(1)
-    unittest.main()

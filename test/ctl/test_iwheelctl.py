@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""iwheelctl against a gateway that only talks: what it sends, when, what it shows, and how it fails.
-
-Usage: test_iwheelctl.py PROGRAM [unittest's arguments]
-"""
+"""iwheelctl against a gateway that only talks: what it sends, when, what it shows, and how it fails."""
 
 import itertools
 import json
@@ -13,15 +9,13 @@ import signal
 import socket
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
 from fake_gateway import FakeGateway, snapshot, wheel
-import several
 
-PROGRAM = ""
+PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -968,10 +962,3 @@ class Watching(WithGateway):
             _, err = process.communicate(timeout=10)
         self.assertEqual(69, process.returncode)
         self.assertTrue(re.search("cannot write: No space", err), err)
-
-
-if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    PROGRAM = os.path.abspath(sys.argv.pop(1))
-    several.main(PROGRAM)

@@ -1,25 +1,19 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Faults at the touch of a key: iwheel-sim on a terminal.
-
-Usage: test_keys.py BUILD [unittest's arguments]
-"""
+"""Faults at the touch of a key: iwheel-sim on a terminal."""
 
 import json
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import termios
 import time
 import unittest
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
 from harness import find_program
 from operator_at_terminal import Operator
 
-BUILD = ""
+BUILD = os.environ["IWHEEL_BUILD"]
 # What each key changes in `status`, and to what; pressed again it is as before.
 TOGGLES = {
     "e": lambda s: s["estop"] == "pressed",
@@ -128,8 +122,3 @@ class Keys(unittest.TestCase):
         self.assertEqual("released", self.status()["estop"])
         piped.terminate()
         self.assertNotIn("bus-off", piped.communicate(timeout=5)[0])
-
-
-if __name__ == "__main__":
-    BUILD = sys.argv.pop(1)
-    unittest.main()

@@ -1,8 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Recordings against sentences: iwheelctl learn concludes nothing of which it has not seen all.
-
-Usage: test_learn_table.py PROGRAM [unittest's arguments]
 
 A generator writes recordings that have or lack, one thing at a time, what a sentence claims. Beside them stands what each
 sentence must then say, worked out from what was recorded and not from what learn does.
@@ -13,11 +10,10 @@ import json
 import os
 import struct
 import subprocess
-import sys
 import unittest
 from dataclasses import dataclass, replace
 
-PROGRAM = ""
+PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 SIDES = ("left", "right")
 IDS = {"setpoint": ("10A", "12A"), "speed": ("100", "120"), "status": ("101", "121"), "force": ("200", "220"), "offset": ("201", "221")}
 PHASES = {"rest": 0, "forward": 400, "backward": -400}
@@ -367,8 +363,3 @@ class AsJson(unittest.TestCase):
     def test_learn_json_of_an_empty_recording_is_an_object_and_the_answer_no(self):
         done = subprocess.run([PROGRAM, "--json", "learn", "-"], input="(1.000000) can0 100#00000000\n", text=True, capture_output=True, check=False)
         self.assertEqual((1, 1), (done.returncode, json.loads(done.stdout)["frames"]))
-
-
-if __name__ == "__main__":
-    PROGRAM = os.path.abspath(sys.argv.pop(1))
-    unittest.main(verbosity=2)

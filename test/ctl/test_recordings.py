@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""iwheelctl decode, learn and replay: what they make of recordings, good ones and bad ones. Needs no gateway.
-
-Usage: test_recordings.py PROGRAM [unittest's arguments]
-"""
+"""iwheelctl decode, learn and replay: what they make of recordings, good ones and bad ones. Needs no gateway."""
 
 import csv
 import io
@@ -12,11 +8,10 @@ import os
 import shutil
 import struct
 import subprocess
-import sys
 import tempfile
 import unittest
 
-PROGRAM = ""
+PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app", "ctl", "iwheelctl")
 GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "recordings")
 SECOND = "(1760000000.{:06d}) can0 {}\n"
 
@@ -699,8 +694,3 @@ class Learn(unittest.TestCase):
     def test_wrong_words_are_told(self):
         for words, code in (((), 64), (("--x",), 64), (("a", "b"), 64), (("/nonexistent",), 65)):
             self.assertEqual((code, ""), run("learn", *words)[:2])
-
-
-if __name__ == "__main__":
-    PROGRAM = os.path.abspath(sys.argv.pop(1))
-    unittest.main(verbosity=2)

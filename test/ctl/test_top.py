@@ -1,33 +1,22 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""iwheelctl top on terminals of many sizes, seen through a terminal emulator (pyte, from PyPI).
+"""iwheelctl top on terminals of many sizes, seen through a terminal emulator (pyte, from PyPI)."""
 
-Usage: test_top.py BUILD [unittest's arguments]
-Exit code 77: pyte is not there.
-"""
-
-import glob
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 import unittest
 
+import pytest
+
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-sys.path += [os.path.join(ROOT, "test", "system"), *glob.glob(os.path.join(ROOT, ".venv", "lib", "python3*", "site-packages"))]
-try:
-    import pyte
-except ImportError:
-    print("skip: pyte is missing (./check installs requirements/check.txt into .venv)")
-    sys.exit(77)
-import several
 from fake_gateway import FakeGateway, snapshot
 from harness import Rig, find_program
 from operator_at_terminal import Operator
 
-BUILD = ""
+pyte = pytest.importorskip("pyte")  # PyPI, requirements/check.txt
+BUILD = os.environ["IWHEEL_BUILD"]
 
 
 def environment(**more):
@@ -390,8 +379,3 @@ class WithoutWheels(unittest.TestCase):
                 self.assertNotIn(b"\x1b", operator.raw)
             for line in operator.text.split("\x1b[K")[1:]:
                 self.assertLess(len(line.split("\r")[0].split("\n")[0]), max(columns, 80) if "drove" in line else columns)
-
-
-if __name__ == "__main__":
-    BUILD = sys.argv.pop(1)
-    several.main(BUILD, at_a_time=3)

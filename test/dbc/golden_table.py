@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Prints the golden vectors of test/support/golden_vectors.h as the table of docs/protocol.md.
+"""Prints the golden vectors of test/support/golden_vectors.h as the table of docs/developer/protocol.md.
 
 golden_table.py --check    exit 1 if the document's table is not that of the header
 golden_table.py --update   rewrite the document's table
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 HEADER = ROOT / "test/support/golden_vectors.h"
-DOCUMENT = ROOT / "docs/protocol.md"
+DOCUMENT = ROOT / "docs/developer/protocol.md"
 BEGIN = "<!-- golden vectors: begin (test/dbc/golden_table.py --update) -->\n"
 END = "<!-- golden vectors: end -->\n"
 
@@ -78,7 +78,7 @@ def main():
         DOCUMENT.write_text(head + BEGIN + table() + END + tail, encoding="utf-8")
     elif sys.argv[1:] == ["--check"]:
         if not is_current():
-            sys.exit("docs/protocol.md: the golden table is not that of golden_vectors.h; run test/dbc/golden_table.py --update")
+            sys.exit("docs/developer/protocol.md: the golden table is not that of golden_vectors.h; run test/dbc/golden_table.py --update")
     else:
         sys.exit(__doc__)
 

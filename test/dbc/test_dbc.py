@@ -1,16 +1,17 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The DBC against the C codec, the golden vectors and the document's table. Usage: test_dbc.py CODEC_LINE"""
+"""The DBC against the C codec, the golden vectors and the document's table."""
 
+import os
 import random
 import re
 import subprocess
-import sys
 import unittest
 
-import cantools
-
 import golden_table
+import pytest
+
+cantools = pytest.importorskip("cantools", reason="cantools is missing in .venv")
+pytestmark = pytest.mark.exact
 
 DBC = golden_table.ROOT / "share/iwheel.dbc"
 FRAMES_PER_MESSAGE = 2000
@@ -67,7 +68,7 @@ def in_byte_order(message):
 class Codec:
     """The C codec behind its pipe."""
 
-    program = None
+    program = os.path.join(os.environ["IWHEEL_BUILD"], "test/dbc/iwheel_codec_line")
 
     def ask(self, lines):
         result = subprocess.run([self.program], input="\n".join(lines) + "\n", capture_output=True, text=True, check=True)
@@ -260,18 +261,3 @@ class TestThatFaultsAreSeen(unittest.TestCase):
 class TestDocument(unittest.TestCase):
     def test_golden_table_of_the_document_is_that_of_the_header(self):
         self.assertTrue(golden_table.is_current(), "run test/dbc/golden_table.py --update")
-
-
-def main():
-    if len(sys.argv) != 2:
-        sys.exit(__doc__)
-    CODEC.program = sys.argv[1]
-    suite = unittest.defaultTestLoader.loadTestsFromModule(sys.modules[__name__])
-    result = unittest.TextTestRunner(verbosity=2, stream=sys.stdout).run(suite)
-    failed = len({case.id().split(" ")[0] for case, _ in result.failures + result.errors})
-    print(f"{result.testsRun - failed} passed, {failed} failed")
-    return 0 if result.wasSuccessful() and result.testsRun > 0 else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

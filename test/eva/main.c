@@ -4,7 +4,7 @@
 /// return anything and whose frames are any bytes.
 ///
 /// Eva computes a superset of all values that every object can have at every statement of every such run. What it cannot
-/// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/static.md.
+/// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/developer/static.md.
 #include "iwheel/bit_timing.h"
 #include "iwheel/gateway.h"
 #include "iwheel/observation.h"

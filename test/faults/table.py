@@ -7,8 +7,8 @@
 
 FUNCTION is a symbol of C (function, variable, table, macro) or of Python (function, Class.method), without its file: it is looked up in the
 tree. Where several files have that symbol and the same code, ` / WORD` after it chooses the file that has this word. The removed code must occur exactly once
-in it; blanks and line ends between its tokens do not matter. Without a line of `+` the code is removed. A further `@@ FUNCTION` alone continues the fault with a second patch in the same file. RULE is a rule of docs/safety-case.md, or the
-page of docs/ whose promise the fault breaks. If FUNCTION is gone or no longer has the code, the patch applies where else the code occurs exactly
+in it; blanks and line ends between its tokens do not matter. Without a line of `+` the code is removed. A further `@@ FUNCTION` alone continues the fault with a second patch in the same file.
+RULE is a rule of docs/developer/safety-case.md, or the name of a page in docs/user or docs/developer whose promise the fault breaks. If FUNCTION is gone or no longer has the code, the patch applies where else the code occurs exactly
 once in the tree, and the fault is reported as moved.
 
 NOTICERS, each of which must notice the fault:

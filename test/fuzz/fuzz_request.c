@@ -53,7 +53,7 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
                      strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0 &&
                      strcmp(now->file, before->file) == 0 && strcmp(now->key, before->key) == 0 &&
                      strcmp(now->lease_key, before->lease_key) == 0 && now->offset == before->offset &&
-                     now->commit == before->commit,
+                     now->has_commit == before->has_commit && now->commit == before->commit,
                  "the same texts");
 }
 

@@ -48,7 +48,7 @@ def json_vectors():
 
 def by_hand():
     """{target: [bytes]}: also what a target must refuse."""
-    said = [line for path in (ROOT / "docs/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
+    said = [line for path in (ROOT / "docs/user/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
     drives = bytes([0, 1, 15, 1, 60, 1, 60, 11, 4, 0, 10, 11, 0, 10, 3, 232, 5, 3, 232, 5, 0, 40, 2, 200, 10, 0, 11, 2, 88, 9, 2, 88, 9, 0, 60])
     return {
         "codec": [bytes([n, 8, 0, *range(8)]) for n in range(len(IDS))] + [b"\xff\x80\x00\x01\x0a\x08\x00" + bytes(8)],

@@ -220,7 +220,7 @@ def parse(arguments):
     parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
     parser.add_argument("--no-install", action="store_true", help="install nothing to build the kernel")
     parser.add_argument("--keep", action="store_true", help="keep results and logs")
-    parser.add_argument("--report", action="store_true", help="write docs/fault-catalogue.md from this run")
+    parser.add_argument("--report", action="store_true", help="write docs/developer/fault-catalogue.md from this run")
     parser.add_argument("--list", action="store_true", help="list the tests and exit")
     options = parser.parse_args(arguments)
     if options.hours is None:

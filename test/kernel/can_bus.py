@@ -33,6 +33,8 @@ class CanBus(Bus):
     gateway and wheels together. `exact`: virtual time, in which the two clocks never drift apart.
     """
 
+    carries_fd = True
+
     def __init__(self, interface, frames=None, exact=False, ids=()):
         # The local bus's recorder is not asked to connect: everything that differs is here.
         self.interface, self.exact = interface, exact

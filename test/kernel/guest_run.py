@@ -13,6 +13,7 @@ import tempfile
 import time
 import traceback
 
+import harness
 import kernel_rig
 from catalogue import ENTRIES
 from harness import SERVICE_NICE, as_a_service, die_with_parent
@@ -28,7 +29,7 @@ def run_one(entry, plan):
     """In the worker: runs the test, returns its result."""
     test, skip, begin_us = kernel_rig.KernelTest(plan["build"], entry.rig_type), None, kernel_rig.now_us()
     test.plan = plan
-    kernel_rig.PACE["slow"] = entry.pace if plan["virtual"] else 1
+    harness.PACE["slow"] = entry.pace if plan["virtual"] else 1
     try:
         entry.function(test)
     except Skip as reason:

@@ -29,7 +29,6 @@ CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
 WITNESS = {"file": None}  # set by guest.py in real time: what iwheel-sleeper writes
 PRESS_LATE_US = 3_000  # a press is timed against 5 ms; a machine later than this could be to blame
 STALL_US = 10_000  # what the judge allows between the gateway's clock and the bus
-PACE = {"slow": 1}  # of telemetry, by guest.py before each test: see catalogue.Entry
 
 
 def late_wakings(from_us, to_us, more_than_us):
@@ -74,11 +73,6 @@ class GpioButton:
 
     def estop_line(self):
         return self.line if self.estop else "none"
-
-    def sim_arguments(self):
-        with open(self.path("pace"), "w", encoding="ascii") as file:
-            file.write(f"at 0 slow {PACE['slow']}\n")
-        return ("--script", self.path("pace"))
 
     def _learn_tick(self):
         self.chip.pull(True, self.chip.WITNESS)

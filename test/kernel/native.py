@@ -3,7 +3,7 @@
 
 What it asks for, what it answers where something is missing, and how it starts the tests is tested (test_native.py), and some of the
 tests are run by it inside the kernel of the tests (kernel_scenarios/native_inside.py). Whether they pass on a kernel that is no process
-depends on that kernel; docs/fault-catalogue.md says where they were run.
+depends on that kernel; docs/developer/fault-catalogue.md says where they were run.
 """
 
 import os

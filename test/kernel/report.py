@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes docs/fault-catalogue.md from the results of a campaign."""
+"""Writes docs/developer/fault-catalogue.md from the results of a campaign."""
 
 import os
 
@@ -10,7 +10,7 @@ from catalogue import ENTRIES
 from judge_log import percentile
 from scenario import REGISTRY
 
-PATH = os.path.join(os.path.dirname(os.path.dirname(HERE)), "docs", "fault-catalogue.md")
+PATH = os.path.join(os.path.dirname(os.path.dirname(HERE)), "docs", "developer", "fault-catalogue.md")
 ROWS = {
     1: "client killed",
     2: "client frozen, its socket open",
@@ -54,7 +54,7 @@ In **virtual time** the processor is infinitely fast, so those figures show what
 the kernel runs on the machine of this run; its timer ticks every 10 ms, and between left and right it may let another process run for
 that long, so that pairs are allowed one tick more than the 5 ms of virtual time.
 
-Row 31, one wheel that does something else than the other, is measured in degrees: [pair.md](pair.md) has the table, before and after.
+Row 31, one wheel that does something else than the other, is measured in degrees: [pair.md](../user/pair.md) has the table, before and after.
 
 | # | fault | tests: kernel | tests: local bus | longest gap | stop begins within | old frames |
 |---|---|---|---|---|---|---|

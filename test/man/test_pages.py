@@ -6,6 +6,7 @@ Usage: test_pages.py BUILD [unittest's arguments]
 """
 
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -74,9 +75,9 @@ class Pages(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             control = os.path.join(folder, "control")
             command = [program("iwheel-sim"), "--quiet", "--can", f"unix:{folder}/bus", "--estop", f"{folder}/button", "--control", control]
-            with subprocess.Popen(command, stdout=subprocess.DEVNULL) as simulator:
+            with subprocess.Popen(command, stdout=subprocess.DEVNULL) as simulator, socket.socket(socket.AF_UNIX) as client:
                 try:
-                    while not os.path.exists(control) and simulator.poll() is None:
+                    while client.connect_ex(control) != 0 and simulator.poll() is None:  # The file is there before anybody listens.
                         time.sleep(0.01)
                     self.expect_printed("iwheel-sim.1", output("iwheel-sim", "--control", control, "help"))
                 finally:

@@ -2,7 +2,7 @@
 """The MQTT bridge on simulated wheels, with a real broker: what it tells, what it carries out and what it drops, and that no stop is lost.
 
 Brokers are Debian's mosquitto and nats-server, the client from outside is PyPI's paho-mqtt. What is missing is skipped, and said so. figures.py puts what
-was sent, arrived and doubled into docs/mqtt.md.
+was sent, arrived and doubled into docs/user/mqtt.md.
 """
 
 import pytest

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes what was sent, arrived and doubled in the tests and in the hours in virtual time into docs/mqtt.md.
+"""Writes what was sent, arrived and doubled in the tests and in the hours in virtual time into docs/user/mqtt.md.
 
 usage: IWHEEL_FIGURES=FILE IWHEEL_FULL=1 .venv/bin/pytest test/mqtt (as often as you like), then test/mqtt/figures.py BUILD FILE
 """
@@ -14,7 +14,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "system")]
 
 from mqtt_rig import put_table
 
-PAGE = HERE.parent.parent / "docs/mqtt.md"
+PAGE = HERE.parent.parent / "docs/user/mqtt.md"
 HEAD = ["| fault | tried | events sent | arrived | doubled | the longest until one arrived |", "|---|---:|---:|---:|---:|---:|"]
 
 

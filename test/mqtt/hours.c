@@ -318,7 +318,7 @@ static void begin(unsigned spool_kB, unsigned every_ms) {
     TEST_ASSERT_EQUAL_INT(MQTT_UP, bridge.broker.state);
 }
 
-/// The line that test/mqtt/figures.py puts into docs/mqtt.md.
+/// The line that test/mqtt/figures.py puts into docs/user/mqtt.md.
 static void tell(const char *fault, unsigned often) {
     (void)printf("figures: %s | %u | %llu | %u | %u | %.1f s\n", fault, often, (unsigned long long)bridge.spool.last,
                  book.arrived, book.doubled, (double)book.latest_us / 1e6);

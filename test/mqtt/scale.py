@@ -10,7 +10,7 @@ shifted against the others'; where the recorded gateway was late with a state, t
 process (stamps.c, preloaded). Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
 
 Processor time is what the kernel counted for each process, so others on the machine change it little; latencies they do change.
---update puts the rows into docs/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
+--update puts the rows into docs/user/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
 """
 
 import argparse
@@ -44,7 +44,7 @@ from judge_log import percentile
 from mqtt_rig import MqttRig, free_port, put_table
 from trials import ROOT, Skip, until
 
-PAGE = ROOT / "docs/mqtt.md"
+PAGE = ROOT / "docs/user/mqtt.md"
 STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
 HEAD = [
     "broker",
@@ -331,7 +331,6 @@ class Load:
         end_us, after = now_us(), self.times()
         memory = [sum(memory_kB(child.pid) for child in group) / 1000 for group in (self.brokers, [self.console])]
         self.bridge_kB = [statistics.median(memory_kB(child.pid, what) for child in self.bridges[:20]) for what in ("Rss", "Pss")]
-        lines = self.gateway.count[1]
         self.gateway.end.set()
         self.gateway.process.join(10)
         self.drain()
@@ -339,7 +338,7 @@ class Load:
         self.console.wait(20)
         stamps = list(STAMP.iter_unpack(Path(self.folder, "stamps").read_bytes()))
         cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before, strict=False)]
-        self.lines_per_s, self.not_taken = lines, self.gateway.count[3]
+        self.not_taken = self.gateway.count[3]
         return self.judge(stamps, begin_us, end_us, cpu, memory)
 
     def drain(self):

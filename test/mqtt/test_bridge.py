@@ -301,7 +301,7 @@ def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
 
 def example(rig, language):
     """The page's example in that language, for this rig's broker."""
-    text = (ROOT / "docs/mqtt.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/user/mqtt.md").read_text(encoding="utf-8")
     code = re.search(rf"```{language}\n(.*?)```", text, re.S)[1]
     return code.replace("1883", str(rig.port)).replace("mosquitto_rr", f"mosquitto_rr -p {rig.port}")
 

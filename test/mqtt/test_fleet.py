@@ -113,7 +113,7 @@ def test_three_servers_leader_killed_each_stop_once_in_order(rig):
 
 
 def test_confirmation_does_not_wait_for_a_stream_of_yours(rig):
-    """What docs/fleet.md says of nats-server: a stream that takes nothing keeps no confirmation back, so a stream alone is no proof."""
+    """What docs/user/mqtt.md says of nats-server: a stream that takes nothing keeps no confirmation back, so a stream alone is no proof."""
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()

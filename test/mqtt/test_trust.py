@@ -20,12 +20,6 @@ STRANGER = 65534
 DRIVING = {"driving": True, "settings": {"state": {"every_ms": 100}}}
 
 
-def of_stranger():
-    os.setgroups([])
-    os.setgid(STRANGER)
-    os.setuid(STRANGER)
-
-
 def need_root():
     if os.geteuid() != 0:
         raise Skip("another user's process needs root")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""docs/northbound.md, and the words and limits of the C sources, agree with share/northbound.json, the description of the protocol.
+"""docs/user/northbound.md, and the words and limits of the C sources, agree with share/northbound.json, the description of the protocol.
 
 usage: test_description.py [unittest's arguments]
 
@@ -38,7 +38,7 @@ SOURCES = {
         ("app/gateway/answers/answers_events.c", "observe_health", set()),
     ],
 }
-DOCUMENT = os.path.join("docs", "northbound.md")
+DOCUMENT = os.path.join("docs", "user", "northbound.md")
 
 
 def read(path):
@@ -76,7 +76,7 @@ def examples(text):
 
 
 class Document:
-    """docs/northbound.md beside the description: what disagrees, as sentences."""
+    """docs/user/northbound.md beside the description: what disagrees, as sentences."""
 
     def __init__(self, description):
         self.description = description

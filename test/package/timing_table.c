@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of docs/deploy.md: what controllers of Linux boards make of 1 Mbit/s and 62.5 %. test/package/run compares.
+// The table of docs/user/deploy.md: what controllers of Linux boards make of 1 Mbit/s and 62.5 %. test/package/run compares.
 #include "iwheel/bit_timing.h"
 
 #include <stdio.h>

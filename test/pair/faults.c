@@ -96,7 +96,7 @@ static int64_t turn_mdeg(const fault_t *fault, situation_t situation, int32_t sp
     return largest;
 }
 
-/// A steady difference that leaks as fast as it comes is never noticed: docs/pair.md has its degrees a second.
+/// A steady difference that leaks as fast as it comes is never noticed: docs/user/pair.md has its degrees a second.
 static bool is_unnoticed(const fault_t *fault, int32_t speed_mm_s) {
     const iw_config_t *const config = &machine.gateway.config;
     const int32_t ordinary_mm_s = speed_mm_s * IW_DIVERGE_DROOP_PERCENT / 100 + 10;

@@ -123,7 +123,7 @@ def undecodable_requests(t):
     t_us = now_us()
     writers["stop"].write(odd(data="somebody's own type"))
     time.sleep(0.4)
-    t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # As docs/safety.md allows a bridge.
+    t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # A bridge may take 200 ms.
     stream.stop()
     t.stopped_by(ride.client, "client_stop", "stopping")
     ride.silence()

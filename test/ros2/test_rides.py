@@ -139,7 +139,7 @@ def services(t):
     t_us = now_us()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
     time.sleep(0.15)  # The answer can come before the next setpoint.
-    ms = t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # As docs/safety.md allows a bridge.
+    ms = t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 200)  # A bridge may take 200 ms.
     t.figure(f"ramp after {ms or 0:.0f} ms")
     ride.silence()
     t.check(ride.still(), "the stream goes on, the wheels do not")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Run by ROS 2's own Python: carries out commands of `ros2` as ros2cli does, through rclpy, where ros2cli itself is not installed.
 
-usage: typed.py WORD...     the words after `ros2`; options as those of ros2cli that docs/ros2.md uses. The printed lines are those of ros2cli.
+usage: typed.py WORD...     the words after `ros2`; options as those of ros2cli that docs/user/ros2.md uses. The printed lines are those of ros2cli.
 """
 
 import argparse

@@ -5,7 +5,6 @@ import os
 import pty
 import random
 import select
-import signal
 import socket
 import threading
 import time
@@ -197,11 +196,6 @@ class SerialRig(Rig):
     def note_after(self, wait_us, kind, **fields):
         """On the timeline, so much later than now."""
         self.timeline.append(Event(now_us() + wait_us, kind, **fields))
-
-    def freeze(self, process, seconds):
-        process.signal(signal.SIGSTOP)
-        time.sleep(seconds)
-        process.signal(signal.SIGCONT)
 
     def close(self, keep=False):
         if self.cable:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What can happen between a client and a board: nothing is obeyed late, and every end of the chain stops the wheels."""
 
+import contextlib
 import json
 import os
 import random
@@ -14,7 +15,7 @@ from bus import now_us
 from client import Client, Closed
 from harness import Process
 from judge_log import Event, percentile
-from rig import framed, mutated
+from rig import Cable, framed, mutated
 from scenario import scenario
 
 LEASE_US = 200_000
@@ -461,32 +462,69 @@ def alone(t):
     t.judge(rig, moves=False)
 
 
-@scenario("what is wrong with a line is said: nothing, noise, another protocol, another rate", 10)
-def explained(t):
-    rig = t.rig()
+def troubles():
+    """What devices that are no board send, and what the relay says of it."""
     chance = random.Random(5)
     noise = bytes(chance.randrange(256) for _ in range(200))
-    cases = (
+    return (
         (b"", "nothing comes"),
         (noise, "baud"),
         (b"login: \r\nPassword: \r\n", "another protocol"),
         (framed(b'0 12 {"event":"link"}').replace(b"link", b"lunk"), "wrong CRC"),
         (b"0 12 {", "no whole line"),
     )
-    for said, words in cases:
-        ours, theirs = socket.socketpair()
-        from rig import Cable
 
+
+@contextlib.contextmanager
+def talking(sock, said):
+    """A device that sends this again and again, as long as it is connected."""
+    over = threading.Event()
+
+    def talk():
+        while said and not over.wait(0.05):
+            sock.sendall(said)
+
+    talker = threading.Thread(target=talk)
+    talker.start()
+    try:
+        yield
+    finally:
+        over.set()
+        talker.join()
+
+
+def check_told(t, rig, said, words, seconds):
+    """The log and a client that comes get this reason within that time."""
+    t.check(rig.await_relay(words, seconds), f"{said[:20]}: {words!r} expected, it said: {rig.gateway.text()[-400:]}")
+    told = rig.client().read_reply(1.0)
+    t.check(told and told["error"] == "bus_down" and words in told["message"], f"a client is told so: {told}")
+
+
+@scenario("what is wrong with a line is said: nothing, noise, another protocol, another rate", 14)
+def explained(t):
+    rig = t.rig()
+    for said, words in troubles():
+        ours, theirs = socket.socketpair()
         rig.cable = Cable(rig.path("port"), ours)
-        relay = rig.start_relay()
-        theirs.sendall(said * 3)
-        t.check(rig.await_relay(words, 5.0), f"{said[:20]}: {words!r} expected, it said: {relay.text()[-400:]}")
-        told = rig.client().read_reply(1.0)
-        t.check(told and told["error"] == "bus_down" and words in told["message"], f"a client is told so: {told}")
-        relay.end()
+        with talking(theirs, said):
+            relay = rig.start_relay()
+            check_told(t, rig, said, words, 8.0)
+            relay.end()
         rig.cable.end()
         theirs.close()
     rig.cable = None
+
+
+@scenario("another reason is said soon after the device changes, by the same relay", 18)
+def explained_anew(t):
+    rig = t.rig()
+    ours, theirs = socket.socketpair()
+    rig.cable = Cable(rig.path("port"), ours)
+    rig.start_relay()
+    for said, words in troubles():
+        with talking(theirs, said):
+            check_told(t, rig, said, words, 8.0)
+    theirs.close()
 
 
 @scenario("ends cleanly by SIGTERM while a client drives", 3)

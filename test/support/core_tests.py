@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Which unit tests can run on another machine: those that need nothing but the core, Unity and test/support."""
+"""Which unit tests can run on another machine: those that need nothing but the core, Unity and test/support; and what one of them said."""
 
+import os
 import re
+import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 UNIT, SUPPORT = ROOT / "test/unit", ROOT / "test/support"
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wcast-qual", "-Werror"]
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
@@ -37,4 +40,19 @@ def needs_only_core(sources):
 
 def core_tests():
     """{name: [sources]}"""
-    return {name: sources for name, sources in listed_tests().items() if needs_only_core(sources)}
+    return {name: [*sources, SUPPORT / "unit_main.c"] for name, sources in listed_tests().items() if needs_only_core(sources)}
+
+
+def unity_folder():
+    """Unity's sources, which the build has found."""
+    folder = Path(os.environ["IWHEEL_BUILD"], "test/target/unity_folder").read_text()
+    if not folder:
+        raise unittest.SkipTest("Unity is installed as a package without sources: give its folder with -DIWHEEL_UNITY_DIR")
+    return folder
+
+
+def count_unity(done):
+    """How many single tests have passed; all of them, or it fails."""
+    summary = re.search(r"(\d+) Tests 0 Failures 0 Ignored", done.stdout)
+    assert done.returncode == 0 and summary and int(summary[1]) > 0, (done.stdout + done.stderr)[-1500:]
+    return int(summary[1])

@@ -2,7 +2,7 @@
 /// Golden vectors: bytes as they stand on the bus, and the values that they mean.
 ///
 /// One table for every purpose: the unit tests drive encode and decode with it, the DBC is compared with it, and the table of
-/// docs/protocol.md is printed from it (test/dbc/golden_table.py, which reads this file and so wants its rows in this form).
+/// docs/developer/protocol.md is printed from it (test/dbc/golden_table.py, which reads this file and so wants its rows in this form).
 /// The bytes were written down from the document, not taken from the codec. Each of the eleven messages has an everyday value, the
 /// extremes of every field, minus one where there is a sign, and bytes that all differ where a swapped pair could hide.
 #ifndef IW_TEST_GOLDEN_VECTORS_H

@@ -2,23 +2,29 @@
 """pytest runs the tests, verdict.py judges them: a conclusive verdict is final, an inconclusive test runs again, alone, when all others have ended.
 
 Each attempt is a process of its own, so that a test that crashes or hangs is one failure and takes nothing with it. Processes without threads fork them
-(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt. Other plugins, as --junitxml, hear of the
-last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
+(Nursery), so that nothing is imported twice. A class that prepares something once (setUpClass) is one attempt, and so are tests marked
+`together(name)`. Other plugins, as --junitxml, hear of the last attempt only. The last line is "N passed, N failed, N skipped", lines before it name what was skipped; the exit status is that of verdict.summary.
 
     --build DIR    what is tested (build/default)           --jobs N       attempts at a time (2)
+    --virtual      in virtual time: pytest_virtual.py       --sample N     N of the tests, chosen by the hash of the commit
     --keep         keeps the folders of the tests           --pdb          all tests in this process; nothing is judged
 
 A test may collect what it finds in a fixture that is a verdict.Evidence. What `said()` of a fixture tells is shown, and judged, with a failure.
-@pytest.mark.full: only with IWHEEL_FULL=1. What passing tests print, -rP shows.
+@pytest.mark.full: only with IWHEEL_FULL=1. @pytest.mark.exact: nothing in it is a matter of time. record_property("tests", N): it counts as that many.
+What passing tests print, -rP shows.
 """
 
 import contextlib
+import functools
+import hashlib
 import io
+import json
 import multiprocessing
 import os
 import queue
 import shutil
 import signal
+import subprocess
 import tempfile
 import threading
 import traceback
@@ -28,8 +34,10 @@ import pytest
 import verdict
 
 LIMIT_S, FULL_LIMIT_S = 240, 7200  # of one test
+MISSING = 77  # exit status: there is no virtual time here
 SKIPS = (unittest.SkipTest, pytest.skip.Exception)
 RUN = pytest.StashKey()
+pytest_plugins = ("pytest_virtual",)
 
 
 class Hooks:
@@ -46,11 +54,16 @@ def pytest_addoption(parser):
     group = parser.getgroup("verdicts")
     group.addoption("--build", default="build/default", metavar="DIR", help="build directory (default: build/default)")
     group.addoption("--jobs", type=int, default=2, metavar="N", help="tests at a time (default: 2)")
+    group.addoption("--sample", type=int, metavar="N", help="only N of the tests, others after each commit")
+    group.addoption("--virtual", action="store_true", help="run them in virtual time, in the kernel of test/kernel")
+    group.addoption("--inside", metavar="PLAN", help="of guest_pytest.py: this is inside that kernel")
     group.addoption("--keep", action="store_true", help="keep the folders with configuration and outputs")
 
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "full: only with IWHEEL_FULL=1")
+    config.addinivalue_line("markers", "exact: what fails, no stall of the machine explains")
+    config.addinivalue_line("markers", "together(name): tests of this name share what they prepare: they are one attempt")
     config.addinivalue_line("markers", f"limit(seconds): how long the test may take, if not {LIMIT_S} s; those for IWHEEL_FULL: {FULL_LIMIT_S} s")
     if config.option.jobs < 1:
         raise pytest.UsageError("--jobs must be at least 1")
@@ -63,6 +76,20 @@ def pytest_collection_modifyitems(config, items):
         long = [item for item in items if item.get_closest_marker("full")]
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if item not in long]
+    if config.option.sample:
+        left_out = sample(items, commit(config.rootpath))[config.option.sample :]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def commit(folder):
+    """What is checked out; of a tree without git nothing, which is a sample too."""
+    return subprocess.run(["git", "rev-parse", "HEAD"], cwd=folder, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def sample(items, key):
+    """In an order that the key alone decides: nobody chooses, and the same commit has the same sample."""
+    return sorted(items, key=lambda item: hashlib.sha256(f"{key} {item.nodeid}".encode()).digest())
 
 
 # ---- in the process of an attempt ------------------------------------------------------------------------------------
@@ -230,7 +257,9 @@ def units_of(items):
     units = {}
     for item in items:
         shared = item.cls and "setUpClass" in vars(item.cls)
-        units.setdefault(item.parent.nodeid if shared else item.nodeid, []).append(item)
+        mark = item.get_closest_marker("together")
+        name = f"{item.path.name}: {mark.args[0]}" if mark else item.parent.nodeid if shared else item.nodeid
+        units.setdefault(name, []).append(item)
     return units
 
 
@@ -243,12 +272,18 @@ class Run(verdict.Session):
         self.folder = tempfile.mkdtemp(prefix="iwheel-tests-")
         os.chmod(self.folder, 0o1777)  # As /tmp: what tests do as another user ends at their own folders.
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
-        self.nursery = Nursery(self.config, self.units)
-        super().__init__(self.work_off, self.tell, verdict.Witness(getattr(self.config, "witness_nice", 0)))
+        virtual = self.config.option.virtual
+        self.nursery = (self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)(self.config, self.units)
+        super().__init__(self.work_off, self.tell, None if virtual else verdict.Witness(getattr(self.config, "witness_nice", 0)))
+
+    def stalls(self, begin_us, end_us):
+        """None in virtual time."""
+        return super().stalls(begin_us, end_us) if self.witness else []
 
     def close(self):
         self.nursery.close()
-        self.witness.close()
+        if self.witness:
+            self.witness.close()
         tempfile.tempdir = os.environ["TMPDIR"] = os.path.dirname(self.folder)
         if not self.config.option.keep:
             shutil.rmtree(self.folder, ignore_errors=True)
@@ -261,14 +296,18 @@ class Run(verdict.Session):
     def work_off(self, name):
         """One attempt of these tests."""
         answer, items = self.nursery.ask(name), self.units[name]
+        if isinstance(answer, verdict.Attempt):
+            return answer
         if isinstance(answer, str):
             return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])
         reports = [self.config.hook.pytest_report_from_serializable(config=self.config, data=data) for data in answer.pop("reports")]
         failures, claims, stalls = ([tuple(one) for report in reports for one in getattr(report, what)] for what in ("failures", "claims", "stalls"))
+        if items[0].get_closest_marker("exact"):
+            failures = [(text, verdict.RULE) for text, *_ in failures]
         skips = {report.nodeid for report in reports if report.skipped}
-        return verdict.Attempt(
-            [verdict.Failure(*failure) for failure in failures], claims=claims, stalls=stalls, tests=len(items), skips=len(skips), data=reports, **answer
-        )
+        tests = sum(dict(report.user_properties).get("tests", 1) for report in reports if report.when == "teardown")
+        failures = [verdict.Failure(*failure) for failure in failures]
+        return verdict.Attempt(failures, claims=claims, stalls=stalls, tests=tests, skips=len(skips), data=reports, **answer)
 
     def tell(self, name, kind, attempt, tries):
         """The reports of the last attempt go to pytest's other plugins, with what was decided."""
@@ -282,7 +321,9 @@ class Run(verdict.Session):
                     report.outcome, report.longrepr = "skipped", (*report.location[:2], attempt.skip)
                 if report.skipped:
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
-                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *([f"attempt {tries}, alone"] if tries > 1 else [])])
+                more = [f"attempt {tries}, alone"] if tries > 1 else []
+                more += [f"longest stall {self.stall_ms(attempt):.0f} ms"] if report.failed else []
+                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)
@@ -292,6 +333,19 @@ class Run(verdict.Session):
         report = report_of(name, (name, 0, name), attempt)
         report.figures = figures
         self.take(name, self.verdict_of(attempt), attempt._replace(data=[report]))
+
+
+def attempts_inside(session):
+    """All of a plan of pytest_virtual.py, each told as it ends."""
+    config, units = session.config, units_of(session.items)
+    config.pluginmanager.unregister(name="terminalreporter")
+    with open(config.option.inside, encoding="utf-8") as file:
+        plan = json.load(file)
+    with open(plan["results"], "a", encoding="utf-8", buffering=1) as results:
+        for name in plan["tests"]:
+            answer = apart(functools.partial(perform, config, units[name]), limit_of(units[name]))
+            results.write(json.dumps({"name": name, "answer": answer}) + "\n")
+    return True
 
 
 def report_of(nodeid, location, attempt):
@@ -314,11 +368,13 @@ def pytest_runtestloop(session):
     option = session.config.option
     if option.collectonly or option.usepdb or session.testsfailed:  # Failed before any test: a file cannot be read.
         return None
+    if option.inside:
+        return attempts_inside(session)
     run, handlers = Run(session), {}
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             handlers[number] = signal.signal(number, run.interrupt)
-        run.run(list(run.units), option.jobs)
+        run.run(list(run.units), len(run.units) if option.virtual else option.jobs)  # Kernels take what is theirs.
         session.config.hook.pytest_verdict_end(run=run)
         session.config.stash[RUN] = run
     finally:
@@ -333,7 +389,8 @@ def pytest_sessionfinish(session):
     run = session.config.stash.get(RUN, None)
     if run:
         with contextlib.redirect_stdout(io.StringIO()) as sums:
-            session.exitstatus = run.end()
+            status = run.end()
+            session.exitstatus = MISSING if getattr(run.nursery, "reason", None) else status
         run.sums = sums.getvalue()
 
 

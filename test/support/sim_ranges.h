@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// What counts as ordinary of a machine on two wheels: nothing inside these ranges may stop it.
 ///
-/// They were fixed before the thresholds were chosen against them, but for the time between kerbs (docs/pair.md). They are
+/// They were fixed before the thresholds were chosen against them, but for the time between kerbs (docs/user/pair.md). They are
 /// assumptions: nobody has measured them on a real pair of wheels.
 ///
 /// What each of them means is in motion.h. Not in here: faults, such as a blocked wheel.

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
-SOURCE = HERE / "pytest_verdict.py"
+SOURCES = (HERE / "pytest_verdict.py", HERE / "pytest_virtual.py")
 # (what, old, new, the test that must fail)
 FAULTS = (
     ("a collected failure is forgotten", "    if found:\n        more", "    if False:\n        more", "test_collected_rule_is_final"),
@@ -68,6 +68,9 @@ FAULTS = (
         "shared = False",
         "test_class_that_prepares_once_is_one_attempt",
     ),
+    ("tests that are together run apart", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
+    ("a stall explains what is exact", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
+    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_what_a_test_counts_as"),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     (
         "others hear of each attempt",
@@ -82,6 +85,26 @@ FAULTS = (
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
     ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_what_a_folder_concludes_counts"),
     ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_what_a_folder_concludes_counts"),
+    (
+        "virtual time is real",
+        '(self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)',
+        "Nursery",
+        "test_each_test_of_each_share_is_judged_once_inside",
+    ),
+    (
+        "what a kernel did not get to passes",
+        'self.answers[name].put(f"{why}\\n{boot.complaint()}")',
+        "self.answers[name].put(verdict.Attempt())",
+        "test_kernel_that_ends_early_fails_what_is_left",
+    ),
+    ("without a kernel all is well", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
+    (
+        "what is for real time runs in virtual time",
+        "items[:] = [item for item in items if item not in native]",
+        "pass",
+        "test_what_needs_real_time_is_left_out_of_virtual_time",
+    ),
+    ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
 )
 LATE = "[(verdict.now_us(), 500_000)]"
@@ -190,6 +213,9 @@ class Made(unittest.TestCase):
 class Conclusive(Made):
     def test_broken_rule_is_final(self):
         self.assertIn("nonzero after e-stop", self.final('def test_one():\n    note("tried")\n    verdict.hold(False, "nonzero after e-stop")\n'))
+
+    def test_exact_test_is_final(self):
+        self.final('@pytest.mark.exact\ndef test_one():\n    note("tried")\n    assert False, "2 != 3"\n')
 
     def test_collected_rule_is_final(self):
         self.assertIn("rule: moved", self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n'))
@@ -399,6 +425,24 @@ class Processes(Made):
         self.assertEqual(0, ran.status, ran.lines)
         self.assertFalse(runs(ran.notes[0]))
 
+    def test_tests_together_are_one_attempt(self):
+        ran = self.run_made(
+            """
+            SEEN = []
+
+            @pytest.mark.parametrize("number", [pytest.param(number, marks=pytest.mark.together(str(number % 2))) for number in range(4)])
+            def test_one(number):
+                SEEN.append(number)
+                assert len(SEEN) == 1 + number // 2
+            """,
+            stalls="[]",
+        )
+        self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
+
+    def test_what_a_test_counts_as(self):
+        ran = self.run_made('def test_one(record_property):\n    record_property("tests", 7)\n')
+        self.assertEqual((0, "7 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
+
     def test_other_users_may_enter_the_folder_of_all_tests(self):
         ran = self.run_made(
             """
@@ -510,6 +554,14 @@ class Chosen(Made):
         self.assertEqual(["test_it.py::test_long", "test_it.py::test_short"], [line for line in ran.lines if "::" in line])
         self.assertFalse(re.search(r"\d+ passed", "\n".join(ran.lines)))
 
+    def test_sample_is_of_the_commit(self):
+        many = 'import pytest\n@pytest.mark.parametrize("number", range(40))\ndef test_it(number):\n    pass\n'
+        git = "import pytest_verdict\npytest_verdict.commit = lambda _: {!r}\n".format
+        first, again, other = (self.run_made(many, "--sample", "4", conftest=git(key)) for key in ("abc", "abc", "def"))
+        self.assertEqual("4 passed, 0 failed, 0 skipped", first.last, first.lines)
+        self.assertEqual(first.cases, again.cases)
+        self.assertNotEqual(first.cases, other.cases)
+
     def test_nothing_that_ran_is_no_success(self):
         for tests, options, last in (
             (self.TWO, ("-k", "nothing"), "0 passed, 0 failed, 0 skipped"),
@@ -527,13 +579,62 @@ class Chosen(Made):
             self.assertNotRegex(done.stdout, r"[1-9] passed, 0 failed")
 
 
+class Virtual(Made):
+    """The kernel is a process that does at once what the plan says."""
+
+    BOOT = """
+        import sys
+        sys.path += [{here!r} + "/../kernel", {here!r} + "/../system"]
+        import boot
+        def kernel(install=True):
+            {kernel}
+        boot.find_kernel = kernel
+        GUEST = "import guest_pytest, sys; guest_pytest.own_tmp = lambda *_: None; sys.exit(guest_pytest.main(sys.argv[1]))"
+        boot.Boot.command = lambda self, kernel: [sys.executable, "-c", GUEST, self.path("json")]
+        """
+    TWO = 'def test_one():\n    note("tried")\n    {}\n\ndef test_two():\n    pass\n'
+
+    def virtual(self, tests, *options, kernel="return 'none'", more=""):
+        return self.run_made(tests, "--virtual", *options, conftest=textwrap.dedent(self.BOOT).format(here=str(HERE), kernel=kernel) + more)
+
+    def told(self, ran):
+        return ran.status, ran.last, ran.notes
+
+    def test_each_test_of_each_share_is_judged_once_inside(self):
+        where = 'note("inside" if request.config.option.inside else "outside")'
+        ran = self.virtual(f"def test_one(request):\n    {where}\n\ndef test_two(request):\n    {where}\n", "--jobs", "2")
+        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.told(ran), ran.lines)
+        self.assertEqual({"test_one": "passed", "test_two": "passed"}, ran.cases)
+
+    def test_nothing_is_excused_in_virtual_time(self):
+        ran = self.virtual(self.TWO.format('assert False, "not within 1 s"'), "--jobs", "1")
+        self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertIn("not within 1 s", "\n".join(ran.lines))
+
+    def test_kernel_that_ends_early_fails_what_is_left(self):
+        ran = self.virtual(self.TWO.format("os.kill(os.getppid(), 9)"), "--jobs", "1")
+        self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertIn("its kernel ended before it did", "\n".join(ran.lines))
+
+    def test_without_a_kernel_nothing_is_judged(self):
+        ran = self.virtual(self.TWO.format("pass"), kernel="raise RuntimeError('no flex')")
+        self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.told(ran), ran.lines)
+        self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
+
+    def test_what_needs_real_time_is_left_out_of_virtual_time(self):
+        tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")
+        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.told(self.virtual(tests)))
+        self.assertEqual(["tried"], self.run_made(tests).notes)
+
+
 def seed(old, new, noticer):
     """Whether the test fails with this fault in the plugin; None: the plugin has no such code."""
-    text = SOURCE.read_text(encoding="utf-8")
-    if text.count(old) != 1:
+    texts = {source: source.read_text(encoding="utf-8") for source in SOURCES}
+    found = [source for source, text in texts.items() for _ in range(text.count(old))]
+    if len(found) != 1:
         return None
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / SOURCE.name).write_text(text.replace(old, new), encoding="utf-8")
+        (Path(folder) / found[0].name).write_text(texts[found[0]].replace(old, new), encoding="utf-8")
         Made.plugin, result = folder, unittest.TestResult()
         try:
             unittest.defaultTestLoader.loadTestsFromName(
@@ -544,7 +645,7 @@ def seed(old, new, noticer):
     return bool(result.failures or result.errors)
 
 
-CLASSES = (Conclusive, Inconclusive, Processes, Chosen)
+CLASSES = (Conclusive, Inconclusive, Processes, Chosen, Virtual)
 
 
 def main():

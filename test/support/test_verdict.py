@@ -72,7 +72,8 @@ READER_FAULTS = (
     ("check takes 75 for success", COUNT, "return 1 if sums[1] else 75 if unjudged else int(not sums[0])", "return 1 if sums[1] else int(not sums[0])"),
     ("check lets 75 outweigh a failure", COUNT, "return 1 if sums[1] else 75 if unjudged", "return 75 if unjudged else 1 if sums[1]"),
     ("check takes any status for 75", COUNT, "status not in (0, 77) and not (status == 75 and", "status == 1 and not (status == 75 and"),
-    ("check cuts the reason of a failure", START, "for more in range(5)", "for more in range(1)"),
+    ("check cuts the reason of a failure", START, "5 if FAILED", "1 if FAILED"),
+    ("check shows a traceback without its exception", START, "20 if REASON", "1 if REASON"),
     ("check names nothing inconclusive", COUNT, 'above\\n" if inconclusive', 'above\\n" if False'),
     ("check takes what was killed for skipped", COUNT, '("none", 77 if status == 77 else 1, 0, 0)', '("none", 77, 0, 0)'),
     ("check shows nothing of what was killed", COUNT, 'if layer == "none":', "if False:"),
@@ -128,6 +129,13 @@ def stall(late_us=200_000, at_us=AT_US):
 
 
 class Conclusive(unittest.TestCase):
+    def test_failure_names_the_longest_stall_that_was_measured(self):
+        for late, words in (((), "meanwhile: 0 ms"), ((stall(7_000), stall(19_000)), "meanwhile: 19 ms")):
+            made, told = Made({"one": [bad(verdict.CHECK)]}, late), []
+            made.session.report = lambda name, kind, attempt, tries, told=told: told.extend(attempt.failures)
+            made.run()
+            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", told[0].text)
+
     def final(self, first, late=()):
         """One attempt, and a failure although the next one would pass."""
         status, lines, made = Made({"one": [first, ok(), ok(), ok()], "two": [ok()]}, late).run()
@@ -254,44 +262,7 @@ class Words(unittest.TestCase):
 
 
 class Processes(unittest.TestCase):
-    """A runner with tests in processes, and the sleepers themselves."""
-
-    RUNNER = """
-        import sys, time, unittest, os
-        sys.path[:0] = [{ctl!r}]
-        import several
-        several.LIMIT_S = {limit}
-        several.verdict.Witness.stalls = lambda *_: [(several.verdict.now_us(), 500_000)]  # This machine is always late.
-        several.verdict.Session.await_quiet = lambda *_: None
-
-        class Fake(unittest.TestCase):
-            def test_{kind}(self):
-                with open({count!r}, "a") as file:
-                    file.write("x")
-                {body}
-
-        if __name__ == "__main__":
-            sys.argv.pop(1)
-            several.main("build")
-        """
-
-    def several(self, kind, body, limit=30):
-        """(exit status, last line, attempts)"""
-        with tempfile.TemporaryDirectory() as folder:
-            count, path = os.path.join(folder, "count"), os.path.join(folder, "fake.py")
-            with open(path, "w", encoding="ascii") as file:
-                file.write(textwrap.dedent(self.RUNNER).format(ctl=os.path.join(HERE, "..", "ctl"), count=count, kind=kind, body=body, limit=limit))
-            done = subprocess.run([sys.executable, path, "build"], capture_output=True, text=True, timeout=60, check=False)
-            return done.returncode, done.stdout.splitlines()[-1], os.path.getsize(count)
-
-    def test_broken_rule_crash_and_hang_are_final_on_a_late_machine(self):
-        final = (1, "0 passed, 1 failed, 0 skipped", 1)
-        self.assertEqual(final, self.several("rule", "raise several.verdict.RuleBroken('nonzero after e-stop')"))
-        self.assertEqual(final, self.several("crash", "os.abort()"))
-        self.assertEqual(final, self.several("hang", "time.sleep(60)", 4))
-
-    def test_late_test_on_a_late_machine_is_not_judged(self):
-        self.assertEqual((75, "0 passed, 0 failed, 1 skipped", 4), self.several("late", "self.fail('not within 1 s')"))
+    """The sleepers themselves."""
 
     def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
         witness = verdict.Witness()
@@ -377,6 +348,17 @@ class Check(unittest.TestCase):
         for what in ("FAIL row11", *(f"  reason {i}" for i in range(1, 5)), "199"):
             self.assertIn(what, shown)
         for what in ("reason 5", "150"):
+            self.assertNotIn(what, shown)
+
+    def test_exception_behind_a_traceback_is_shown_with_what_came_instead(self):
+        runner = (
+            "echo 'FAIL: test_x (x.X)'; seq 301 309; echo \"AssertionError: 'ready' did not come; after the last text came:\"\n"
+            "echo busy; seq 401 430; seq 501 540; exit 1\n"
+        )
+        shown = "\n".join(self.check(runner, "system")[1])
+        for what in ("FAIL: test_x", "AssertionError: 'ready'", ": busy", ": 401", ": 418"):
+            self.assertIn(what, shown)
+        for what in (": 309", ": 419"):
             self.assertNotIn(what, shown)
 
     def test_not_judged_is_75_and_named(self):

@@ -223,6 +223,10 @@ class Session:
             attempt = attempt._replace(skip=f"inconclusive in each of {tries} attempts: the machine stalled for up to {self.stall_ms(attempt):.0f} ms")
         elif tries > 1:
             self.repeated.append(name)
+        if verdict == FAILED and attempt.failures:
+            first, *others = attempt.failures
+            words = f"{first.text}\nlongest stall of the machine measured meanwhile: {self.stall_ms(attempt):.0f} ms"
+            attempt = attempt._replace(failures=[first._replace(text=words), *others])
         skips = attempt.skips if verdict == PASSED else 0
         self.counts[SKIPPED if verdict == INCONCLUSIVE else verdict] += attempt.tests - skips if verdict == PASSED else 1
         self.counts[SKIPPED] += skips

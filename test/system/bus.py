@@ -32,6 +32,8 @@ def realtime_ahead_ns():
 class Bus:
     """The stamp is taken by the kernel when the hub hands the frame over, so this process may be slow without harm."""
 
+    carries_fd = False
+
     def __init__(self, path, frames=None):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)

@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""System tests: the real gateway and simulator, judged from the bus log."""
+"""System tests: the real gateway and simulator, judged from the bus log. In real time, or in virtual time with --virtual."""
 
+import pytest
 import verdict
 from harness import SERVICE_NICE
 from judge_log import percentile
+from scenario import as_documented
 
 ESTOP_AROUND_US = 20_000
 
 
 def pytest_configure(config):
     config.witness_nice = SERVICE_NICE
+
+
+def pytest_collection_modifyitems(items):
+    """In virtual time telemetry is slower than documented, which is the harder task, but in these."""
+    for item in items:
+        if as_documented(item.name):
+            item.add_marker(pytest.mark.pace(1))
 
 
 def presses(run):

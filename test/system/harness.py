@@ -24,6 +24,7 @@ from verdict import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 SERVICE_NICE = -10
+PACE = {"slow": 1}  # how many times slower than documented telemetry comes, where time is virtual: test/kernel/catalogue.py
 WORDS = 800  # of a program's, beside a failure
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
 DEFAULTS = {
@@ -81,6 +82,18 @@ def read_only(folder):
             raise OSError(ctypes.get_errno(), "mount")
 
     return mount
+
+
+def children(pid):
+    """{name: process number} of its children, on every kernel: /proc/PID/task/PID/children is an option of it."""
+    found = {}
+    for stat in glob.glob("/proc/[0-9]*/stat"):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError), open(stat, encoding="utf-8", errors="replace") as file:
+            number, rest = file.read().split(" (", 1)
+            name, rest = rest.rsplit(")", 1)
+            if int(rest.split()[1]) == pid:
+                found[name] = int(number)
+    return found
 
 
 def as_a_service():
@@ -239,7 +252,11 @@ class Rig:
 
     def sim_arguments(self):
         """More arguments of the simulator."""
-        return ()
+        if PACE["slow"] == 1:
+            return ()
+        with open(self.path("pace"), "w", encoding="ascii") as file:
+            file.write(f"at 0 slow {PACE['slow']}\n")
+        return ("--script", self.path("pace"))
 
     def listen(self, frames=None):
         """The recorder of the bus; `frames` are what another one had recorded before."""

@@ -1,28 +1,20 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Runs the STM32 image on an emulated Cortex-M and judges what it does.
 
-usage: emulate.py MODEL_LIBRARY BUILDS [BOARD[.SCENARIO]]...
+usage: emulate.py MODEL_LIBRARY BOARD-IMAGE.elf SCENARIO     "ok", or "FAIL: " and why, of one scenario (for test/faults)
 
-BUILDS holds BOARD-IMAGE.elf for the boards and images that scenarios.py names; test/target/run makes them. Without names, what is long and the same on both families runs on the first board only, unless IWHEEL_FULL is 1.
-Needs the Python package unicorn. The last line is "N passed, N failed, N skipped".
+Needs the Python package unicorn.
 """
 
-import gc
-import os
-import re
 import subprocess
 import sys
 import tempfile
-import time
 import traceback
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 
-import beginnings
 import scenarios
 import symbols
 from emulator.boards import BOARDS
@@ -33,12 +25,12 @@ from emulator.machine import Machine
 class Rig:
     """An image running on a board, and what a scenario may ask of it."""
 
-    def __init__(self, board_name, elf, oscillator=None):
+    def __init__(self, elf, oscillator=None):
         with tempfile.TemporaryDirectory() as folder:  # Not /dev/stdout: objcopy run by root can put a file in its place.
             subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), f"{folder}/image"], check=True)
             image = Path(folder, "image").read_bytes()
-        kind = re.sub(r"^.*-", "", Path(elf).stem)
-        self.machine = Machine(BOARDS[board_name](**scenarios.WIRING.get(kind, {})), image)
+        board, kind = Path(elf).stem.split("-")
+        self.machine = Machine(BOARDS[board](**scenarios.WIRING.get(kind, {})), image)
         self.machine.uart.baud = scenarios.BAUD.get(kind, self.machine.uart.baud)
         if oscillator is not None:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
@@ -95,74 +87,31 @@ class Rig:
         assert not foreign, f"ids sent that are not ours: {foreign}"
 
 
-def attempt(function, *arguments):
-    """None, or what went wrong."""
-    try:
-        function(*arguments)
-    except AssertionError as error:
-        line = traceback.extract_tb(error.__traceback__)[-1]
-        return f"{error or line.line} (line {line.lineno} of {Path(line.filename).name})"
-    except Exception:  # noqa: BLE001
-        return traceback.format_exc()
-    return None
+def load(library):
+    Machine.library = Controller.library = load_model(library)
 
 
 def judge(rig, scenario):
-    """(error or None, notes, seconds)"""
-    started = time.time()
-
-    def play():
+    """(what went wrong or None, notes)"""
+    error = None
+    try:
         scenario(rig)
         rig.judge()
-
-    return attempt(play), rig.notes, time.time() - started
-
-
-def play(group):
-    """[(name, error or None, notes, seconds)] of scenarios that begin alike."""
-    library, folder, board, image, oscillator, several = group
-    Machine.library = Controller.library = load_model(library)
-    gc.disable()  # It takes a twentieth of the time, and has little to find before the end.
-    rig = Rig(board, Path(folder) / f"{board}-{image}.elf", oscillator)
-    failed = attempt(beginnings.run, rig, beginnings.of(several[0]))
-    verdicts = []
-    for scenario in several:
-        verdict = (failed, [], 0) if failed else beginnings.apart(judge, rig, scenario) or ("it ended without a verdict", [], 0)
-        verdicts.append((f"{board}.{scenario.__name__}", *verdict))
-    del rig
-    gc.collect()
-    return verdicts
+    except AssertionError as failed:
+        line = traceback.extract_tb(failed.__traceback__)[-1]
+        error = f"{failed or line.line} (line {line.lineno} of {Path(line.filename).name})"
+    except Exception:  # noqa: BLE001
+        error = traceback.format_exc()
+    return error, rig.notes
 
 
-def groups(chosen, full):
-    """(board, image, the watchdog's oscillator, scenarios that begin alike), the largest first."""
-    found = {}
-    for board in BOARDS:
-        for image, several in scenarios.BY_BOARD[board].items():
-            for scenario in several:
-                if (
-                    board in chosen
-                    or f"{board}.{scenario.__name__}" in chosen
-                    or (not chosen and (full or board != "stm32f407" or scenario not in scenarios.LONG))
-                ):
-                    found.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
-    return sorted(((*alike[:3], several) for alike, several in found.items()), key=lambda group: -len(group[3]))
-
-
-def main(arguments):
-    if len(arguments) < 3:
-        sys.exit(__doc__)
-    tasks = [(Path(arguments[1]).resolve(), arguments[2], *group) for group in groups(arguments[3:], os.environ.get("IWHEEL_FULL") == "1")]
-    passed = failed = 0
-    with ProcessPoolExecutor(2) as pool:
-        for verdicts in pool.map(play, tasks):
-            for name, error, notes, seconds in verdicts:
-                passed, failed = passed + (error is None), failed + (error is not None)
-                told = f"FAIL: {error}" if error else "ok" + "".join(f", {note}" for note in notes)
-                print(f"{name:<36} {seconds:5.1f} s  {told}", flush=True)
-    print(f"{passed} passed, {failed} failed, 0 skipped")
-    return 1 if failed or not passed else 0
+def main(library, elf, name):
+    board, kind = Path(elf).stem.split("-")
+    scenario = next(one for one in scenarios.BY_BOARD[board][kind] if one.__name__ == name)
+    load(Path(library).resolve())
+    error, _ = judge(Rig(elf, scenarios.OSCILLATOR.get(scenario)), scenario)
+    print(f"FAIL: {error}" if error else "ok")
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv))
+    main(*sys.argv[1:]) if len(sys.argv) == 4 else sys.exit(__doc__)

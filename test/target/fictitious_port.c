@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Somebody follows docs/porting.md: its files are compiled as they stand there, on a controller with two transmit slots that exists
+// Somebody follows docs/developer/porting.md: its files are compiled as they stand there, on a controller with two transmit slots that exists
 // nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, stand after the loop was held up while the switch stays on,
 // and go again when it was off and is on again; with 1 if they are not told it in time, and with 3 if they go on their own.
 #include "my_port.h"

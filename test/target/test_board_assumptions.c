@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a board keeps of its wheels: which of it comes back, which is forgotten, and what a power cut leaves.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 #include "board_records.h"
 #include "flash.h"
@@ -41,8 +41,6 @@ void setUp(void) {
     gateway_rig_init(&rig);
 }
 
-void tearDown(void) {}
-
 static brd_settings_t settings_of(const char *key, const char *value) {
     char why[200];
     iwn_text_t text = iwn_text_begin(why, sizeof why);
@@ -76,7 +74,7 @@ static iw_snapshot_t run_again(const brd_assumptions_t *learned, const brd_setti
     return gateway_rig_look(&rig);
 }
 
-static void test_learnt_same_settings_comes_back_with_its_provenance(void) {
+TEST(test_learnt_same_settings_comes_back_with_its_provenance) {
     const brd_assumptions_t learned = something();
     const brd_settings_t settings = settings_of(NULL, NULL);
     brd_assumptions_zero_t zero[IW_SIDES];
@@ -97,7 +95,7 @@ static void test_learnt_same_settings_comes_back_with_its_provenance(void) {
     TEST_ASSERT_FALSE_MESSAGE(brd_assumptions_differs(&again, &learned), "each start would write the same once more");
 }
 
-static void test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else(void) {
+TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else) {
     static const struct {
         const char *key;
         const char *value;
@@ -126,7 +124,7 @@ static void test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_
     }
 }
 
-static void test_learnt_zero_that_no_wheel_has_is_not_restored(void) {
+TEST(test_learnt_zero_that_no_wheel_has_is_not_restored) {
     brd_assumptions_t learned = something();
     const brd_settings_t settings = settings_of(NULL, NULL);
     brd_assumptions_zero_t zero[IW_SIDES];
@@ -138,7 +136,7 @@ static void test_learnt_zero_that_no_wheel_has_is_not_restored(void) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, zero[IW_LEFT].from);
 }
 
-static void test_learnt_small_changes_are_not_worth_a_record(void) {
+TEST(test_learnt_small_changes_are_not_worth_a_record) {
     const brd_assumptions_t kept = something();
     brd_assumptions_t now = kept;
     now.figure[IW_ASSUMPTION_FORCE_UNIT_RIGHT]++;
@@ -159,7 +157,7 @@ static brd_records_t power_on(void) {
     return kept;
 }
 
-static void test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was(void) {
+TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was) {
     const brd_settings_t settings = settings_of("wheels.track_mm", "540");
     brd_assumptions_t learned = something();
     brd_settings_t found;
@@ -186,7 +184,7 @@ static void test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_a
     }
 }
 
-static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
+TEST(test_learnt_last_blank_slot_is_the_configuration_s) {
     const brd_settings_t settings = settings_of(NULL, NULL);
     const brd_assumptions_t learned = something();
     brd_records_t kept = power_on();
@@ -258,7 +256,7 @@ static void write_as_before(brd_records_t *kept, const brd_settings_t *settings,
     TEST_ASSERT_TRUE(brd_store_write(&kept->store, words, false));
 }
 
-static void test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair(void) {
+TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair) {
     const brd_settings_t settings = settings_of("wheels.track_mm", "777");
     brd_assumptions_t learned = something();
     brd_settings_t found;
@@ -275,7 +273,7 @@ static void test_learnt_record_of_the_version_before_is_read_with_the_defaults_o
     }
 }
 
-static void test_learnt_record_of_the_version_before_without_settings_has_none(void) {
+TEST(test_learnt_record_of_the_version_before_without_settings_has_none) {
     brd_settings_t found;
     brd_assumptions_t read;
     brd_records_t kept = power_on();
@@ -286,22 +284,8 @@ static void test_learnt_record_of_the_version_before_without_settings_has_none(v
 }
 
 /// Commands that were kept from before a power loss quote another number of starts.
-static void test_learnt_every_power_on_is_counted(void) {
+TEST(test_learnt_every_power_on_is_counted) {
     for (uint32_t starts = 1; starts < 20U; starts++) {
         TEST_ASSERT_EQUAL_UINT32(starts, power_on().power_ons);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_learnt_same_settings_comes_back_with_its_provenance);
-    RUN_TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else);
-    RUN_TEST(test_learnt_zero_that_no_wheel_has_is_not_restored);
-    RUN_TEST(test_learnt_small_changes_are_not_worth_a_record);
-    RUN_TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was);
-    RUN_TEST(test_learnt_last_blank_slot_is_the_configuration_s);
-    RUN_TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair);
-    RUN_TEST(test_learnt_record_of_the_version_before_without_settings_has_none);
-    RUN_TEST(test_learnt_every_power_on_is_counted);
-    return UNITY_END();
 }

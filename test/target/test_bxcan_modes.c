@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Initialisation, joining the bus, silence, bus-off: the handshakes of chapter 4 and section 7.6.
 #include "bxcan_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 #define REJOIN_BITS (128U * 11U)
 
@@ -23,7 +23,7 @@ static iw_bus_state_t state(void) {
     return brd_bxcan_bus_state(driver);
 }
 
-static void test_bus_is_down_until_11_recessive_bits(void) {
+TEST(test_bus_is_down_until_11_recessive_bits) {
     rig_init(0, false);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     bxcan_model_recessive(model, 10);
@@ -33,13 +33,13 @@ static void test_bus_is_down_until_11_recessive_bits(void) {
     TEST_ASSERT_TRUE(bxcan_model_is_on(model));
 }
 
-static void test_bit_timing_is_written_as_configured(void) {
+TEST(test_bit_timing_is_written_as_configured) {
     rig_start(0);
     TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
     TEST_ASSERT_EQUAL_HEX32(0x00010000U, model->mcr);
 }
 
-static void test_bus_held_dominant_at_start_is_waited_for_without_waiting(void) {
+TEST(test_bus_held_dominant_at_start_is_waited_for_without_waiting) {
     rig_init(0, false);
     for (int i = 0; i < 1000; i++) {
         bxcan_model_dominant(model);
@@ -49,7 +49,7 @@ static void test_bus_held_dominant_at_start_is_waited_for_without_waiting(void) 
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_controller_that_does_not_answer_is_down_and_recovers(void) {
+TEST(test_controller_that_does_not_answer_is_down_and_recovers) {
     model->deaf = true;
     rig_init(0, false);
     for (int i = 0; i < 100; i++) {
@@ -63,7 +63,7 @@ static void test_controller_that_does_not_answer_is_down_and_recovers(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_reset_of_the_controller_behind_our_back_is_reported_and_mended(void) {
+TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended) {
     rig_start(0);
     bxcan_model_reset(model, 28);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
@@ -73,7 +73,7 @@ static void test_reset_of_the_controller_behind_our_back_is_reported_and_mended(
     TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
 }
 
-static void test_reset_of_the_controller_while_joining_is_mended(void) {
+TEST(test_reset_of_the_controller_while_joining_is_mended) {
     rig_init(0, false);
     (void)state();
     bxcan_model_reset(model, 28);
@@ -84,7 +84,7 @@ static void test_reset_of_the_controller_while_joining_is_mended(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_request_that_got_lost_is_repeated(void) {
+TEST(test_request_that_got_lost_is_repeated) {
     model->deaf = true;
     rig_init(0, false);
     (void)state();
@@ -96,7 +96,7 @@ static void test_request_that_got_lost_is_repeated(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_initialisation_asked_for_by_somebody_else_is_left(void) {
+TEST(test_initialisation_asked_for_by_somebody_else_is_left) {
     rig_start(0);
     bxcan_model_write(model, 0x00, 0x00010001U);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
@@ -105,7 +105,7 @@ static void test_initialisation_asked_for_by_somebody_else_is_left(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_silent_device_hears_but_neither_acknowledges_nor_sends(void) {
+TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     iw_can_frame_t heard;
     rig_init(0, true);
@@ -117,7 +117,7 @@ static void test_silent_device_hears_but_neither_acknowledges_nor_sends(void) {
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
-static void test_device_that_is_not_silent_acknowledges(void) {
+TEST(test_device_that_is_not_silent_acknowledges) {
     rig_start(0);
     TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
 }
@@ -134,7 +134,7 @@ static void fail_until_bus_off(void) {
     TEST_ASSERT_TRUE(model->bus_off);
 }
 
-static void test_bus_off_is_reported_and_left_after_128_times_11_bits(void) {
+TEST(test_bus_off_is_reported_and_left_after_128_times_11_bits) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -149,7 +149,7 @@ static void test_bus_off_is_reported_and_left_after_128_times_11_bits(void) {
     TEST_ASSERT_EQUAL(1, driver->bus_offs);
 }
 
-static void test_bus_off_is_not_left_by_the_controller_alone(void) {
+TEST(test_bus_off_is_not_left_by_the_controller_alone) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -159,7 +159,7 @@ static void test_bus_off_is_not_left_by_the_controller_alone(void) {
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
 }
 
-static void test_send_fails_in_bus_off_that_nobody_has_reported_yet(void) {
+TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -167,7 +167,7 @@ static void test_send_fails_in_bus_off_that_nobody_has_reported_yet(void) {
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
-static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
+TEST(test_nothing_from_before_bus_off_is_sent_after_it) {
     const iw_can_frame_t left = rig_frame(266, 1);
     const iw_can_frame_t right = rig_frame(298, 1);
     model_frame_t frame;
@@ -188,7 +188,7 @@ static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
-static void test_recovery_waits_until_what_waits_is_taken_back(void) {
+TEST(test_recovery_waits_until_what_waits_is_taken_back) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -206,7 +206,7 @@ static void test_recovery_waits_until_what_waits_is_taken_back(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-static void test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery(void) {
+TEST(test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
@@ -223,7 +223,7 @@ static void test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery(void
     TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
 }
 
-static void test_error_passive_is_told_apart(void) {
+TEST(test_error_passive_is_told_apart) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
@@ -239,7 +239,7 @@ static void test_error_passive_is_told_apart(void) {
     TEST_ASSERT_EQUAL(3, RIG_ESR_LEC(rig_read_esr(0)));
 }
 
-static void test_receive_errors_are_told(void) {
+TEST(test_receive_errors_are_told) {
     rig_start(0);
     for (int i = 0; i < 130; i++) {
         bxcan_model_hear_error(model);
@@ -249,7 +249,7 @@ static void test_receive_errors_are_told(void) {
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
 }
 
-static void test_error_interrupt_wakes_and_ends(void) {
+TEST(test_error_interrupt_wakes_and_ends) {
     rig_start(0);
     for (int i = 0; i < 128; i++) {
         bxcan_model_hear_error(model);
@@ -260,7 +260,7 @@ static void test_error_interrupt_wakes_and_ends(void) {
     TEST_ASSERT_EQUAL(1, rig[0].interrupts);
 }
 
-static void test_two_devices_share_filters_and_nothing_else(void) {
+TEST(test_two_devices_share_filters_and_nothing_else) {
     const iw_can_frame_t frame = rig_frame(266, 7);
     model_frame_t on_bus;
     iw_can_frame_t heard;
@@ -284,7 +284,7 @@ static bool in_use_reads_back(uint32_t id) {
            echo.id == id && echo.kind == IW_CAN_ECHO;
 }
 
-static void test_trouble_of_one_device_is_not_the_other_ones(void) {
+TEST(test_trouble_of_one_device_is_not_the_other_ones) {
     brd_bxcan_t *const other = &rig[1].driver;
     const iw_can_frame_t frame = rig_frame(298, 7);
     model_frame_t on_bus;
@@ -312,7 +312,7 @@ static void test_trouble_of_one_device_is_not_the_other_ones(void) {
     TEST_ASSERT_TRUE(in_use_reads_back(298));
 }
 
-static void test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers(void) {
+TEST(test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
@@ -330,37 +330,9 @@ static void test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers(void
     TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
 }
 
-static void test_bus_held_dominant_while_listening_is_passive_only(void) {
+TEST(test_bus_held_dominant_while_listening_is_passive_only) {
     rig_start(0);
     bxcan_model_hold(model, 1000000, false);
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
     TEST_ASSERT_GREATER_THAN(127, RIG_ESR_REC(rig_read_esr(0)));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bus_is_down_until_11_recessive_bits);
-    RUN_TEST(test_bit_timing_is_written_as_configured);
-    RUN_TEST(test_bus_held_dominant_at_start_is_waited_for_without_waiting);
-    RUN_TEST(test_controller_that_does_not_answer_is_down_and_recovers);
-    RUN_TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended);
-    RUN_TEST(test_reset_of_the_controller_while_joining_is_mended);
-    RUN_TEST(test_request_that_got_lost_is_repeated);
-    RUN_TEST(test_initialisation_asked_for_by_somebody_else_is_left);
-    RUN_TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends);
-    RUN_TEST(test_device_that_is_not_silent_acknowledges);
-    RUN_TEST(test_bus_off_is_reported_and_left_after_128_times_11_bits);
-    RUN_TEST(test_bus_off_is_not_left_by_the_controller_alone);
-    RUN_TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet);
-    RUN_TEST(test_nothing_from_before_bus_off_is_sent_after_it);
-    RUN_TEST(test_recovery_waits_until_what_waits_is_taken_back);
-    RUN_TEST(test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery);
-    RUN_TEST(test_error_passive_is_told_apart);
-    RUN_TEST(test_receive_errors_are_told);
-    RUN_TEST(test_error_interrupt_wakes_and_ends);
-    RUN_TEST(test_two_devices_share_filters_and_nothing_else);
-    RUN_TEST(test_trouble_of_one_device_is_not_the_other_ones);
-    RUN_TEST(test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers);
-    RUN_TEST(test_bus_held_dominant_while_listening_is_passive_only);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // Filters, FIFO and ring: sections 7.3 and 7.4.
 #include "bxcan_rig.h"
 #include "iwheel/codec.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -38,7 +38,7 @@ static int pass(const model_frame_t *frame, iw_can_frame_t *out_frame) {
     return brd_bxcan_receive(driver, out_frame);
 }
 
-static void test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote(void) {
+TEST(test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote) {
     for (uint32_t id = 0; id < 2048U; id++) {
         for (uint8_t remote = 0; remote <= 1; remote++) {
             const model_frame_t frame = {.id = id, .remote = remote, .dlc = 4};
@@ -52,7 +52,7 @@ static void test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote(void) {
     }
 }
 
-static void test_of_29_bit_ids_only_those_with_the_same_number_pass(void) {
+TEST(test_of_29_bit_ids_only_those_with_the_same_number_pass) {
     for (uint32_t bit = 0; bit < 29U; bit++) {
         for (uint32_t id = 0; id < 2048U; id++) {
             const model_frame_t frame = {.id = id ^ (1U << bit), .extended = 1, .dlc = 4};
@@ -65,7 +65,7 @@ static void test_of_29_bit_ids_only_those_with_the_same_number_pass(void) {
     }
 }
 
-static void test_29_bit_id_that_begins_like_ours_does_not_pass(void) {
+TEST(test_29_bit_id_that_begins_like_ours_does_not_pass) {
     for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
         const model_frame_t frame = {.id = ours[i] << 18, .extended = 1, .dlc = 4};
         iw_can_frame_t taken;
@@ -73,7 +73,7 @@ static void test_29_bit_id_that_begins_like_ours_does_not_pass(void) {
     }
 }
 
-static void test_frame_is_taken_byte_for_byte(void) {
+TEST(test_frame_is_taken_byte_for_byte) {
     const model_frame_t frame = {.id = 290, .dlc = 8, .data = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08}};
     iw_can_frame_t taken;
     memset(&taken, 0xA5, sizeof taken);
@@ -84,14 +84,14 @@ static void test_frame_is_taken_byte_for_byte(void) {
     TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, taken.data, 8);
 }
 
-static void test_dlc_above_8_means_8_bytes(void) {
+TEST(test_dlc_above_8_means_8_bytes) {
     const model_frame_t frame = {.id = 256, .dlc = 15};
     iw_can_frame_t taken;
     TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
     TEST_ASSERT_EQUAL(8, taken.dlc);
 }
 
-static void test_frames_come_in_the_order_of_the_bus_with_echoes_between(void) {
+TEST(test_frames_come_in_the_order_of_the_bus_with_echoes_between) {
     const iw_can_frame_t left = rig_frame(266, 9);
     const uint32_t expected[] = {256, 266, 512, 288};
     model_frame_t on_bus;
@@ -108,14 +108,14 @@ static void test_frames_come_in_the_order_of_the_bus_with_echoes_between(void) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
 }
 
-static void test_foreign_setpoint_is_received_and_no_echo(void) {
+TEST(test_foreign_setpoint_is_received_and_no_echo) {
     iw_can_frame_t taken;
     (void)rig_hear(0, 266, 5);
     TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
 }
 
-static void test_slow_release_shows_no_frame_twice(void) {
+TEST(test_slow_release_shows_no_frame_twice) {
     iw_can_frame_t taken;
     model->release_slow = 4;
     for (uint8_t i = 0; i < 3; i++) {
@@ -148,14 +148,14 @@ static void overrun(void) {
     (void)brd_register_read(&rig[0].window.MSR);
 }
 
-static void test_overrun_of_the_controller_is_counted_once(void) {
+TEST(test_overrun_of_the_controller_is_counted_once) {
     overrun();
     TEST_ASSERT_EQUAL(1, driver->overruns);
     (void)rig_hear(0, 256, 4);
     TEST_ASSERT_EQUAL(1, driver->overruns);
 }
 
-static void test_overrun_is_told_once_and_before_what_came_with_it(void) {
+TEST(test_overrun_is_told_once_and_before_what_came_with_it) {
     iw_can_frame_t taken;
     for (int round = 0; round < 2; round++) {
         overrun();
@@ -168,7 +168,7 @@ static void test_overrun_is_told_once_and_before_what_came_with_it(void) {
     }
 }
 
-static void test_full_ring_loses_the_newest_and_counts(void) {
+TEST(test_full_ring_loses_the_newest_and_counts) {
     iw_can_frame_t taken;
     for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH + 5U; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
@@ -186,7 +186,7 @@ static void test_full_ring_loses_the_newest_and_counts(void) {
     TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
 }
 
-static void test_ring_goes_on_for_ever(void) {
+TEST(test_ring_goes_on_for_ever) {
     iw_can_frame_t taken;
     atomic_store(&driver->ring.head, UINT32_MAX - 20U);
     atomic_store(&driver->ring.tail, UINT32_MAX - 20U);
@@ -198,7 +198,7 @@ static void test_ring_goes_on_for_ever(void) {
     TEST_ASSERT_EQUAL(0, driver->lost);
 }
 
-static void test_filters_do_not_depend_on_what_was_set_before(void) {
+TEST(test_filters_do_not_depend_on_what_was_set_before) {
     rig_reset();
     model->fm1r = 0x0FFFFFFFU;
     model->fs1r = 0x0FFFFFFFU;
@@ -214,7 +214,7 @@ static void test_filters_do_not_depend_on_what_was_set_before(void) {
     TEST_ASSERT_EQUAL_HEX32(0x0FFFFFFCU, model->fs1r);
 }
 
-static void test_filters_leave_the_banks_of_others_alone(void) {
+TEST(test_filters_leave_the_banks_of_others_alone) {
     rig_reset();
     model->fa1r = 1U << 20;
     model->bank[20][0] = 0x12345678U;
@@ -223,7 +223,7 @@ static void test_filters_leave_the_banks_of_others_alone(void) {
     TEST_ASSERT_EQUAL_HEX32(0x12345678U, model->bank[20][0]);
 }
 
-static void test_filters_fit_a_controller_with_14_banks(void) {
+TEST(test_filters_fit_a_controller_with_14_banks) {
     rig_reset();
     bxcan_model_reset(model, 14);
     rig_start(0);
@@ -231,7 +231,7 @@ static void test_filters_fit_a_controller_with_14_banks(void) {
     TEST_ASSERT_EQUAL_HEX32(0, model->fmr & 1U);
 }
 
-static void test_receive_error_counter_goes_down_again(void) {
+TEST(test_receive_error_counter_goes_down_again) {
     for (int i = 0; i < 10; i++) {
         bxcan_model_hear_error(model);
     }
@@ -240,25 +240,4 @@ static void test_receive_error_counter_goes_down_again(void) {
     }
     TEST_ASSERT_EQUAL(6, RIG_ESR_REC(rig_read_esr(0)));
     TEST_ASSERT_EQUAL(0, RIG_ESR_LEC(rig_read_esr(0)));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote);
-    RUN_TEST(test_of_29_bit_ids_only_those_with_the_same_number_pass);
-    RUN_TEST(test_29_bit_id_that_begins_like_ours_does_not_pass);
-    RUN_TEST(test_frame_is_taken_byte_for_byte);
-    RUN_TEST(test_dlc_above_8_means_8_bytes);
-    RUN_TEST(test_frames_come_in_the_order_of_the_bus_with_echoes_between);
-    RUN_TEST(test_foreign_setpoint_is_received_and_no_echo);
-    RUN_TEST(test_slow_release_shows_no_frame_twice);
-    RUN_TEST(test_overrun_of_the_controller_is_counted_once);
-    RUN_TEST(test_overrun_is_told_once_and_before_what_came_with_it);
-    RUN_TEST(test_full_ring_loses_the_newest_and_counts);
-    RUN_TEST(test_ring_goes_on_for_ever);
-    RUN_TEST(test_filters_do_not_depend_on_what_was_set_before);
-    RUN_TEST(test_filters_leave_the_banks_of_others_alone);
-    RUN_TEST(test_filters_fit_a_controller_with_14_banks);
-    RUN_TEST(test_receive_error_counter_goes_down_again);
-    return UNITY_END();
 }

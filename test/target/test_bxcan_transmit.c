@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Mailboxes, echoes, replacing and taking back: section 7.1, and the port's contract in iwheel/hal.h.
 #include "bxcan_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static brd_bxcan_t *const driver = &rig[0].driver;
 static bxcan_model_t *const model = &rig[0].model;
@@ -48,7 +48,7 @@ static void assert_no_echo(void) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
-static void test_frame_arrives_byte_for_byte(void) {
+TEST(test_frame_arrives_byte_for_byte) {
     const uint8_t bytes[8] = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08};
     iw_can_frame_t frame = {.id = 0x7FF, .dlc = 8};
     model_frame_t on_bus;
@@ -64,7 +64,7 @@ static void test_frame_arrives_byte_for_byte(void) {
     TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, on_bus.data, 8);
 }
 
-static void test_every_dlc_is_sent(void) {
+TEST(test_every_dlc_is_sent) {
     for (uint8_t dlc = 0; dlc <= 8; dlc++) {
         const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
         model_frame_t on_bus;
@@ -74,7 +74,7 @@ static void test_every_dlc_is_sent(void) {
     }
 }
 
-static void test_what_is_no_plain_data_frame_is_refused(void) {
+TEST(test_what_is_no_plain_data_frame_is_refused) {
     const iw_can_frame_t wrong[] = {
         {.id = 266U | IW_CAN_EXTENDED, .dlc = 5},
         {.id = 266U | IW_CAN_REMOTE, .dlc = 5},
@@ -88,7 +88,7 @@ static void test_what_is_no_plain_data_frame_is_refused(void) {
     assert_nothing_waits();
 }
 
-static void test_echo_comes_only_with_the_acknowledgement(void) {
+TEST(test_echo_comes_only_with_the_acknowledgement) {
     model_frame_t frame;
     TEST_ASSERT_EQUAL(1, send(266, 1));
     assert_no_echo();
@@ -103,7 +103,7 @@ static void test_echo_comes_only_with_the_acknowledgement(void) {
     assert_no_echo();
 }
 
-static void test_left_leaves_before_right_whatever_the_order(void) {
+TEST(test_left_leaves_before_right_whatever_the_order) {
     (void)send(298, 2);
     (void)send(266, 1);
     assert_on_bus(266, 1);
@@ -126,7 +126,7 @@ static int send_pair(uint8_t left_mark, uint8_t right_mark) {
     return brd_bxcan_send(driver, pair, 2);
 }
 
-static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
+TEST(test_pair_fills_both_mailboxes_before_it_requests_one) {
     writes = 0;
     rig[0].on_write = note_write;
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
@@ -144,7 +144,7 @@ static void test_pair_fills_both_mailboxes_before_it_requests_one(void) {
     assert_no_echo();
 }
 
-static void test_pair_takes_the_places_of_the_waiting_one(void) {
+TEST(test_pair_takes_the_places_of_the_waiting_one) {
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
     TEST_ASSERT_EQUAL(0, send_pair(5, 6));
@@ -158,7 +158,7 @@ static void test_pair_takes_the_places_of_the_waiting_one(void) {
     assert_no_echo();
 }
 
-static void test_pair_with_a_wrong_frame_is_refused_whole(void) {
+TEST(test_pair_with_a_wrong_frame_is_refused_whole) {
     const iw_can_frame_t left_wrong[] = {rig_frame(0x800, 1), rig_frame(298, 2)};
     const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, left_wrong, 2));
@@ -167,7 +167,7 @@ static void test_pair_with_a_wrong_frame_is_refused_whole(void) {
     assert_no_echo();
 }
 
-static void test_pair_whose_right_frame_finds_no_place_leaves_the_left_one(void) {
+TEST(test_pair_whose_right_frame_finds_no_place_leaves_the_left_one) {
     const iw_can_frame_t right = rig_frame(298, 2);
     (void)send(298, 1);
     (void)brd_bxcan_send(driver, &right, 1);
@@ -189,7 +189,7 @@ static bool send_all_at_masking(uint32_t offset) {
 }
 
 /// Both old frames get through while the new ones take their places: the first one's mailbox is free again for the second one.
-static void test_pair_finds_places_though_both_old_frames_leave_meanwhile(void) {
+TEST(test_pair_finds_places_though_both_old_frames_leave_meanwhile) {
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
     rig[0].on_read = send_all_at_masking;
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
@@ -205,7 +205,7 @@ static void test_pair_finds_places_though_both_old_frames_leave_meanwhile(void) 
     assert_no_echo();
 }
 
-static void test_call_places_no_more_frames_than_wheels(void) {
+TEST(test_call_places_no_more_frames_than_wheels) {
     const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
     TEST_ASSERT_EQUAL(2, brd_bxcan_send(driver, three, 3));
     assert_on_bus(266, 1);
@@ -213,7 +213,7 @@ static void test_call_places_no_more_frames_than_wheels(void) {
     assert_nothing_waits();
 }
 
-static void test_newer_frame_takes_the_place_of_the_waiting_one(void) {
+TEST(test_newer_frame_takes_the_place_of_the_waiting_one) {
     (void)send(266, 1);
     (void)send(298, 1);
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -226,7 +226,7 @@ static void test_newer_frame_takes_the_place_of_the_waiting_one(void) {
     assert_no_echo();
 }
 
-static void test_third_frame_of_an_id_must_wait_and_changes_nothing(void) {
+TEST(test_third_frame_of_an_id_must_wait_and_changes_nothing) {
     (void)send(298, 1);
     (void)send(298, 2);
     TEST_ASSERT_EQUAL(0, send(298, 3));
@@ -268,7 +268,7 @@ static void begin_first(void) {
     bxcan_model_begin(model, bxcan_model_offer(model, &frame));
 }
 
-static void test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo(void) {
+TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = end_frame_on_bus;
@@ -280,7 +280,7 @@ static void test_old_frame_that_gets_through_while_being_replaced_has_its_own_ec
     assert_no_echo();
 }
 
-static void test_old_frame_that_fails_while_being_replaced_never_comes(void) {
+TEST(test_old_frame_that_fails_while_being_replaced_never_comes) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = lose_frame_on_bus;
@@ -300,7 +300,7 @@ static void join_again(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(driver));
 }
 
-static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
+TEST(test_frame_that_never_ends_is_waited_for_with_a_bound) {
     (void)send(266, 1);
     begin_first();
     TEST_ASSERT_EQUAL(0, send(266, 2));
@@ -314,7 +314,7 @@ static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
     assert_no_echo();
 }
 
-static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus(void) {
+TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus) {
     (void)send(266, 1);
     (void)send(298, 1);
     begin_first();
@@ -332,7 +332,7 @@ static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_
 }
 
 /// Sent and confirmed, but the core has not asked for it yet when the other frame has to be purged by force.
-static void test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core(void) {
+TEST(test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core) {
     iw_can_frame_t echo;
     (void)send(266, 1);
     assert_on_bus(266, 1);
@@ -343,7 +343,7 @@ static void test_purge_that_resets_the_controller_keeps_echoes_of_before_from_th
     TEST_ASSERT_EQUAL(-1, brd_bxcan_receive(driver, &echo));
 }
 
-static void test_purge_of_a_controller_that_ignores_aborts_resets_it(void) {
+TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it) {
     (void)send(266, 1);
     model->abort_reads = UINT32_MAX;
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
@@ -354,7 +354,7 @@ static void test_purge_of_a_controller_that_ignores_aborts_resets_it(void) {
     TEST_ASSERT_EQUAL(1, driver->resets);
 }
 
-static void test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing(void) {
+TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing) {
     (void)send(266, 1);
     (void)send(298, 1);
     begin_first();
@@ -369,7 +369,7 @@ static void test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing(vo
 }
 
 /// ALST and TERR of an attempt stay readable after the abort of the mailbox: they are no echo, and no obstacle to the next frame.
-static void test_failed_attempts_before_an_abort_are_no_echo(void) {
+TEST(test_failed_attempts_before_an_abort_are_no_echo) {
     const model_end_t ends[] = {MODEL_LOST_ARBITRATION, MODEL_BIT_ERROR, MODEL_NO_ACKNOWLEDGEMENT};
     for (size_t i = 0; i < 3; i++) {
         model_frame_t frame;
@@ -387,7 +387,7 @@ static void test_failed_attempts_before_an_abort_are_no_echo(void) {
     }
 }
 
-static void test_slow_abort_is_awaited(void) {
+TEST(test_slow_abort_is_awaited) {
     model->abort_reads = 20;
     (void)send(266, 1);
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -395,7 +395,7 @@ static void test_slow_abort_is_awaited(void) {
     assert_nothing_waits();
 }
 
-static void test_fourth_frame_waits_for_a_free_mailbox(void) {
+TEST(test_fourth_frame_waits_for_a_free_mailbox) {
     (void)send(266, 1);
     (void)send(298, 1);
     TEST_ASSERT_EQUAL(1, send(300, 1));
@@ -404,7 +404,7 @@ static void test_fourth_frame_waits_for_a_free_mailbox(void) {
     TEST_ASSERT_EQUAL(1, send(301, 1));
 }
 
-static void test_purge_takes_everything_back(void) {
+TEST(test_purge_takes_everything_back) {
     (void)send(266, 1);
     (void)send(298, 1);
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
@@ -416,14 +416,14 @@ static void test_purge_takes_everything_back(void) {
     assert_no_echo();
 }
 
-static void test_echo_from_before_a_purge_never_comes(void) {
+TEST(test_echo_from_before_a_purge_never_comes) {
     (void)send(266, 1);
     assert_on_bus(266, 1);
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_no_echo();
 }
 
-static void test_purge_keeps_what_was_received(void) {
+TEST(test_purge_keeps_what_was_received) {
     iw_can_frame_t frame;
     (void)rig_hear(0, 256, 4);
     (void)brd_bxcan_purge(driver);
@@ -431,7 +431,7 @@ static void test_purge_keeps_what_was_received(void) {
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, frame.kind);
 }
 
-static void test_frame_that_completes_during_a_purge_has_no_echo_afterwards(void) {
+TEST(test_frame_that_completes_during_a_purge_has_no_echo_afterwards) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = end_frame_on_bus;
@@ -470,7 +470,7 @@ static void fill_mailboxes(void) {
     TEST_ASSERT_EQUAL(1, send(300, 1));
 }
 
-static void test_purge_of_three_full_mailboxes_empties_them_all(void) {
+TEST(test_purge_of_three_full_mailboxes_empties_them_all) {
     fill_mailboxes();
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(0, driver->resets);
@@ -479,7 +479,7 @@ static void test_purge_of_three_full_mailboxes_empties_them_all(void) {
     fill_mailboxes();
 }
 
-static void test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting(void) {
+TEST(test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
@@ -488,7 +488,7 @@ static void test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_w
     TEST_ASSERT_EQUAL(0, driver->resets);
 }
 
-static void test_completion_while_another_mailbox_is_withdrawn_is_not_lost(void) {
+TEST(test_completion_while_another_mailbox_is_withdrawn_is_not_lost) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -502,12 +502,12 @@ static void test_completion_while_another_mailbox_is_withdrawn_is_not_lost(void)
     TEST_ASSERT_EQUAL(1, send(298, 2));
 }
 
-static void test_purge_of_an_idle_device_succeeds(void) {
+TEST(test_purge_of_an_idle_device_succeeds) {
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
 }
 
-static void test_receive_of_a_stopped_device_is_broken(void) {
+TEST(test_receive_of_a_stopped_device_is_broken) {
     iw_can_frame_t frame;
     rig_init(0, false);
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_receive(driver, &frame));
@@ -516,7 +516,7 @@ static void test_receive_of_a_stopped_device_is_broken(void) {
 
 /// Random hands-over, transmissions, failures, purges: an echo with the bytes of each frame handed over, none without acknowledgement, and
 /// never an older frame after a newer one.
-static void test_random_traffic_keeps_the_account(void) {
+TEST(test_random_traffic_keeps_the_account) {
     uint32_t chance = 12345;
     uint8_t mark = 0;
     uint8_t newest_sent[2] = {0, 0};
@@ -569,42 +569,4 @@ static void test_random_traffic_keeps_the_account(void) {
             TEST_ASSERT_EQUAL(0, open[0] + open[1]);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_frame_arrives_byte_for_byte);
-    RUN_TEST(test_every_dlc_is_sent);
-    RUN_TEST(test_what_is_no_plain_data_frame_is_refused);
-    RUN_TEST(test_echo_comes_only_with_the_acknowledgement);
-    RUN_TEST(test_left_leaves_before_right_whatever_the_order);
-    RUN_TEST(test_pair_fills_both_mailboxes_before_it_requests_one);
-    RUN_TEST(test_pair_takes_the_places_of_the_waiting_one);
-    RUN_TEST(test_pair_with_a_wrong_frame_is_refused_whole);
-    RUN_TEST(test_pair_whose_right_frame_finds_no_place_leaves_the_left_one);
-    RUN_TEST(test_pair_finds_places_though_both_old_frames_leave_meanwhile);
-    RUN_TEST(test_call_places_no_more_frames_than_wheels);
-    RUN_TEST(test_newer_frame_takes_the_place_of_the_waiting_one);
-    RUN_TEST(test_third_frame_of_an_id_must_wait_and_changes_nothing);
-    RUN_TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo);
-    RUN_TEST(test_old_frame_that_fails_while_being_replaced_never_comes);
-    RUN_TEST(test_frame_that_never_ends_is_waited_for_with_a_bound);
-    RUN_TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus);
-    RUN_TEST(test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core);
-    RUN_TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it);
-    RUN_TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing);
-    RUN_TEST(test_failed_attempts_before_an_abort_are_no_echo);
-    RUN_TEST(test_slow_abort_is_awaited);
-    RUN_TEST(test_fourth_frame_waits_for_a_free_mailbox);
-    RUN_TEST(test_purge_takes_everything_back);
-    RUN_TEST(test_echo_from_before_a_purge_never_comes);
-    RUN_TEST(test_purge_keeps_what_was_received);
-    RUN_TEST(test_frame_that_completes_during_a_purge_has_no_echo_afterwards);
-    RUN_TEST(test_purge_of_three_full_mailboxes_empties_them_all);
-    RUN_TEST(test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting);
-    RUN_TEST(test_completion_while_another_mailbox_is_withdrawn_is_not_lost);
-    RUN_TEST(test_purge_of_an_idle_device_succeeds);
-    RUN_TEST(test_receive_of_a_stopped_device_is_broken);
-    RUN_TEST(test_random_traffic_keeps_the_account);
-    return UNITY_END();
 }

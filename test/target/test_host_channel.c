@@ -15,7 +15,7 @@ static void assert_channel_ends_with(const char *noise) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(IW_CLIENT_NONE, host.client[0].served.id, noise);
 }
 
-static void test_channel_opened_again_has_no_lease(void) {
+TEST(test_channel_opened_again_has_no_lease) {
     const iw_client_t before = host.client[0].served.id;
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);
@@ -25,15 +25,15 @@ static void test_channel_opened_again_has_no_lease(void) {
     assert_answer("{\"cmd\":\"hello\",\"id\":3}", "\"name\":\"iwheel-gateway\"");
 }
 
-static void test_channel_of_a_relay_that_sends_noise_ends(void) {
+TEST(test_channel_of_a_relay_that_sends_noise_ends) {
     assert_channel_ends_with("7f3a\n");
 }
 
-static void test_channel_of_a_relay_with_wrong_checksums_ends(void) {
+TEST(test_channel_of_a_relay_with_wrong_checksums_ends) {
     assert_channel_ends_with("0 {\"cmd\":\"alive\"}*00000000\n");
 }
 
-static void test_channel_of_a_relay_that_is_alive_stays(void) {
+TEST(test_channel_of_a_relay_that_is_alive_stays) {
     char line[IWN_LINE_BOARD_MAX];
     line[framed(0, "{\"cmd\":\"alive\"}", line)] = '\0';
     run_with_noise(2U * IWN_LINE_SILENT_MS, line);
@@ -62,13 +62,13 @@ static void drive_with_age(uint32_t age_ms) {
     run_ms(10);
 }
 
-static void test_command_older_than_a_short_lease_is_stale(void) {
+TEST(test_command_older_than_a_short_lease_is_stale) {
     start_with_lease(100);
     drive_with_age(150);
     TEST_ASSERT_EQUAL_UINT32(1, refused);
 }
 
-static void test_command_within_a_long_lease_is_not_stale(void) {
+TEST(test_command_within_a_long_lease_is_not_stale) {
     start_with_lease(450);
     drive_with_age(300);
     TEST_ASSERT_EQUAL_UINT32(0, refused);
@@ -83,7 +83,7 @@ static void run_until_listening(void) {
     TEST_ASSERT_TRUE(brd_host_is_silent(&host));
 }
 
-static void test_flash_is_not_written_while_an_arm_waits(void) {
+TEST(test_flash_is_not_written_while_an_arm_waits) {
     run_until_listening();
     say(0, "{\"cmd\":\"alive\"}");
     gateway_judge_renew(&rig.judge);
@@ -95,7 +95,7 @@ static void test_flash_is_not_written_while_an_arm_waits(void) {
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
 }
 
-static void test_take_of_two_lines_carries_out_one_a_time(void) {
+TEST(test_take_of_two_lines_carries_out_one_a_time) {
     say(1, "{\"cmd\":\"hello\",\"id\":1}");
     say(1, "{\"cmd\":\"hello\",\"id\":2}");
     answer[0] = '\0';
@@ -106,7 +106,7 @@ static void test_take_of_two_lines_carries_out_one_a_time(void) {
     TEST_ASSERT_FALSE(brd_host_take(&host, rig.now_us));
 }
 
-static void test_channel_that_only_watches_may_not_arm(void) {
+TEST(test_channel_that_only_watches_may_not_arm) {
     run_until_listening();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"arm\",\"id\":9}");
@@ -116,7 +116,7 @@ static void test_channel_that_only_watches_may_not_arm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-static void test_channel_closed_leaves_the_others(void) {
+TEST(test_channel_closed_leaves_the_others) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
     say(0, "{\"cmd\":\"close\",\"channel\":2}");
     run_ms(20);
@@ -140,7 +140,7 @@ static void assert_told(const char *part) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, part), part);
 }
 
-static void test_answers_that_wait_leave_a_place_for_an_arm(void) {
+TEST(test_answers_that_wait_leave_a_place_for_an_arm) {
     char part[64];
     run_until_listening();
     say(0, "{\"cmd\":\"alive\"}");
@@ -158,7 +158,7 @@ static void test_answers_that_wait_leave_a_place_for_an_arm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-static void test_answer_that_waits_for_a_closed_channel_frees_its_place(void) {
+TEST(test_answer_that_waits_for_a_closed_channel_frees_its_place) {
     all_length = 0;
     ask_for_status(2, 3);
     say(0, "{\"cmd\":\"close\",\"channel\":3}");
@@ -170,7 +170,7 @@ static void test_answer_that_waits_for_a_closed_channel_frees_its_place(void) {
     TEST_ASSERT_NULL(strstr(all, "\"id\":103"));
 }
 
-static void test_pending_place_is_of_one_client_and_one_request(void) {
+TEST(test_pending_place_is_of_one_client_and_one_request) {
     static brd_pending_t pool;
     const iwn_id_t one = {.kind = IWN_ID_NUMBER, .number = 1};
     const iwn_id_t two = {.kind = IWN_ID_NUMBER, .number = 2};
@@ -185,7 +185,7 @@ static void test_pending_place_is_of_one_client_and_one_request(void) {
     TEST_ASSERT_EQUAL_INT64(2, brd_pending_take(&pool, 5, IWN_CMD_STATUS)->number);
 }
 
-static void test_pending_pool_that_is_full_refuses_all_but_who_waits_already(void) {
+TEST(test_pending_pool_that_is_full_refuses_all_but_who_waits_already) {
     static brd_pending_t pool;
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 1};
     memset(&pool, 0, sizeof pool);
@@ -208,23 +208,4 @@ static void test_pending_pool_that_is_full_refuses_all_but_who_waits_already(voi
     TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, 1, IWN_CMD_STATUS)->number);
     TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, 1, IWN_CMD_ARM)->number);
     TEST_ASSERT_EQUAL_INT64(1, brd_pending_take(&pool, IWN_LINE_CHANNELS, IWN_CMD_STATUS)->number);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_channel_opened_again_has_no_lease);
-    RUN_TEST(test_channel_of_a_relay_that_sends_noise_ends);
-    RUN_TEST(test_channel_of_a_relay_with_wrong_checksums_ends);
-    RUN_TEST(test_channel_of_a_relay_that_is_alive_stays);
-    RUN_TEST(test_command_older_than_a_short_lease_is_stale);
-    RUN_TEST(test_command_within_a_long_lease_is_not_stale);
-    RUN_TEST(test_take_of_two_lines_carries_out_one_a_time);
-    RUN_TEST(test_channel_that_only_watches_may_not_arm);
-    RUN_TEST(test_channel_closed_leaves_the_others);
-    RUN_TEST(test_flash_is_not_written_while_an_arm_waits);
-    RUN_TEST(test_answers_that_wait_leave_a_place_for_an_arm);
-    RUN_TEST(test_answer_that_waits_for_a_closed_channel_frees_its_place);
-    RUN_TEST(test_pending_place_is_of_one_client_and_one_request);
-    RUN_TEST(test_pending_pool_that_is_full_refuses_all_but_who_waits_already);
-    return UNITY_END();
 }

@@ -35,7 +35,7 @@ static void disarm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void) {
+TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once) {
     disarm();
     watch_everything();
     estop_high = true;
@@ -62,7 +62,7 @@ static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void
     TEST_ASSERT_EQUAL_UINT(6, count_of("\"event\":\"fault\""));
 }
 
-static void test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others(void) {
+TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others) {
     char line[IWN_LINE_BOARD_MAX];
     watch_everything();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
@@ -81,7 +81,7 @@ static void test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refu
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "(gone)"), all);
 }
 
-static void test_host_zero_of_each_wheel_is_told_once_for_each_change(void) {
+TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change) {
     disarm();
     watch_everything();
     iw_snapshot_t seen = gateway_rig_look(&rig);
@@ -113,7 +113,7 @@ static void test_host_zero_of_each_wheel_is_told_once_for_each_change(void) {
     TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
 }
 
-static void test_host_word_on_an_item_is_compared_with_what_is_in_force(void) {
+TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force) {
     say(0, "{\"cmd\":\"alive\"}");
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
     say(0, "{\"cmd\":\"alive\"}");
@@ -122,7 +122,7 @@ static void test_host_word_on_an_item_is_compared_with_what_is_in_force(void) {
     assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
 }
 
-static void test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often(void) {
+TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often) {
     forget();
     for (unsigned i = 0; i < 10U; i++) {
         say(0, "{\"cmd\":\"alive\"}");
@@ -132,7 +132,7 @@ static void test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often
     TEST_ASSERT_UINT_WITHIN(2, 10, count_of("\"event\":\"link\""));
 }
 
-static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start(void) {
+TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start) {
     iw_assumption_state_t state;
     disarm();
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
@@ -157,7 +157,7 @@ static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_th
     TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.memory);
 }
 
-static void test_host_turn_is_refused_when_the_track_is_contradicted(void) {
+TEST(test_host_turn_is_refused_when_the_track_is_contradicted) {
     disarm();
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"700\"}", "\"contradicted\"");
     assert_answer("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":0,\"id\":2}", "\"error\":\"not_armed\"");
@@ -167,7 +167,7 @@ static void test_host_turn_is_refused_when_the_track_is_contradicted(void) {
     assert_answer("{\"cmd\":\"arm\",\"id\":5}", "\"error\":\"stale_command\""); // It wants to turn.
 }
 
-static void test_host_command_older_than_its_channel_is_stale(void) {
+TEST(test_host_command_older_than_its_channel_is_stale) {
     char json[256];
     (void)snprintf(json, sizeof json,
                    "{\"boot\":\"%016llx\",\"seq\":1,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":100,"
@@ -182,7 +182,7 @@ static void test_host_command_older_than_its_channel_is_stale(void) {
     TEST_ASSERT_EQUAL_UINT32(1, refused);
 }
 
-static void test_host_state_after_a_stall_comes_in_no_burst(void) {
+TEST(test_host_state_after_a_stall_comes_in_no_burst) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     pass(300);
@@ -205,7 +205,7 @@ static bool is_accepted(const iw_config_t *config) {
     return brd_settings_check(&settings, &why);
 }
 
-static void test_host_setting_out_of_its_range_is_refused(void) {
+TEST(test_host_setting_out_of_its_range_is_refused) {
     iw_config_t config = rig.config;
     TEST_ASSERT_TRUE(is_accepted(&config));
     config.gear_turns = 1000;
@@ -226,7 +226,7 @@ static void test_host_setting_out_of_its_range_is_refused(void) {
     TEST_ASSERT_FALSE(is_accepted(&config));
 }
 
-static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error(void) {
+TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error) {
     static const char *const good[] = {"{\"cmd\":\"alive\"}",
                                        "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}",
                                        "{\"cmd\":\"close\",\"channel\":2}",
@@ -261,7 +261,7 @@ static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an
     TEST_ASSERT_EQUAL_UINT32(2U + sizeof bad / sizeof bad[0] - 1U, host.errors);
 }
 
-static void test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was(void) {
+TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was) {
     watch_everything();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"watch\",\"topics\":[\"stop\"]}");
@@ -281,7 +281,7 @@ static void test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_go
     TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[1].served.id);
 }
 
-static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) {
+TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero) {
     host.zero[IW_LEFT] = (brd_assumptions_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
     host.zero[IW_RIGHT] = (brd_assumptions_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
     const iwn_surroundings_t around = iwn_target_around(&host.server, iwn_server_look(&host.server));
@@ -290,13 +290,13 @@ static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) 
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].deviation_mN);
 }
 
-static void test_host_restarts_only_if_it_was_asked_to(void) {
+TEST(test_host_restarts_only_if_it_was_asked_to) {
     TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
     host.restart_us = 1;
     TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
-static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(void) {
+TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it) {
     disarm();
     pass(1000);
     forget();
@@ -306,7 +306,7 @@ static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(voi
     TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_tell(&host, &seen, false));
 }
 
-static void test_host_hello_and_force_are_whole(void) {
+TEST(test_host_hello_and_force_are_whole) {
     forget();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
@@ -317,7 +317,7 @@ static void test_host_hello_and_force_are_whole(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(all, "\"event\":\"force\""), "\"left\":{"), all);
 }
 
-static void test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds(void) {
+TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds) {
     disarm();
     const iw_time_us_t silent_us = host.learn_us;
     TEST_ASSERT_TRUE(silent_us > rig.now_us - 2000000U && silent_us <= rig.now_us + 2000000U);
@@ -328,26 +328,4 @@ static void test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_
     host.learn_us = 0; // As after motion.
     pass(100);
     TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once);
-    RUN_TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others);
-    RUN_TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change);
-    RUN_TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force);
-    RUN_TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often);
-    RUN_TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start);
-    RUN_TEST(test_host_turn_is_refused_when_the_track_is_contradicted);
-    RUN_TEST(test_host_command_older_than_its_channel_is_stale);
-    RUN_TEST(test_host_state_after_a_stall_comes_in_no_burst);
-    RUN_TEST(test_host_setting_out_of_its_range_is_refused);
-    RUN_TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error);
-    RUN_TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was);
-    RUN_TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero);
-    RUN_TEST(test_host_restarts_only_if_it_was_asked_to);
-    RUN_TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it);
-    RUN_TEST(test_host_hello_and_force_are_whole);
-    RUN_TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds);
-    return UNITY_END();
 }

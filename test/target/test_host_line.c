@@ -87,7 +87,7 @@ static void put_hostile(void) {
     put("\n", random_below(2)); // Some run into the next line.
 }
 
-static void test_host_line_million_hostile_lines_none_is_obeyed(void) {
+TEST(test_host_line_million_hostile_lines_none_is_obeyed) {
     const char *const config = getenv("IWHEEL_HOSTILE_LINES");
     const uint32_t wanted = (config != NULL) ? (uint32_t)strtoul(config, NULL, 10) : 1000000U;
     uint32_t lines = 0;
@@ -116,7 +116,7 @@ static void test_host_line_million_hostile_lines_none_is_obeyed(void) {
     TEST_ASSERT_GREATER_THAN_UINT32(wanted / 60U / 4U, accepted);
 }
 
-static void test_host_line_errors_are_told_at_most_five_times_a_second(void) {
+TEST(test_host_line_errors_are_told_at_most_five_times_a_second) {
     for (uint32_t turn = 0; turn < 200U; turn++) {
         put("rubbish*00000000\n", 17);
         say(0, "{\"cmd\":\"alive\"}");
@@ -127,7 +127,7 @@ static void test_host_line_errors_are_told_at_most_five_times_a_second(void) {
 }
 
 /// The lease runs from the stamp that a command quotes, not from when it came.
-static void test_host_line_delayed_commands_lease_ends_from_their_stamp(void) {
+TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp) {
     char line[IWN_LINE_BOARD_MAX];
     const uint64_t stamp_us = t_us;
     run_ms(150);
@@ -141,7 +141,7 @@ static void test_host_line_delayed_commands_lease_ends_from_their_stamp(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
 }
 
-static void test_host_answers_tell_what_was_asked_and_what_became_of_it(void) {
+TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it) {
     gateway_judge_renew(&rig.judge);
     say(0, "{\"cmd\":\"alive\"}");
     assert_answer("{\"cmd\":\"hello\",\"id\":1}", "\"name\":\"iwheel-gateway\"");
@@ -155,7 +155,7 @@ static void test_host_answers_tell_what_was_asked_and_what_became_of_it(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(heard, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), heard);
 }
 
-static void test_host_answer_to_arm_comes_when_it_is_armed(void) {
+TEST(test_host_answer_to_arm_comes_when_it_is_armed) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
     say(1, "{\"cmd\":\"stop\"}");
     for (unsigned i = 0; i < 10U; i++) {
@@ -187,7 +187,7 @@ static void assert_aged(const char *cmd, int64_t age_ms, const char *part) {
     assert_answer(json, part);
 }
 
-static void test_one_person_board_refuses_what_is_too_old(void) {
+TEST(test_one_person_board_refuses_what_is_too_old) {
     static const int64_t late_ms[] = {1100, 10000, 60000, -200};
     assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
     wait_ms(2500);
@@ -206,7 +206,7 @@ static void test_one_person_board_refuses_what_is_too_old(void) {
     TEST_ASSERT_NULL_MESSAGE(strstr(answer, "key"), "a board has no random numbers");
 }
 
-static void test_one_person_board_reset_of_another_stop_is_refused(void) {
+TEST(test_one_person_board_reset_of_another_stop_is_refused) {
     assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
     wait_ms(2500);
     say(0, "{\"cmd\":\"alive\"}");
@@ -219,7 +219,7 @@ static void test_one_person_board_reset_of_another_stop_is_refused(void) {
 }
 
 /// Row 7: refused for its quote or its key, a command still shows that somebody wants motion.
-static void test_one_person_board_refused_drive_is_a_deflected_stick(void) {
+TEST(test_one_person_board_refused_drive_is_a_deflected_stick) {
     static const char *const refused_for[] = {"\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777",
                                               "\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777,\"key\":\"00\"",
                                               "\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0"};
@@ -238,7 +238,7 @@ static void test_one_person_board_refused_drive_is_a_deflected_stick(void) {
     }
 }
 
-static void test_host_twist_turns_the_right_wheel_faster(void) {
+TEST(test_host_twist_turns_the_right_wheel_faster) {
     char line[IWN_LINE_BOARD_MAX];
     char json[256];
     gateway_judge_asked(&rig.judge, true);
@@ -253,7 +253,7 @@ static void test_host_twist_turns_the_right_wheel_faster(void) {
     TEST_ASSERT_GREATER_THAN_INT(rig.bus.commanded_mm_s[IW_LEFT] + 20, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall(void) {
+TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall) {
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     states = 0;
     for (unsigned i = 0; i < 10U; i++) {
@@ -261,19 +261,4 @@ static void test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall(void
         run_ms(100);
     }
     TEST_ASSERT_UINT_WITHIN(3, 10, states);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_host_line_million_hostile_lines_none_is_obeyed);
-    RUN_TEST(test_host_line_errors_are_told_at_most_five_times_a_second);
-    RUN_TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp);
-    RUN_TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it);
-    RUN_TEST(test_host_answer_to_arm_comes_when_it_is_armed);
-    RUN_TEST(test_one_person_board_refuses_what_is_too_old);
-    RUN_TEST(test_one_person_board_reset_of_another_stop_is_refused);
-    RUN_TEST(test_one_person_board_refused_drive_is_a_deflected_stick);
-    RUN_TEST(test_host_twist_turns_the_right_wheel_faster);
-    RUN_TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall);
-    return UNITY_END();
 }

@@ -30,42 +30,42 @@ static void watch(const char *topics) {
     forget();
 }
 
-static void test_host_why_names_cause_and_has_no_recording(void) {
+TEST(test_host_why_names_cause_and_has_no_recording) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     ask("{\"cmd\":\"why\",\"id\":2}", "\"cause\":\"client_stop\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"recording\":null"), answer);
 }
 
-static void test_host_reset_before_its_time_is_refused(void) {
+TEST(test_host_reset_before_its_time_is_refused) {
     ask("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
     ask("{\"cmd\":\"reset\",\"id\":2,\"stop\":1}", "\"id\":2,\"ok\":false");
 }
 
-static void test_host_confirmed_item_has_all_its_members(void) {
+TEST(test_host_confirmed_item_has_all_its_members) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"dlc\",\"value\":\"yes\"}", "\"state\":\"confirmed\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(
         strstr(answer, "\"found\":null,\"how\":null,\"since_wall_us\":null,\"reason\":null,\"disabled\":null}"),
         answer);
 }
 
-static void test_host_staged_keys_stay_when_they_are_read(void) {
+TEST(test_host_staged_keys_stay_when_they_are_read) {
     ask("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.radius_mm\",\"value\":\"200\"}", "\"staged\":true");
     ask("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "{\"key\":\"wheels.radius_mm\",\"value\":\"200\"},{\"key\":"), answer);
     ask("{\"cmd\":\"config\",\"id\":3,\"commit\":false}", "\"staged\":false");
 }
 
-static void test_host_role_of_the_current_is_read_as_a_word(void) {
+TEST(test_host_role_of_the_current_is_read_as_a_word) {
     ask("{\"cmd\":\"config\",\"id\":1}", "{\"key\":\"wheels.current_role\",\"value\":\"limit\"}");
 }
 
-static void test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first(void) {
+TEST(test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first) {
     ask("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.radius_mm\",\"value\":\"1\"}", " must be 60 to 400");
     ask("{\"cmd\":\"config\",\"id\":2,\"key\":\"limits.rest_rpm\",\"value\":\"9\"}", "\"staged\":true");
     ask("{\"cmd\":\"config\",\"id\":3,\"commit\":true}", "set it to 2 first");
 }
 
-static void test_host_lease_that_ends_is_told_once(void) {
+TEST(test_host_lease_that_ends_is_told_once) {
     watch("\"lease\"");
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
@@ -77,7 +77,7 @@ static void test_host_lease_that_ends_is_told_once(void) {
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
 }
 
-static void test_host_state_that_changes_is_told_at_once(void) {
+TEST(test_host_state_that_changes_is_told_at_once) {
     watch("\"state\"");
     pass(1100); // What comes at its rate has come.
     forget();
@@ -85,13 +85,13 @@ static void test_host_state_that_changes_is_told_at_once(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"state\""), all);
 }
 
-static void test_host_item_that_changes_is_told(void) {
+TEST(test_host_item_that_changes_is_told) {
     watch("\"state\"");
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"dlc\",\"value\":\"no\"}", "\"state\":\"contradicted\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"ledger\""), all);
 }
 
-static void test_host_link_line_comes_at_its_second_and_not_later(void) {
+TEST(test_host_link_line_comes_at_its_second_and_not_later) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     pass(2500);
     iw_snapshot_t seen = gateway_rig_look(&rig);
@@ -115,7 +115,7 @@ static void press(iw_side_t side, uint32_t span_ms) {
     }
 }
 
-static void test_host_tare_of_one_wheel_is_that_wheels_zero(void) {
+TEST(test_host_tare_of_one_wheel_is_that_wheels_zero) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     press(IW_LEFT, 4000);
     ask("{\"cmd\":\"tare\",\"id\":2,\"side\":\"left\"}", "\"left\":{");
@@ -127,7 +127,7 @@ static void test_host_tare_of_one_wheel_is_that_wheels_zero(void) {
     TEST_ASSERT_EQUAL_UINT32(0, around.zero[IW_RIGHT].samples);
 }
 
-static void test_host_first_item_is_kept_like_the_others(void) {
+TEST(test_host_first_item_is_kept_like_the_others) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
     const iw_snapshot_t seen = gateway_rig_look(&rig);
     brd_assumptions_t learned;
@@ -135,7 +135,7 @@ static void test_host_first_item_is_kept_like_the_others(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, learned.item[IW_ASSUMPTION_SETPOINT_TYPE] & 0x0FU);
 }
 
-static void test_host_counts_its_channels_and_nothing_behind_them(void) {
+TEST(test_host_counts_its_channels_and_nothing_behind_them) {
     memset(&host.pending, 0xFF, sizeof host.pending);
     memset(&host.receiver, 0xFF, sizeof host.receiver);
     memset(host.in, 0xFF, sizeof host.in);
@@ -143,27 +143,8 @@ static void test_host_counts_its_channels_and_nothing_behind_them(void) {
     TEST_ASSERT_EQUAL_UINT32(1, iwn_target_around(&host.server, &seen).clients);
 }
 
-static void test_host_line_has_room_for_what_stands_around_its_json(void) {
+TEST(test_host_line_has_room_for_what_stands_around_its_json) {
     const iwn_out_t json = iwn_server_begin_event(&host.server, "link");
     TEST_ASSERT_EQUAL_PTR(&host.scratch.small[IWN_LINE_PREFIX], json.data);
     TEST_ASSERT_EQUAL_UINT32(BRD_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_host_why_names_cause_and_has_no_recording);
-    RUN_TEST(test_host_reset_before_its_time_is_refused);
-    RUN_TEST(test_host_confirmed_item_has_all_its_members);
-    RUN_TEST(test_host_staged_keys_stay_when_they_are_read);
-    RUN_TEST(test_host_role_of_the_current_is_read_as_a_word);
-    RUN_TEST(test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first);
-    RUN_TEST(test_host_lease_that_ends_is_told_once);
-    RUN_TEST(test_host_state_that_changes_is_told_at_once);
-    RUN_TEST(test_host_item_that_changes_is_told);
-    RUN_TEST(test_host_link_line_comes_at_its_second_and_not_later);
-    RUN_TEST(test_host_tare_of_one_wheel_is_that_wheels_zero);
-    RUN_TEST(test_host_first_item_is_kept_like_the_others);
-    RUN_TEST(test_host_counts_its_channels_and_nothing_behind_them);
-    RUN_TEST(test_host_line_has_room_for_what_stands_around_its_json);
-    return UNITY_END();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "lamp.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -14,14 +14,12 @@ void setUp(void) {
     seen.bus = IW_BUS_ACTIVE;
 }
 
-void tearDown(void) {}
-
 static uint16_t pattern_in(iw_state_t state) {
     seen.state = state;
     return brd_lamp_pattern(&seen, false);
 }
 
-static void test_each_state_has_its_own_pattern(void) {
+TEST(test_each_state_has_its_own_pattern) {
     const uint16_t patterns[] = {pattern_in(IW_STATE_LISTENING),
                                  pattern_in(IW_STATE_ARMED),
                                  pattern_in(IW_STATE_STOPPING),
@@ -37,14 +35,14 @@ static void test_each_state_has_its_own_pattern(void) {
     }
 }
 
-static void test_pressed_contact_shows_before_any_state(void) {
+TEST(test_pressed_contact_shows_before_any_state) {
     for (int state = IW_STATE_LISTENING; state <= IW_STATE_LATCHED; state++) {
         (void)pattern_in((iw_state_t)state);
         TEST_ASSERT_EQUAL_HEX16(BRD_LAMP_ESTOP, brd_lamp_pattern(&seen, true));
     }
 }
 
-static void test_listening_tells_whether_the_bus_is_there(void) {
+TEST(test_listening_tells_whether_the_bus_is_there) {
     for (int bus = IW_BUS_DOWN; bus <= IW_BUS_ACTIVE; bus++) {
         seen.bus = (iw_bus_state_t)bus;
         TEST_ASSERT_EQUAL_HEX16((bus < IW_BUS_PASSIVE) ? BRD_LAMP_NO_BUS : BRD_LAMP_LISTENING,
@@ -52,7 +50,7 @@ static void test_listening_tells_whether_the_bus_is_there(void) {
     }
 }
 
-static void test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second(void) {
+TEST(test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second) {
     for (uint32_t slot = 0; slot < 16; slot++) {
         for (uint32_t second = 0; second < 3; second++) {
             const iw_time_us_t at_us = second * 1000000U + slot * BRD_LAMP_SLOT_US;
@@ -60,13 +58,4 @@ static void test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second(v
             TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, brd_lamp_is_lit(0x1234U, at_us + BRD_LAMP_SLOT_US - 1U));
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_each_state_has_its_own_pattern);
-    RUN_TEST(test_pressed_contact_shows_before_any_state);
-    RUN_TEST(test_listening_tells_whether_the_bus_is_there);
-    RUN_TEST(test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second);
-    return UNITY_END();
 }

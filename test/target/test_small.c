@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // small.c against the library of this machine, under other names.
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -35,10 +35,7 @@ static int sign(int value) {
     return (value > 0) - (value < 0);
 }
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void test_small_memory_is_that_of_the_library(void) {
+TEST(test_small_memory_is_that_of_the_library) {
     for (unsigned i = 0; i < 20000U; i++) {
         uint8_t mine[SIZE];
         uint8_t theirs[SIZE];
@@ -59,7 +56,7 @@ static void test_small_memory_is_that_of_the_library(void) {
     }
 }
 
-static void test_small_texts_are_those_of_the_library(void) {
+TEST(test_small_texts_are_those_of_the_library) {
     for (unsigned i = 0; i < 20000U; i++) {
         char texts[2][SIZE] = {{0}};
         for (size_t at = 0; at < SIZE - 1U; at++) {
@@ -77,7 +74,7 @@ static void test_small_texts_are_those_of_the_library(void) {
     }
 }
 
-static void test_small_division_is_that_of_this_machine(void) {
+TEST(test_small_division_is_that_of_this_machine) {
     static const uint64_t corners[] = {
         0,         1,     2,          3,          10,          999,         1000,
         65535,     65536, 1000000000, UINT32_MAX, 1ULL << 32U, 1ULL << 63U, UINT64_MAX - 1U,
@@ -92,12 +89,4 @@ static void test_small_division_is_that_of_this_machine(void) {
         TEST_ASSERT_EQUAL_UINT64((divisor == 0U) ? 0U : number % divisor, rest);
         TEST_ASSERT_EQUAL_UINT64(quotient, small_divide(number, divisor, NULL));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_small_memory_is_that_of_the_library);
-    RUN_TEST(test_small_texts_are_those_of_the_library);
-    RUN_TEST(test_small_division_is_that_of_this_machine);
-    return UNITY_END();
 }

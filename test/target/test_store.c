@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The records in flash, on a flash that is cut off from power after any number of writes and erasures.
-#include "unity.h"
+#include "unit.h"
 
 #include "flash.h"
 #include "store.h"
@@ -53,8 +53,6 @@ void setUp(void) {
     torn_by = 0;
 }
 
-void tearDown(void) {}
-
 static void fill(uint32_t payload[BRD_STORE_WORDS], uint32_t number) {
     for (uint32_t word = 0; word < BRD_STORE_WORDS; word++) {
         payload[word] = number * 2654435761U + word * 40503U;
@@ -85,13 +83,13 @@ static bool write(brd_store_t *store, uint32_t number, bool may_erase) {
     return brd_store_write(store, payload, may_erase);
 }
 
-static void test_store_blank_flash_has_no_record(void) {
+TEST(test_store_blank_flash_has_no_record) {
     brd_store_t store;
     TEST_ASSERT_EQUAL_UINT32(0, newest(&store));
     TEST_ASSERT_EQUAL_UINT(4, brd_store_blank(&store));
 }
 
-static void test_store_each_record_is_the_newest(void) {
+TEST(test_store_each_record_is_the_newest) {
     brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 50U; number++) {
@@ -102,7 +100,7 @@ static void test_store_each_record_is_the_newest(void) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT(25, erasures);
 }
 
-static void test_store_without_erasing_full_page_refuses_and_keeps(void) {
+TEST(test_store_without_erasing_full_page_refuses_and_keeps) {
     brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 4U; number++) {
@@ -115,7 +113,7 @@ static void test_store_without_erasing_full_page_refuses_and_keeps(void) {
 }
 
 /// One record after another with a cut after every operation of each, and whatever bits of the last one got through.
-static void test_store_cut_at_any_instant_leaves_old_or_new(void) {
+TEST(test_store_cut_at_any_instant_leaves_old_or_new) {
     static const uint32_t torn[] = {0, 0x0000FFFF, 0xFFFF0000, 0x55555555, UINT32_MAX};
     for (unsigned way = 0; way < sizeof torn / sizeof torn[0]; way++) {
         brd_store_t store;
@@ -138,7 +136,7 @@ static void test_store_cut_at_any_instant_leaves_old_or_new(void) {
     }
 }
 
-static void test_store_flipped_bit_falls_back_to_the_record_before(void) {
+TEST(test_store_flipped_bit_falls_back_to_the_record_before) {
     brd_store_t store;
     (void)newest(&store);
     TEST_ASSERT_TRUE(write(&store, 1, true));
@@ -150,14 +148,4 @@ static void test_store_flipped_bit_falls_back_to_the_record_before(void) {
         TEST_ASSERT_EQUAL_UINT32(1, newest(&again));
         *word ^= 1U << bit % 32U;
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_store_blank_flash_has_no_record);
-    RUN_TEST(test_store_each_record_is_the_newest);
-    RUN_TEST(test_store_without_erasing_full_page_refuses_and_keeps);
-    RUN_TEST(test_store_cut_at_any_instant_leaves_old_or_new);
-    RUN_TEST(test_store_flipped_bit_falls_back_to_the_record_before);
-    return UNITY_END();
 }

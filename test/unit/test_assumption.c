@@ -4,7 +4,7 @@
 
 #include "iwheel_northbound/words.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -25,8 +25,6 @@ void setUp(void) {
     config.rpm_of_rotor = true;
 }
 
-void tearDown(void) {}
-
 static void assert_value(iw_assumption_item_t item, const char *expected) {
     char value[IWN_VALUE_SIZE];
     memset(value, 0x5A, sizeof value);
@@ -38,7 +36,7 @@ static void assert_found(inspect_found_t expected, iw_assumption_item_t item, co
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected, inspect_assumption_compare(&configured, item, found), found);
 }
 
-static void test_assumption_values_are_those_of_the_configuration(void) {
+TEST(test_assumption_values_are_those_of_the_configuration) {
     assert_value(IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_value(IW_ASSUMPTION_CURRENT_ROLE, "setpoint");
     assert_value(IW_ASSUMPTION_FORCE_UNIT_LEFT, "cN");
@@ -56,13 +54,13 @@ static void test_assumption_values_are_those_of_the_configuration(void) {
     assert_value(IW_ASSUMPTION_GEAR_RATIO, "1, rpm of the wheel");
 }
 
-static void test_assumption_longest_values_fit(void) {
+TEST(test_assumption_longest_values_fit) {
     config.gear_turns = 1000;
     config.gear_per = 999;
     assert_value(IW_ASSUMPTION_GEAR_RATIO, "1000/999, rpm of the rotor");
 }
 
-static void test_assumption_every_item_is_found_by_its_name_and_nothing_else_is(void) {
+TEST(test_assumption_every_item_is_found_by_its_name_and_nothing_else_is) {
     for (unsigned n = 0; n < IW_ASSUMPTION_ITEMS; n++) {
         iw_assumption_item_t item = IW_ASSUMPTION_ITEMS;
         TEST_ASSERT_TRUE(iwn_assumption_item_of(iwn_assumption_item_name((iw_assumption_item_t)n), &item));
@@ -75,20 +73,20 @@ static void test_assumption_every_item_is_found_by_its_name_and_nothing_else_is(
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, item);
 }
 
-static void test_assumption_without_a_value_the_configured_one_is_meant(void) {
+TEST(test_assumption_without_a_value_the_configured_one_is_meant) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         assert_found(INSPECT_FOUND_SAME, (iw_assumption_item_t)item, "");
     }
 }
 
-static void test_assumption_what_is_not_configured_cannot_be_confirmed(void) {
+TEST(test_assumption_what_is_not_configured_cannot_be_confirmed) {
     iw_config_default(&config);
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "");
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_CURRENT_ROLE, "limit");
 }
 
-static void test_assumption_numbers_are_compared_as_numbers(void) {
+TEST(test_assumption_numbers_are_compared_as_numbers) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "007");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_SETPOINT_TYPE, "0");
@@ -99,7 +97,7 @@ static void test_assumption_numbers_are_compared_as_numbers(void) {
     }
 }
 
-static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
+TEST(test_assumption_a_radius_within_two_percent_is_the_same) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "192");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "195");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "189");
@@ -110,7 +108,7 @@ static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_WHEEL_RADIUS, "19");
 }
 
-static void test_assumption_a_track_within_two_percent_is_the_same(void) {
+TEST(test_assumption_a_track_within_two_percent_is_the_same) {
     configured.track_mm = 600;
     assert_value(IW_ASSUMPTION_TRACK, "600");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_TRACK, "600");
@@ -123,7 +121,7 @@ static void test_assumption_a_track_within_two_percent_is_the_same(void) {
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_TRACK, "199");
 }
 
-static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
+TEST(test_assumption_gear_ratios_are_compared_as_ratios) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "10/3");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "20/6");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_GEAR_RATIO, "10");
@@ -135,7 +133,7 @@ static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
     }
 }
 
-static void test_assumption_words_are_compared_as_words(void) {
+TEST(test_assumption_words_are_compared_as_words) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "dN");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "cN");
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "DN");
@@ -147,7 +145,7 @@ static void test_assumption_words_are_compared_as_words(void) {
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_OFFSET_INCLUDED, "no");
 }
 
-static void test_assumption_evidence_tells_the_figure(void) {
+TEST(test_assumption_evidence_tells_the_figure) {
     const inspect_word_t word = {"", ""};
     iw_assumption_entry_t entry = {IW_CONTRADICTED, IW_SOURCE_BUS, -1010};
     inspect_assumption_source(IW_ASSUMPTION_FORCE_UNIT_LEFT, &entry, &word, text);
@@ -172,19 +170,19 @@ static void assert_word(iw_assumption_state_t state, const char *found, const ch
     TEST_ASSERT_EQUAL_STRING(expected, text);
 }
 
-static void test_assumption_evidence_tells_what_the_operator_found(void) {
+TEST(test_assumption_evidence_tells_what_the_operator_found) {
     assert_word(IW_CONTRADICTED, "181", "", "the operator found 181");
     assert_word(IW_CONTRADICTED, "", "", "the operator found something else");
     assert_word(IW_CONFIRMED, "192", "", "the operator says so");
 }
 
-static void test_assumption_evidence_tells_how_the_operator_found_it(void) {
+TEST(test_assumption_evidence_tells_how_the_operator_found_it) {
     assert_word(IW_CONFIRMED, "192", "bringup: 5.00 m pushed", "found by bringup: 5.00 m pushed");
     assert_word(IW_CONTRADICTED, "181", "a tape", "the operator found 181 by a tape");
     assert_word(IW_CONTRADICTED, "", "a tape", "the operator found something else by a tape");
 }
 
-static void test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm(void) {
+TEST(test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         const char *cost = inspect_assumption_cost((iw_assumption_item_t)item);
         const bool refuses = strncmp(cost, "arm is refused; ", 16) == 0;
@@ -193,23 +191,4 @@ static void test_assumption_every_contradiction_names_its_cost_and_those_of_moti
     }
     TEST_ASSERT_TRUE(iw_assumption_guards_motion(IW_ASSUMPTION_MOUNT_SIGN_LEFT));
     TEST_ASSERT_FALSE(iw_assumption_guards_motion(IW_ASSUMPTION_DLC));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_assumption_values_are_those_of_the_configuration);
-    RUN_TEST(test_assumption_longest_values_fit);
-    RUN_TEST(test_assumption_every_item_is_found_by_its_name_and_nothing_else_is);
-    RUN_TEST(test_assumption_without_a_value_the_configured_one_is_meant);
-    RUN_TEST(test_assumption_what_is_not_configured_cannot_be_confirmed);
-    RUN_TEST(test_assumption_numbers_are_compared_as_numbers);
-    RUN_TEST(test_assumption_a_radius_within_two_percent_is_the_same);
-    RUN_TEST(test_assumption_a_track_within_two_percent_is_the_same);
-    RUN_TEST(test_assumption_gear_ratios_are_compared_as_ratios);
-    RUN_TEST(test_assumption_words_are_compared_as_words);
-    RUN_TEST(test_assumption_evidence_tells_the_figure);
-    RUN_TEST(test_assumption_evidence_tells_what_the_operator_found);
-    RUN_TEST(test_assumption_evidence_tells_how_the_operator_found_it);
-    RUN_TEST(test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm);
-    return UNITY_END();
 }

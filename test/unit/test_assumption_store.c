@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "iwheel/private/assumption_store.h"
-#include "unity.h"
+#include "unit.h"
 
 #define POISON 0xA5
 
@@ -14,8 +14,6 @@ void setUp(void) {
     iw_assumption_init(&assumptions);
 }
 
-void tearDown(void) {}
-
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source, int32_t figure) {
     const iw_assumption_entry_t *entry = iw_assumption_entry(&assumptions, item);
     TEST_ASSERT_EQUAL_INT(state, entry->state);
@@ -23,7 +21,7 @@ static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state,
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
 }
 
-static void test_init_assumes_everything_and_tells_what_the_document_says(void) {
+TEST(test_init_assumes_everything_and_tells_what_the_document_says) {
     static const iw_source_t origin[IW_ASSUMPTION_ITEMS] = {
         [IW_ASSUMPTION_FORCE_UNIT_LEFT] = IW_SOURCE_DOCUMENT,
         [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = IW_SOURCE_DOCUMENT,
@@ -40,11 +38,11 @@ static void test_init_assumes_everything_and_tells_what_the_document_says(void) 
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions.doubt);
 }
 
-static void test_there_are_fourteen_items(void) {
+TEST(test_there_are_fourteen_items) {
     TEST_ASSERT_EQUAL_INT(14, IW_ASSUMPTION_ITEMS);
 }
 
-static void test_assume_tells_where_an_assumption_comes_from(void) {
+TEST(test_assume_tells_where_an_assumption_comes_from) {
     iw_assumption_assume(&assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION, 0);
     TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
@@ -54,48 +52,48 @@ static void test_assume_tells_where_an_assumption_comes_from(void) {
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_NONE, 0);
 }
 
-static void test_confirm_from_bus_lifts_no_contradiction(void) {
+TEST(test_confirm_from_bus_lifts_no_contradiction) {
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 1010);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 9980);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONTRADICTED, IW_SOURCE_BUS, 1010);
     TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
 }
 
-static void test_confirm_by_operator_lifts_a_contradiction(void) {
+TEST(test_confirm_by_operator_lifts_a_contradiction) {
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 1010);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_OPERATOR, 0);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_UINT32(2, assumptions.changes);
 }
 
-static void test_confirm_from_bus_does_not_replace_the_operators_word(void) {
+TEST(test_confirm_from_bus_does_not_replace_the_operators_word) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_OPERATOR, 0);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_BUS, 77);
     assert_entry(IW_ASSUMPTION_WHEEL_RADIUS, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
 }
 
-static void test_confirm_by_operator_replaces_evidence_of_the_bus(void) {
+TEST(test_confirm_by_operator_replaces_evidence_of_the_bus) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_BUS, 120);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_BUS, 120);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_OPERATOR, 0);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
 }
 
-static void test_contradict_ends_every_confirmation_even_the_operators(void) {
+TEST(test_contradict_ends_every_confirmation_even_the_operators) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_BUS, -120);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONTRADICTED, IW_SOURCE_BUS, -120);
 }
 
-static void test_contradict_keeps_the_extremes_of_its_figure(void) {
+TEST(test_contradict_keeps_the_extremes_of_its_figure) {
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_BUS, INT32_MIN);
     assert_entry(IW_ASSUMPTION_DLC, IW_CONTRADICTED, IW_SOURCE_BUS, INT32_MIN);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_OPERATOR, INT32_MAX);
     assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_OPERATOR, INT32_MAX);
 }
 
-static void test_items_do_not_touch_each_other(void) {
+TEST(test_items_do_not_touch_each_other) {
     for (int touched = 0; touched < IW_ASSUMPTION_ITEMS; touched++) {
         setUp();
         const iw_assumption_store_t before = assumptions;
@@ -174,24 +172,8 @@ static void walk(uint32_t path, unsigned length) {
     }
 }
 
-static void test_every_sequence_of_six_operations_keeps_to_the_diagram(void) {
+TEST(test_every_sequence_of_six_operations_keeps_to_the_diagram) {
     for (uint32_t path = 0; path < 46656; path++) {
         walk(path, 6);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_init_assumes_everything_and_tells_what_the_document_says);
-    RUN_TEST(test_there_are_fourteen_items);
-    RUN_TEST(test_assume_tells_where_an_assumption_comes_from);
-    RUN_TEST(test_confirm_from_bus_lifts_no_contradiction);
-    RUN_TEST(test_confirm_by_operator_lifts_a_contradiction);
-    RUN_TEST(test_confirm_from_bus_does_not_replace_the_operators_word);
-    RUN_TEST(test_confirm_by_operator_replaces_evidence_of_the_bus);
-    RUN_TEST(test_contradict_ends_every_confirmation_even_the_operators);
-    RUN_TEST(test_contradict_keeps_the_extremes_of_its_figure);
-    RUN_TEST(test_items_do_not_touch_each_other);
-    RUN_TEST(test_every_sequence_of_six_operations_keeps_to_the_diagram);
-    return UNITY_END();
 }

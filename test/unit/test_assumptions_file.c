@@ -4,7 +4,7 @@
 
 #include "iwheel_northbound/words.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -73,8 +73,6 @@ void setUp(void) {
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
 }
 
-void tearDown(void) {}
-
 static void refused(const char *why) {
     const gw_stored_t before = got;
     TEST_ASSERT_FALSE(gw_assumptions_file_read(text, length, BUS, &got, reason));
@@ -103,13 +101,13 @@ static void assert_same(void) {
     }
 }
 
-static void test_memory_what_is_written_is_read_back_even_at_its_extremes(void) {
+TEST(test_memory_what_is_written_is_read_back_even_at_its_extremes) {
     TEST_ASSERT_GREATER_THAN_UINT(0, length);
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
     assert_same();
 }
 
-static void test_memory_with_every_item_at_its_longest_fits(void) {
+TEST(test_memory_with_every_item_at_its_longest_fits) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         fill_item(item);
     }
@@ -119,21 +117,21 @@ static void test_memory_with_every_item_at_its_longest_fits(void) {
     assert_same();
 }
 
-static void test_memory_of_nothing_is_a_memory(void) {
+TEST(test_memory_of_nothing_is_a_memory) {
     memset(&known, 0, sizeof known);
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
     assert_same();
 }
 
-static void test_memory_too_small_a_buffer_gives_nothing(void) {
+TEST(test_memory_too_small_a_buffer_gives_nothing) {
     char guarded[200];
     memset(guarded, 0x5A, sizeof guarded);
     TEST_ASSERT_EQUAL_UINT(0, gw_assumptions_file_write(&known, BUS, guarded, 100));
     TEST_ASSERT_EQUAL_HEX8(0x5A, guarded[100]);
 }
 
-static void test_memory_every_single_flipped_bit_is_damage(void) {
+TEST(test_memory_every_single_flipped_bit_is_damage) {
     for (size_t bit = 0; bit < length * 8U; bit++) {
         text[bit / 8U] = (char)(text[bit / 8U] ^ (1 << (bit % 8U)));
         TEST_ASSERT_FALSE(gw_assumptions_file_read(text, length, BUS, &got, reason));
@@ -142,7 +140,7 @@ static void test_memory_every_single_flipped_bit_is_damage(void) {
     TEST_ASSERT_TRUE(gw_assumptions_file_read(text, length, BUS, &got, reason));
 }
 
-static void test_memory_every_shorter_or_longer_text_is_damage(void) {
+TEST(test_memory_every_shorter_or_longer_text_is_damage) {
     const size_t whole = length;
     for (length = 0; length < whole; length++) {
         refused("damaged");
@@ -167,7 +165,7 @@ static void forge(const char *body) {
 #define LONG "123456789012345678901234567890123456789012345678901234567890"
 #define HEAD "{\"format\":\"iwheel-ledger\",\"version\":1,\"bus\":\"unix:/tmp/\\\"a\\\" b/bus\","
 
-static void test_memory_of_another_bus_version_or_program_is_refused(void) {
+TEST(test_memory_of_another_bus_version_or_program_is_refused) {
     TEST_ASSERT_FALSE(gw_assumptions_file_read(text, length, "can0", &got, reason));
     TEST_ASSERT_NOT_NULL(strstr(reason, "another bus"));
     forge("{\"format\":\"iwheel-ledger\",\"version\":2,\"bus\":\"can0\",\"items\":{},\"offsets\":{}}\n");
@@ -182,7 +180,7 @@ static void test_memory_of_another_bus_version_or_program_is_refused(void) {
     refused("damaged");
 }
 
-static void test_memory_that_holds_anything_strange_is_refused_as_a_whole(void) {
+TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole) {
     static const char *const bodies[] = {
         HEAD "\"offsets\":{}}\n",
         HEAD "\"items\":[],\"offsets\":{}}\n",
@@ -232,7 +230,7 @@ static void test_memory_that_holds_anything_strange_is_refused_as_a_whole(void) 
 }
 
 /// As versions without the track and without a way of finding wrote it.
-static void test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open(void) {
+TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open) {
     forge(HEAD "\"items\":{\"wheel_radius\":{\"state\":\"confirmed\",\"evidence\":\"operator\",\"figure\":0,"
                "\"value\":\"192\",\"found\":\"192\",\"since_wall_us\":1}},\"offsets\":{}}\n");
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
@@ -242,7 +240,7 @@ static void test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open(voi
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, got.item[IW_ASSUMPTION_TRACK].entry.state);
 }
 
-static void test_memory_tells_how_only_if_it_was_told(void) {
+TEST(test_memory_tells_how_only_if_it_was_told) {
     memset(&known, 0, sizeof known);
     gw_stored_item_t *entry = &known.item[IW_ASSUMPTION_TRACK];
     entry->entry = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
@@ -266,7 +264,7 @@ static bool believed(void) {
     return taken;
 }
 
-static void test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not(void) {
+TEST(test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not) {
     static const struct {
         iw_assumption_item_t item;
         iw_assumption_state_t state;
@@ -305,7 +303,7 @@ static void test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed
     }
 }
 
-static void test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus(void) {
+TEST(test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus) {
     static const iw_assumption_item_t items[] = {IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMPTION_MOUNT_SIGN_LEFT,
                                                  IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_ASSUMPTION_WHEEL_RADIUS};
     for (size_t i = 0; i < sizeof items / sizeof items[0]; i++) {
@@ -320,7 +318,7 @@ static void test_memory_of_what_only_the_operator_can_know_is_not_believed_of_th
     }
 }
 
-static void test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed(void) {
+TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed) {
     static const struct {
         iw_assumption_item_t item;
         const char *value;
@@ -345,7 +343,7 @@ static void test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_beli
     }
 }
 
-static void test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed(void) {
+TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed) {
     static const struct {
         bool good;
         gw_stored_offset_t offset;
@@ -378,30 +376,10 @@ static void test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed(void
     }
 }
 
-static void test_memory_file_name_is_one_plain_word(void) {
+TEST(test_memory_file_name_is_one_plain_word) {
     char name[64];
     gw_assumptions_file_name("can0", name, sizeof name);
     TEST_ASSERT_EQUAL_STRING("ledger-can0", name);
     gw_assumptions_file_name("unix:/run/a b/../bus", name, sizeof name);
     TEST_ASSERT_EQUAL_STRING("ledger-unix__run_a_b_.._bus", name);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_memory_what_is_written_is_read_back_even_at_its_extremes);
-    RUN_TEST(test_memory_with_every_item_at_its_longest_fits);
-    RUN_TEST(test_memory_of_nothing_is_a_memory);
-    RUN_TEST(test_memory_too_small_a_buffer_gives_nothing);
-    RUN_TEST(test_memory_every_single_flipped_bit_is_damage);
-    RUN_TEST(test_memory_every_shorter_or_longer_text_is_damage);
-    RUN_TEST(test_memory_of_another_bus_version_or_program_is_refused);
-    RUN_TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole);
-    RUN_TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open);
-    RUN_TEST(test_memory_tells_how_only_if_it_was_told);
-    RUN_TEST(test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not);
-    RUN_TEST(test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus);
-    RUN_TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed);
-    RUN_TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed);
-    RUN_TEST(test_memory_file_name_is_one_plain_word);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What every program does before anything else.
 #include "begin/begin.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -39,7 +39,7 @@ static int begin(char *argument) {
     return begin_program("program", (argument != NULL) ? 3 : 2, arguments);
 }
 
-static void test_begin_log_without_a_reader_ends_nothing(void) {
+TEST(test_begin_log_without_a_reader_ends_nothing) {
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
@@ -52,7 +52,7 @@ static void test_begin_log_without_a_reader_ends_nothing(void) {
     TEST_ASSERT_EQUAL_INT(-1, count);
 }
 
-static void test_begin_closed_streams_are_opened(void) {
+TEST(test_begin_closed_streams_are_opened) {
     struct stat null;
     struct stat found[COUNT(kept)] = {{.st_rdev = 0}};
     for (int fd = 0; fd < COUNT(kept); fd++) {
@@ -72,7 +72,7 @@ static void test_begin_closed_streams_are_opened(void) {
     }
 }
 
-static void test_begin_open_streams_are_left_alone(void) {
+TEST(test_begin_open_streams_are_left_alone) {
     struct stat before;
     struct stat after;
     (void)fstat(STDOUT_FILENO, &before);
@@ -81,7 +81,7 @@ static void test_begin_open_streams_are_left_alone(void) {
     TEST_ASSERT_TRUE(before.st_ino == after.st_ino && before.st_dev == after.st_dev);
 }
 
-static void test_begin_argument_that_means_nothing_is_refused(void) {
+TEST(test_begin_argument_that_means_nothing_is_refused) {
     char empty[] = "";
     char bare[] = "--";
     char *const refused[] = {empty, bare};
@@ -90,7 +90,7 @@ static void test_begin_argument_that_means_nothing_is_refused(void) {
     }
 }
 
-static void test_begin_argument_that_may_mean_something_is_accepted(void) {
+TEST(test_begin_argument_that_may_mean_something_is_accepted) {
     char dash[] = "-";
     char longer[] = "--x";
     char three[] = "---";
@@ -101,21 +101,10 @@ static void test_begin_argument_that_may_mean_something_is_accepted(void) {
     }
 }
 
-static void test_begin_option_in_place_of_a_value_is_no_value(void) {
+TEST(test_begin_option_in_place_of_a_value_is_no_value) {
     TEST_ASSERT_TRUE(begin_is_value("program", NULL));
     TEST_ASSERT_TRUE(begin_is_value("program", "-"));
     TEST_ASSERT_TRUE(begin_is_value("program", "a-b"));
     TEST_ASSERT_FALSE(begin_is_value("program", "-b"));
     TEST_ASSERT_FALSE(begin_is_value("program", "--listen-only"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_begin_log_without_a_reader_ends_nothing);
-    RUN_TEST(test_begin_closed_streams_are_opened);
-    RUN_TEST(test_begin_open_streams_are_left_alone);
-    RUN_TEST(test_begin_argument_that_means_nothing_is_refused);
-    RUN_TEST(test_begin_argument_that_may_mean_something_is_accepted);
-    RUN_TEST(test_begin_option_in_place_of_a_value_is_no_value);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "iwheel/bit_timing.h"
-#include "unity.h"
+#include "unit.h"
 
 #define POISON 0xA5
 #define MHZ    1000000U
@@ -14,8 +14,6 @@ static iw_bit_timing_limits_t limits;
 void setUp(void) {
     limits = IW_BIT_TIMING_BXCAN;
 }
-
-void tearDown(void) {}
 
 /// How far a setting's sample point is from the wanted one, as the fraction numerator / quanta.
 typedef struct {
@@ -81,13 +79,13 @@ static void compare_with_search(uint32_t clock_hz, const iw_bit_timing_achieved_
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(best.quanta, distance.quanta, "not the most quanta");
 }
 
-static void test_solve_every_clock_from_8_to_80_MHz_finds_what_a_search_finds(void) {
+TEST(test_solve_every_clock_from_8_to_80_MHz_finds_what_a_search_finds) {
     for (uint32_t clock_hz = 8 * MHZ; clock_hz <= 80 * MHZ; clock_hz += MHZ / 2) {
         compare_with_search(clock_hz, &bus);
     }
 }
 
-static void test_solve_other_rates_and_sample_points_finds_what_a_search_finds(void) {
+TEST(test_solve_other_rates_and_sample_points_finds_what_a_search_finds) {
     static const uint32_t rates[] = {125000, 500000, 800000};
     static const uint16_t points[] = {1, 500, 750, 800, 875, 1000};
     for (size_t i = 0; i < 18; i++) {
@@ -108,7 +106,7 @@ static void assert_nearest_to_the_permille(uint32_t clock_hz, const iw_bit_timin
     TEST_ASSERT_TRUE(distance.numerator * best.quanta <= (best.numerator + best.quanta) * distance.quanta);
 }
 
-static void test_solve_every_sample_point_finds_the_nearest(void) {
+TEST(test_solve_every_sample_point_finds_the_nearest) {
     static const uint32_t clocks[] = {8, 10, 12, 16, 36, 42};
     for (size_t i = 0; i < sizeof clocks / sizeof clocks[0]; i++) {
         for (uint16_t permille = 1; permille <= 1000; permille++) {
@@ -119,7 +117,7 @@ static void test_solve_every_sample_point_finds_the_nearest(void) {
     }
 }
 
-static void test_solve_eight_quanta_takes_the_nearer_eighth(void) {
+TEST(test_solve_eight_quanta_takes_the_nearer_eighth) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const iw_bit_timing_achieved_t wanted = {1000000, permille};
         limits.prescaler_max = 1;
@@ -127,14 +125,14 @@ static void test_solve_eight_quanta_takes_the_nearer_eighth(void) {
     }
 }
 
-static void test_solve_narrow_limits_are_kept(void) {
+TEST(test_solve_narrow_limits_are_kept) {
     limits = (iw_bit_timing_limits_t){4, 3, 5, 2, 3};
     for (uint32_t clock_hz = 4 * MHZ; clock_hz <= 40 * MHZ; clock_hz += MHZ) {
         compare_with_search(clock_hz, &bus);
     }
 }
 
-static void test_solve_one_possible_setting_is_found(void) {
+TEST(test_solve_one_possible_setting_is_found) {
     limits = (iw_bit_timing_limits_t){1, 4, 4, 3, 3};
     compare_with_search(8 * MHZ, &bus);
     compare_with_search(16 * MHZ, &bus);
@@ -147,7 +145,7 @@ static iw_bit_timing_achieved_t solved(uint32_t clock_hz) {
     return iw_bit_timing_achieved(clock_hz, &timing);
 }
 
-static void test_solve_multiples_of_8_MHz_reach_the_bus_exactly(void) {
+TEST(test_solve_multiples_of_8_MHz_reach_the_bus_exactly) {
     static const uint32_t clocks[] = {8, 16, 32, 40, 48, 56, 64, 72, 80};
     for (size_t i = 0; i < sizeof clocks / sizeof clocks[0]; i++) {
         const iw_bit_timing_achieved_t achieved = solved(clocks[i] * MHZ);
@@ -156,7 +154,7 @@ static void test_solve_multiples_of_8_MHz_reach_the_bus_exactly(void) {
     }
 }
 
-static void test_solve_usual_stm32_clocks_cannot_reach_the_sample_point(void) {
+TEST(test_solve_usual_stm32_clocks_cannot_reach_the_sample_point) {
     static const struct {
         uint32_t clock_MHz;
         uint16_t nearest_permille;
@@ -168,7 +166,7 @@ static void test_solve_usual_stm32_clocks_cannot_reach_the_sample_point(void) {
     }
 }
 
-static void test_solve_f103_with_32_MHz_takes_sixteen_quanta(void) {
+TEST(test_solve_f103_with_32_MHz_takes_sixteen_quanta) {
     iw_bit_timing_t timing;
     TEST_ASSERT_EQUAL_INT(IW_OK, iw_bit_timing_solve(&limits, 32 * MHZ, &bus, &timing));
     TEST_ASSERT_EQUAL_UINT16(2, timing.prescaler);
@@ -176,7 +174,7 @@ static void test_solve_f103_with_32_MHz_takes_sixteen_quanta(void) {
     TEST_ASSERT_EQUAL_UINT16(6, timing.tseg2);
 }
 
-static void test_solve_of_two_sample_points_as_near_takes_the_later(void) {
+TEST(test_solve_of_two_sample_points_as_near_takes_the_later) {
     static const iw_bit_timing_achieved_t wanted = {1000000, 650};
     iw_bit_timing_t timing;
     limits.prescaler_max = 1;
@@ -184,7 +182,7 @@ static void test_solve_of_two_sample_points_as_near_takes_the_later(void) {
     TEST_ASSERT_EQUAL_UINT16(700, iw_bit_timing_achieved(10 * MHZ, &timing).sample_point_permille);
 }
 
-static void test_solve_never_leaves_the_first_segment_empty(void) {
+TEST(test_solve_never_leaves_the_first_segment_empty) {
     iw_bit_timing_t timing;
     limits.tseg1_min = 0;
     TEST_ASSERT_EQUAL_INT(IW_ERR_RANGE, iw_bit_timing_solve(&limits, 2 * MHZ, &bus, &timing));
@@ -192,7 +190,7 @@ static void test_solve_never_leaves_the_first_segment_empty(void) {
     TEST_ASSERT_EQUAL_UINT16(1, timing.tseg1);
 }
 
-static void test_solve_zero_argument_is_refused_and_leaves_output_alone(void) {
+TEST(test_solve_zero_argument_is_refused_and_leaves_output_alone) {
     static const iw_bit_timing_achieved_t no_rate = {0, 625};
     static const iw_bit_timing_achieved_t no_point = {1000000, 0};
     iw_bit_timing_t timing = {11, 22, 33};
@@ -206,7 +204,7 @@ static void test_solve_zero_argument_is_refused_and_leaves_output_alone(void) {
     TEST_ASSERT_EQUAL_UINT16(33, timing.tseg2);
 }
 
-static void test_solve_largest_numbers_do_not_overflow(void) {
+TEST(test_solve_largest_numbers_do_not_overflow) {
     static const iw_bit_timing_achieved_t wanted = {1, 1};
     limits = (iw_bit_timing_limits_t){65535, 65535, 65535, 65533, 65535};
     iw_bit_timing_t timing = {0, 0, 0};
@@ -216,7 +214,7 @@ static void test_solve_largest_numbers_do_not_overflow(void) {
     TEST_ASSERT_EQUAL_UINT16(65533, timing.tseg2);
 }
 
-static void test_achieved_rounds_to_the_nearest(void) {
+TEST(test_achieved_rounds_to_the_nearest) {
     static const struct {
         uint32_t clock_hz;
         iw_bit_timing_t timing;
@@ -241,7 +239,7 @@ static void test_achieved_rounds_to_the_nearest(void) {
     }
 }
 
-static void test_achieved_every_bxcan_setting_is_within_half_a_unit(void) {
+TEST(test_achieved_every_bxcan_setting_is_within_half_a_unit) {
     for (uint16_t prescaler = 1; prescaler <= 64; prescaler++) {
         for (uint16_t tseg1 = 1; tseg1 <= 16; tseg1++) {
             for (uint16_t tseg2 = 1; tseg2 <= 8; tseg2++) {
@@ -257,38 +255,16 @@ static void test_achieved_every_bxcan_setting_is_within_half_a_unit(void) {
     }
 }
 
-static void test_achieved_slower_than_any_number_gives_zeros(void) {
+TEST(test_achieved_slower_than_any_number_gives_zeros) {
     const iw_bit_timing_t timing = {65535, 65535, 65535};
     const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(32 * MHZ, &timing);
     TEST_ASSERT_EQUAL_UINT32(0, achieved.bitrate_hz);
     TEST_ASSERT_EQUAL_UINT16(0, achieved.sample_point_permille);
 }
 
-static void test_achieved_prescaler_zero_gives_zeros(void) {
+TEST(test_achieved_prescaler_zero_gives_zeros) {
     const iw_bit_timing_t timing = {0, 4, 3};
     const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(32 * MHZ, &timing);
     TEST_ASSERT_EQUAL_UINT32(0, achieved.bitrate_hz);
     TEST_ASSERT_EQUAL_UINT16(0, achieved.sample_point_permille);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_solve_every_clock_from_8_to_80_MHz_finds_what_a_search_finds);
-    RUN_TEST(test_solve_other_rates_and_sample_points_finds_what_a_search_finds);
-    RUN_TEST(test_solve_every_sample_point_finds_the_nearest);
-    RUN_TEST(test_solve_eight_quanta_takes_the_nearer_eighth);
-    RUN_TEST(test_solve_narrow_limits_are_kept);
-    RUN_TEST(test_solve_one_possible_setting_is_found);
-    RUN_TEST(test_solve_multiples_of_8_MHz_reach_the_bus_exactly);
-    RUN_TEST(test_solve_usual_stm32_clocks_cannot_reach_the_sample_point);
-    RUN_TEST(test_solve_f103_with_32_MHz_takes_sixteen_quanta);
-    RUN_TEST(test_solve_of_two_sample_points_as_near_takes_the_later);
-    RUN_TEST(test_solve_never_leaves_the_first_segment_empty);
-    RUN_TEST(test_solve_zero_argument_is_refused_and_leaves_output_alone);
-    RUN_TEST(test_solve_largest_numbers_do_not_overflow);
-    RUN_TEST(test_achieved_rounds_to_the_nearest);
-    RUN_TEST(test_achieved_every_bxcan_setting_is_within_half_a_unit);
-    RUN_TEST(test_achieved_slower_than_any_number_gives_zeros);
-    RUN_TEST(test_achieved_prescaler_zero_gives_zeros);
-    return UNITY_END();
 }

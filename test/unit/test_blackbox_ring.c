@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "blackbox_ring.h"
 
+#include "unit.h"
 #include <stdlib.h>
 #include <string.h>
-#include <unity.h>
 
 /// More than a ring of one second ever has.
 #define MANY 20000U
@@ -42,12 +42,12 @@ static void expect(uint64_t from, uint64_t to, uint64_t first, size_t count) {
     }
 }
 
-static void test_empty_ring_has_nothing(void) {
+TEST(test_empty_ring_has_nothing) {
     expect(0, UINT64_MAX, 0, 0);
     TEST_ASSERT_EQUAL_UINT64(0, blackbox_ring_written(ring));
 }
 
-static void test_entries_come_back_in_order(void) {
+TEST(test_entries_come_back_in_order) {
     put(0, 10);
     expect(0, 10, 0, 10);
     expect(3, 7, 3, 4);
@@ -55,7 +55,7 @@ static void test_entries_come_back_in_order(void) {
     expect(10, UINT64_MAX, 10, 0);
 }
 
-static void test_overwritten_entries_are_missing_and_nothing_else(void) {
+TEST(test_overwritten_entries_are_missing_and_nothing_else) {
     size_t count;
     put(0, MANY);
     const uint64_t first = blackbox_ring_copy(ring, 0, UINT64_MAX, out, &count);
@@ -69,7 +69,7 @@ static void test_overwritten_entries_are_missing_and_nothing_else(void) {
     expect(MANY, MANY, MANY, 0);
 }
 
-static void test_ring_is_whole_until_the_first_block_is_overwritten(void) {
+TEST(test_ring_is_whole_until_the_first_block_is_overwritten) {
     size_t count;
     uint64_t n = 0;
     for (; blackbox_ring_is_whole(ring); n++) {
@@ -81,7 +81,7 @@ static void test_ring_is_whole_until_the_first_block_is_overwritten(void) {
 }
 
 /// What two wheels and a client at 50 Hz bring in a second, step by step as it comes in a quiet gateway.
-static void test_a_second_of_driving_fits_one_and_a_half_times(void) {
+TEST(test_a_second_of_driving_fits_one_and_a_half_times) {
     const blackbox_entry_t speed = {.kind = BLACKBOX_FRAME, .number = 256, .a = 4};
     const blackbox_entry_t echo = {.kind = BLACKBOX_FRAME, .number = 266, .a = 5, .b = IW_CAN_ECHO};
     const blackbox_entry_t drive = {.kind = BLACKBOX_DRIVE, .number = 1, .as = {.drive = {{300, 300}, {0, 0}, 1}}};
@@ -113,7 +113,7 @@ static void expect_back(const blackbox_entry_t *entries, size_t count) {
     }
 }
 
-static void test_every_kind_of_entry_comes_back_as_it_was(void) {
+TEST(test_every_kind_of_entry_comes_back_as_it_was) {
     blackbox_entry_t entries[3U * BLACKBOX_KINDS];
     for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
         blackbox_entry_t *three = &entries[3U * kind];
@@ -128,7 +128,7 @@ static void test_every_kind_of_entry_comes_back_as_it_was(void) {
     expect_back(entries, sizeof entries / sizeof entries[0]);
 }
 
-static void test_frame_keeps_as_many_bytes_as_it_has(void) {
+TEST(test_frame_keeps_as_many_bytes_as_it_has) {
     const blackbox_entry_t entry = {.kind = BLACKBOX_FRAME, .a = 3, .as = {.data = {1, 2, 3, 4, 5, 6, 7, 8}}};
     const uint8_t kept[IW_CAN_DATA_MAX] = {1, 2, 3};
     size_t count;
@@ -137,7 +137,7 @@ static void test_frame_keeps_as_many_bytes_as_it_has(void) {
     TEST_ASSERT_EQUAL_MEMORY(kept, out[0].as.data, sizeof kept);
 }
 
-static void test_times_far_apart_and_backwards_come_back(void) {
+TEST(test_times_far_apart_and_backwards_come_back) {
     const blackbox_entry_t entries[] = {
         {.at_us = 5, .kind = BLACKBOX_STEP},
         {.at_us = 5U + 0xFFFFFFU, .kind = BLACKBOX_STEP},
@@ -149,32 +149,17 @@ static void test_times_far_apart_and_backwards_come_back(void) {
     expect_back(entries, sizeof entries / sizeof entries[0]);
 }
 
-static void test_size_follows_the_seconds_and_has_a_least(void) {
+TEST(test_size_follows_the_seconds_and_has_a_least) {
     TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)30U * BLACKBOX_BLOCKS_PER_S * BLACKBOX_BLOCK,
                              blackbox_ring_size(30));
     TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)BLACKBOX_BLOCKS_MIN * BLACKBOX_BLOCK, blackbox_ring_size(0));
     TEST_ASSERT_LESS_THAN_size_t(640000U, blackbox_ring_size(30)); // What the page of recordings promises.
 }
 
-static void test_every_kind_has_a_name_of_its_own(void) {
+TEST(test_every_kind_has_a_name_of_its_own) {
     for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
         TEST_ASSERT_EQUAL(kind, blackbox_kind_of(blackbox_kind_name((blackbox_kind_t)kind)));
     }
     TEST_ASSERT_EQUAL(BLACKBOX_KINDS, blackbox_kind_of("nonsense"));
     TEST_ASSERT_EQUAL_STRING("unknown", blackbox_kind_name(BLACKBOX_KINDS));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_empty_ring_has_nothing);
-    RUN_TEST(test_entries_come_back_in_order);
-    RUN_TEST(test_overwritten_entries_are_missing_and_nothing_else);
-    RUN_TEST(test_ring_is_whole_until_the_first_block_is_overwritten);
-    RUN_TEST(test_a_second_of_driving_fits_one_and_a_half_times);
-    RUN_TEST(test_every_kind_of_entry_comes_back_as_it_was);
-    RUN_TEST(test_frame_keeps_as_many_bytes_as_it_has);
-    RUN_TEST(test_times_far_apart_and_backwards_come_back);
-    RUN_TEST(test_size_follows_the_seconds_and_has_a_least);
-    RUN_TEST(test_every_kind_has_a_name_of_its_own);
-    return UNITY_END();
 }

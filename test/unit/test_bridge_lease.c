@@ -3,7 +3,7 @@
 #include "common/lease.h"
 
 #include "../support/fake_gateway.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -66,14 +66,14 @@ static void arm(const char *name, bool ok, const char *fields) {
     step();
 }
 
-static void test_lease_viewer_has_no_connection(void) {
+TEST(test_lease_viewer_has_no_connection) {
     step();
     TEST_ASSERT_EQUAL(0, gateway.count);
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, bridge_lease_next_us(&lease, now_us));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
-static void test_one_person_key_of_the_gateway_is_in_each_drive(void) {
+TEST(test_one_person_key_of_the_gateway_is_in_each_drive) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
@@ -83,7 +83,7 @@ static void test_one_person_key_of_the_gateway_is_in_each_drive(void) {
     TEST_ASSERT_NOT_NULL(strstr(line, "\"right_mm_s\":100,\"key\":\"00112233445566778899aabbccddeeff\"}"));
 }
 
-static void test_one_person_without_gateways_key_gets_a_drawn_one(void) {
+TEST(test_one_person_without_gateways_key_gets_a_drawn_one) {
     arm("a", true, ",\"state\":\"armed\"");
     TEST_ASSERT_EQUAL(32, strlen(armed_key));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
@@ -92,7 +92,7 @@ static void test_one_person_without_gateways_key_gets_a_drawn_one(void) {
     TEST_ASSERT_NULL(strstr(line, "key"));
 }
 
-static void test_one_person_other_key_never_drives(void) {
+TEST(test_one_person_other_key_never_drives) {
     static const char *const wrong[] = {NULL, "", "00112233445566778899aabbccddeefe", "00112233445566778899aabbccddeef",
                                         "00112233445566778899aabbccddeefff"};
     arm("a", true, GIVEN);
@@ -103,7 +103,7 @@ static void test_one_person_other_key_never_drives(void) {
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 0, line, sizeof line));
 }
 
-static void test_one_person_second_is_another_client_and_refused(void) {
+TEST(test_one_person_second_is_another_client_and_refused) {
     arm("a", true, GIVEN);
     arm("b", false, ",\"error\":\"busy\",\"message\":\"a drives\"");
     TEST_ASSERT_NOT_NULL(strstr(last, "busy"));
@@ -113,7 +113,7 @@ static void test_one_person_second_is_another_client_and_refused(void) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
-static void test_one_person_third_is_busy_while_second_asks(void) {
+TEST(test_one_person_third_is_busy_while_second_asks) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY,
@@ -122,7 +122,7 @@ static void test_one_person_third_is_busy_while_second_asks(void) {
     TEST_ASSERT_EQUAL(2, gateway.count);
 }
 
-static void test_one_person_takeover_ends_the_former_holder(void) {
+TEST(test_one_person_takeover_ends_the_former_holder) {
     arm("a", true, GIVEN);
     arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
     TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
@@ -130,7 +130,7 @@ static void test_one_person_takeover_ends_the_former_holder(void) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
-static void test_lease_end_voids_the_key_before_the_connection(void) {
+TEST(test_lease_end_voids_the_key_before_the_connection) {
     arm("a", true, GIVEN);
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
@@ -142,7 +142,7 @@ static void test_lease_end_voids_the_key_before_the_connection(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-static void test_lease_ending_place_makes_room_for_the_next(void) {
+TEST(test_lease_ending_place_makes_room_for_the_next) {
     arm("a", true, GIVEN);
     bridge_lease_end(&lease, now_us);
     arm("b", true, GIVEN);
@@ -152,7 +152,7 @@ static void test_lease_ending_place_makes_room_for_the_next(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0) || fake_gateway_is_closed(&gateway, 1));
 }
 
-static void test_lease_end_refuses_who_asks(void) {
+TEST(test_lease_end_refuses_who_asks) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     bridge_lease_end(&lease, now_us);
@@ -162,7 +162,7 @@ static void test_lease_end_refuses_who_asks(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-static void test_lease_forgotten_asker_gets_no_lease(void) {
+TEST(test_lease_forgotten_asker_gets_no_lease) {
     int who = 0;
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, &who}, now_us));
     step();
@@ -172,7 +172,7 @@ static void test_lease_forgotten_asker_gets_no_lease(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-static void test_lease_not_holder_ends_it(void) {
+TEST(test_lease_not_holder_ends_it) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
                       bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
@@ -184,7 +184,7 @@ static void test_lease_not_holder_ends_it(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-static void test_lease_lost_connection_answers_drives_once(void) {
+TEST(test_lease_lost_connection_answers_drives_once) {
     arm("a", true, GIVEN);
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
@@ -198,7 +198,7 @@ static void test_lease_lost_connection_answers_drives_once(void) {
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
 }
 
-static void test_lease_arm_without_reply_ends(void) {
+TEST(test_lease_arm_without_reply_ends) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     now_us += BRIDGE_ARM_US;
@@ -209,7 +209,7 @@ static void test_lease_arm_without_reply_ends(void) {
                       bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
 }
 
-static void test_movers_deflected_stick_is_named_for_its_time(void) {
+TEST(test_movers_deflected_stick_is_named_for_its_time) {
     bridge_movers_t movers = {0};
     TEST_ASSERT_NULL(bridge_movers_who(&movers, NULL, 200, now_us));
     bridge_movers_note(&movers, "b", now_us);
@@ -220,7 +220,7 @@ static void test_movers_deflected_stick_is_named_for_its_time(void) {
     TEST_ASSERT_EQUAL_STRING("b", bridge_movers_who(&movers, NULL, 800, now_us + 799U * MS));
 }
 
-static void test_movers_many_sources_replace_the_oldest(void) {
+TEST(test_movers_many_sources_replace_the_oldest) {
     bridge_movers_t movers = {0};
     char name[8];
     for (unsigned i = 0; i < 3U * BRIDGE_MOVERS_MAX; i++) {
@@ -230,25 +230,4 @@ static void test_movers_many_sources_replace_the_oldest(void) {
     }
     bridge_movers_note(&movers, name, now_us + 1000U * MS);
     TEST_ASSERT_EQUAL_STRING(name, bridge_movers_who(&movers, NULL, 200, now_us + 1000U * MS));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_lease_viewer_has_no_connection);
-    RUN_TEST(test_one_person_key_of_the_gateway_is_in_each_drive);
-    RUN_TEST(test_one_person_without_gateways_key_gets_a_drawn_one);
-    RUN_TEST(test_one_person_other_key_never_drives);
-    RUN_TEST(test_one_person_second_is_another_client_and_refused);
-    RUN_TEST(test_one_person_third_is_busy_while_second_asks);
-    RUN_TEST(test_one_person_takeover_ends_the_former_holder);
-    RUN_TEST(test_lease_end_voids_the_key_before_the_connection);
-    RUN_TEST(test_lease_ending_place_makes_room_for_the_next);
-    RUN_TEST(test_lease_end_refuses_who_asks);
-    RUN_TEST(test_lease_forgotten_asker_gets_no_lease);
-    RUN_TEST(test_lease_not_holder_ends_it);
-    RUN_TEST(test_lease_lost_connection_answers_drives_once);
-    RUN_TEST(test_lease_arm_without_reply_ends);
-    RUN_TEST(test_movers_deflected_stick_is_named_for_its_time);
-    RUN_TEST(test_movers_many_sources_replace_the_oldest);
-    return UNITY_END();
 }

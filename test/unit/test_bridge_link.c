@@ -3,7 +3,7 @@
 #include "common/bridge_link.h"
 
 #include "../support/fake_gateway.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -84,14 +84,14 @@ static int read_all(int connection) {
     return count;
 }
 
-static void test_link_start_opens_watch_and_stop_connection(void) {
+TEST(test_link_start_opens_watch_and_stop_connection) {
     connect_both();
     TEST_ASSERT_EQUAL(2, gateway.count);
     TEST_ASSERT_EQUAL(1, here);
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, STOPS, line, sizeof line));
 }
 
-static void test_questions_beyond_four_wait_in_order(void) {
+TEST(test_questions_beyond_four_wait_in_order) {
     connect_both();
     for (int i = 0; i < 10; i++) {
         char request[40];
@@ -112,7 +112,7 @@ static void test_questions_beyond_four_wait_in_order(void) {
     TEST_ASSERT_EQUAL(10, answered);
 }
 
-static void test_question_without_place_is_not_accepted(void) {
+TEST(test_question_without_place_is_not_accepted) {
     connect_both();
     for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
@@ -126,7 +126,7 @@ static void test_question_without_place_is_not_accepted(void) {
     TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state);
 }
 
-static void test_forgotten_question_is_not_sent(void) {
+TEST(test_forgotten_question_is_not_sent) {
     int who = 0;
     connect_both();
     for (int i = 0; i < 8; i++) {
@@ -139,7 +139,7 @@ static void test_forgotten_question_is_not_sent(void) {
     TEST_ASSERT_EQUAL(0, answered + refused);
 }
 
-static void test_stop_never_waits_for_questions(void) {
+TEST(test_stop_never_waits_for_questions) {
     connect_both();
     for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
@@ -152,7 +152,7 @@ static void test_stop_never_waits_for_questions(void) {
     TEST_ASSERT_EQUAL(1, answered);
 }
 
-static void test_stop_never_queues_behind_stops(void) {
+TEST(test_stop_never_queues_behind_stops) {
     connect_both();
     for (int i = 0; i < 300; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
@@ -172,7 +172,7 @@ static void test_stop_never_queues_behind_stops(void) {
     TEST_ASSERT_EQUAL(0, refused);
 }
 
-static void test_stop_without_reply_is_reported_and_reconnects(void) {
+TEST(test_stop_without_reply_is_reported_and_reconnects) {
     connect_both();
     TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
     now_us += BRIDGE_STOP_US - 1U;
@@ -189,7 +189,7 @@ static void test_stop_without_reply_is_reported_and_reconnects(void) {
     TEST_ASSERT_EQUAL(0, read_all(2)); // It is not sent late.
 }
 
-static void test_stop_while_the_line_is_lost_connects_at_once(void) {
+TEST(test_stop_while_the_line_is_lost_connects_at_once) {
     connect_both();
     fake_gateway_hang_up(&gateway, STOPS);
     step();
@@ -200,7 +200,7 @@ static void test_stop_while_the_line_is_lost_connects_at_once(void) {
     TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
 }
 
-static void test_stop_without_gateway_is_not_accepted(void) {
+TEST(test_stop_without_gateway_is_not_accepted) {
     connect_both();
     fake_gateway_close(&gateway);
     step();
@@ -210,7 +210,7 @@ static void test_stop_without_gateway_is_not_accepted(void) {
     TEST_ASSERT_EQUAL(0, answered + refused);
 }
 
-static void test_gateway_that_does_not_greet_delays_nothing(void) {
+TEST(test_gateway_that_does_not_greet_delays_nothing) {
     gateway.greets = false;
     step();
     step();
@@ -225,7 +225,7 @@ static void test_gateway_that_does_not_greet_delays_nothing(void) {
     TEST_ASSERT_GREATER_THAN_UINT64(now_us, bridge_link_next_us(&link_, now_us));
 }
 
-static void test_stop_that_was_given_up_is_not_sent_late(void) {
+TEST(test_stop_that_was_given_up_is_not_sent_late) {
     gateway.greets = false;
     step();
     step();
@@ -240,7 +240,7 @@ static void test_stop_that_was_given_up_is_not_sent_late(void) {
     TEST_ASSERT_EQUAL(0, read_all(STOPS));
 }
 
-static void test_full_gateway_is_not_called_without_pause(void) {
+TEST(test_full_gateway_is_not_called_without_pause) {
     gateway.greets = false;
     for (int i = 0; i < 20; i++) {
         const int before = gateway.count;
@@ -257,7 +257,7 @@ static void test_full_gateway_is_not_called_without_pause(void) {
     TEST_ASSERT_EQUAL(0, here);
 }
 
-static void test_lost_gateway_answers_all_questions_once(void) {
+TEST(test_lost_gateway_answers_all_questions_once) {
     connect_both();
     for (int i = 0; i < 9; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
@@ -278,22 +278,4 @@ static void test_lost_gateway_answers_all_questions_once(void) {
     step();
     TEST_ASSERT_EQUAL(2, here);
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 2, line, sizeof line)); // No question is sent twice.
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_link_start_opens_watch_and_stop_connection);
-    RUN_TEST(test_questions_beyond_four_wait_in_order);
-    RUN_TEST(test_question_without_place_is_not_accepted);
-    RUN_TEST(test_forgotten_question_is_not_sent);
-    RUN_TEST(test_stop_never_waits_for_questions);
-    RUN_TEST(test_stop_never_queues_behind_stops);
-    RUN_TEST(test_stop_without_reply_is_reported_and_reconnects);
-    RUN_TEST(test_stop_while_the_line_is_lost_connects_at_once);
-    RUN_TEST(test_stop_without_gateway_is_not_accepted);
-    RUN_TEST(test_gateway_that_does_not_greet_delays_nothing);
-    RUN_TEST(test_stop_that_was_given_up_is_not_sent_late);
-    RUN_TEST(test_full_gateway_is_not_called_without_pause);
-    RUN_TEST(test_lost_gateway_answers_all_questions_once);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What other machines can reach, read from the kernel: real sockets, opened and bound by the test.
 #include "common/reach.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <arpa/inet.h>
 #include <string.h>
@@ -61,19 +61,19 @@ static unsigned count(void) {
 
 // ---- which sockets count --------------------------------------------------------------------------------------------
 
-static void test_reach_process_without_sockets_has_none(void) {
+TEST(test_reach_process_without_sockets_has_none) {
     TEST_ASSERT_EQUAL_UINT(0, count());
     TEST_ASSERT_EQUAL_STRING("", text);
 }
 
-static void test_reach_udp_of_every_address_counts_and_is_named(void) {
+TEST(test_reach_udp_of_every_address_counts_and_is_named) {
     TEST_ASSERT_TRUE(open_at(SOCK_DGRAM, "0.0.0.0") >= 0);
     TEST_ASSERT_EQUAL_UINT(1, count());
     TEST_ASSERT_EQUAL_STRING_LEN("UDP 0.0.0.0 port ", text, 17);
     TEST_ASSERT_FALSE(bridge_reach_is_local("test", NULL, 0));
 }
 
-static void test_reach_tcp_counts_from_listen_on(void) {
+TEST(test_reach_tcp_counts_from_listen_on) {
     const int fd = open_at(SOCK_STREAM, "0.0.0.0");
     TEST_ASSERT_EQUAL_UINT(0, count());
     TEST_ASSERT_EQUAL_INT(0, listen(fd, 1));
@@ -81,7 +81,7 @@ static void test_reach_tcp_counts_from_listen_on(void) {
     TEST_ASSERT_EQUAL_STRING_LEN("TCP 0.0.0.0 port ", text, 17);
 }
 
-static void test_reach_loopback_addresses_do_not_count(void) {
+TEST(test_reach_loopback_addresses_do_not_count) {
     TEST_ASSERT_TRUE(open_at(SOCK_DGRAM, "127.0.0.1") >= 0);
     TEST_ASSERT_TRUE(open_at(SOCK_DGRAM, "127.3.2.1") >= 0);
     TEST_ASSERT_TRUE(listen_at("127.0.0.1") >= 0);
@@ -89,7 +89,7 @@ static void test_reach_loopback_addresses_do_not_count(void) {
     TEST_ASSERT_TRUE(bridge_reach_is_local("test", NULL, 0));
 }
 
-static void test_reach_ipv6_counts_by_its_address(void) {
+TEST(test_reach_ipv6_counts_by_its_address) {
     if (open_at(SOCK_DGRAM, "::1") < 0) {
         TEST_IGNORE_MESSAGE("this machine has no IPv6");
     }
@@ -100,7 +100,7 @@ static void test_reach_ipv6_counts_by_its_address(void) {
     TEST_ASSERT_EQUAL_UINT(2, count());
 }
 
-static void test_reach_udp_with_a_peer_or_without_a_port_does_not_count(void) {
+TEST(test_reach_udp_with_a_peer_or_without_a_port_does_not_count) {
     const struct sockaddr_in peer = {.sin_family = AF_INET, .sin_port = 9, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     fds[fd_count++] = socket(AF_INET, SOCK_DGRAM, 0);
     TEST_ASSERT_EQUAL_UINT(0, count());
@@ -108,7 +108,7 @@ static void test_reach_udp_with_a_peer_or_without_a_port_does_not_count(void) {
     TEST_ASSERT_EQUAL_UINT(0, count());
 }
 
-static void test_reach_excepted_socket_does_not_count_and_others_do(void) {
+TEST(test_reach_excepted_socket_does_not_count_and_others_do) {
     const int pair[2] = {-1, listen_at("0.0.0.0")};
     TEST_ASSERT_EQUAL_UINT(0, bridge_reach_count(pair, 2, text));
     TEST_ASSERT_TRUE(bridge_reach_is_local("test", pair, 2));
@@ -119,7 +119,7 @@ static void test_reach_excepted_socket_does_not_count_and_others_do(void) {
 
 // ---- bound to lo ----------------------------------------------------------------------------------------------------
 
-static void test_reach_sockets_bound_to_lo_still_receive_locally(void) {
+TEST(test_reach_sockets_bound_to_lo_still_receive_locally) {
     struct sockaddr_in address;
     socklen_t size = sizeof address;
     char byte = 'a';
@@ -135,7 +135,7 @@ static void test_reach_sockets_bound_to_lo_still_receive_locally(void) {
     TEST_ASSERT_EQUAL_INT(1, recv(fd, &byte, 1, MSG_DONTWAIT));
 }
 
-static void test_reach_socket_that_is_not_emptied_is_not_trusted(void) {
+TEST(test_reach_socket_that_is_not_emptied_is_not_trusted) {
     struct sockaddr_in address;
     socklen_t size = sizeof address;
     const int fd = open_at(SOCK_DGRAM, "0.0.0.0");
@@ -144,18 +144,4 @@ static void test_reach_socket_that_is_not_emptied_is_not_trusted(void) {
     TEST_ASSERT_EQUAL_INT(1,
                           sendto(open_at(SOCK_DGRAM, "127.0.0.1"), "a", 1, 0, (const struct sockaddr *)&address, size));
     TEST_ASSERT_FALSE(bridge_reach_bind_lo()); // It may have come from anywhere.
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_reach_process_without_sockets_has_none);
-    RUN_TEST(test_reach_udp_of_every_address_counts_and_is_named);
-    RUN_TEST(test_reach_tcp_counts_from_listen_on);
-    RUN_TEST(test_reach_loopback_addresses_do_not_count);
-    RUN_TEST(test_reach_ipv6_counts_by_its_address);
-    RUN_TEST(test_reach_udp_with_a_peer_or_without_a_port_does_not_count);
-    RUN_TEST(test_reach_excepted_socket_does_not_count_and_others_do);
-    RUN_TEST(test_reach_sockets_bound_to_lo_still_receive_locally);
-    RUN_TEST(test_reach_socket_that_is_not_emptied_is_not_trusted);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "assumptions/assumptions_file.h"
 #include "assumptions/button.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -39,8 +39,6 @@ void setUp(void) {
     now_us = MS(5000);
 }
 
-void tearDown(void) {}
-
 /// That answer for so long, looked at every 10 ms.
 static gw_button_news_t hold(int answer, unsigned for_ms) {
     gw_button_news_t news = GW_BUTTON_NO_NEWS;
@@ -53,7 +51,7 @@ static gw_button_news_t hold(int answer, unsigned for_ms) {
     return news;
 }
 
-static void test_button_pressed_and_released_is_tried_on_this_wiring(void) {
+TEST(test_button_pressed_and_released_is_tried_on_this_wiring) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
@@ -66,7 +64,7 @@ static void test_button_pressed_and_released_is_tried_on_this_wiring(void) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
 }
 
-static void test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise(void) {
+TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise) {
     (void)hold(0, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 40));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
@@ -75,7 +73,7 @@ static void test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise
 }
 
 /// A release is told late, by the debounce time: that is no part of the press.
-static void test_button_press_is_not_longer_by_its_debounce_time(void) {
+TEST(test_button_press_is_not_longer_by_its_debounce_time) {
     button.debounce_us = MS(100);
     (void)hold(0, 10);
     (void)hold(1, 140);
@@ -84,13 +82,13 @@ static void test_button_press_is_not_longer_by_its_debounce_time(void) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
 }
 
-static void test_button_pressed_at_the_start_shows_nothing(void) {
+TEST(test_button_pressed_at_the_start_shows_nothing) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
 }
 
-static void test_button_unreadable_or_gone_breaks_the_press(void) {
+TEST(test_button_unreadable_or_gone_breaks_the_press) {
     (void)hold(0, 10);
     (void)hold(1, 1000);
     (void)hold(-1, 10);
@@ -109,7 +107,7 @@ static void press(void) {
     (void)hold(0, 10);
 }
 
-static void test_button_that_is_simulated_or_absent_is_never_tried(void) {
+TEST(test_button_that_is_simulated_or_absent_is_never_tried) {
     ops.simulated = true;
     press();
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
@@ -123,7 +121,7 @@ static void test_button_that_is_simulated_or_absent_is_never_tried(void) {
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
 }
 
-static void test_button_of_any_other_wiring_is_void(void) {
+TEST(test_button_of_any_other_wiring_is_void) {
     for (unsigned change = 0; change < 4U; change++) {
         setUp();
         press();
@@ -140,7 +138,7 @@ static void test_button_of_any_other_wiring_is_void(void) {
     }
 }
 
-static void test_button_whose_line_cannot_be_read_is_not_void(void) {
+TEST(test_button_whose_line_cannot_be_read_is_not_void) {
     press();
     const int64_t before = tried.wall_us;
     readable = false;
@@ -160,7 +158,7 @@ static gw_button_news_t hold_both(int first, int second, unsigned for_ms) {
     return hold(first, for_ms);
 }
 
-static void test_button_of_two_contacts_is_tried_by_a_press_of_both(void) {
+TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 1000));
@@ -179,7 +177,7 @@ static void test_button_of_two_contacts_is_tried_by_a_press_of_both(void) {
 }
 
 /// The time of both counts, not that of whichever is released last.
-static void test_button_of_two_contacts_is_not_tried_by_a_moment_of_both(void) {
+TEST(test_button_of_two_contacts_is_not_tried_by_a_moment_of_both) {
     for (int first = 0; first < 2; first++) {
         set_up_two();
         (void)hold_both(0, 0, 10);
@@ -198,7 +196,7 @@ static void test_button_of_two_contacts_is_not_tried_by_a_moment_of_both(void) {
 }
 
 /// Pressed at the start, both shows nothing, whatever one of them does.
-static void test_button_of_two_contacts_pressed_at_the_start_shows_nothing(void) {
+TEST(test_button_of_two_contacts_pressed_at_the_start_shows_nothing) {
     set_up_two();
     (void)hold_both(1, 1, 1000);
     (void)hold_both(0, 1, 100);
@@ -206,7 +204,7 @@ static void test_button_of_two_contacts_pressed_at_the_start_shows_nothing(void)
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
 }
 
-static void test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing(void) {
+TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     (void)hold_both(1, 1, 100);
@@ -217,7 +215,7 @@ static void test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
 }
 
-static void test_button_with_another_second_contact_is_void(void) {
+TEST(test_button_with_another_second_contact_is_void) {
     for (unsigned change = 0; change < 4U; change++) {
         set_up_two();
         (void)hold_both(0, 0, 10);
@@ -232,7 +230,7 @@ static void test_button_with_another_second_contact_is_void(void) {
     }
 }
 
-static void test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round(void) {
+TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round) {
     press();
     TEST_ASSERT_TRUE(tried.wall_us > 0);
     button = (gw_button_t){.contact = {{"ESTOP", true}, {"ESTOP2", true}}}; // Started anew.
@@ -246,7 +244,7 @@ static void test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_
 }
 
 /// One contact is stuck: at the next start both read released, and only what is kept can warn.
-static void test_button_whose_contacts_disagree_is_void_until_both_were_tried_again(void) {
+TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     (void)hold_both(1, 1, 100);
@@ -265,7 +263,7 @@ static void test_button_whose_contacts_disagree_is_void_until_both_were_tried_ag
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
 }
 
-static void test_button_stored_without_a_second_contact_is_that_of_one(void) {
+TEST(test_button_stored_without_a_second_contact_is_that_of_one) {
     press();
     tried.contact[1].line[0] = '\0';
     button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", false}}};
@@ -273,7 +271,7 @@ static void test_button_stored_without_a_second_contact_is_that_of_one(void) {
     TEST_ASSERT_TRUE(tried.wall_us > 0);
 }
 
-static void test_button_that_says_the_same_is_not_asked_for_its_names(void) {
+TEST(test_button_that_says_the_same_is_not_asked_for_its_names) {
     (void)hold(0, 10);
     names_read = 0;
     (void)hold(0, 1000);
@@ -289,7 +287,7 @@ static bool stored_is_read(const gw_stored_t *known, gw_stored_t *out_known) {
     return length > 0U && gw_assumptions_file_read(text, length, "can0", out_known, reason);
 }
 
-static void test_button_is_stored_and_read_back(void) {
+TEST(test_button_is_stored_and_read_back) {
     static gw_stored_t known;
     static gw_stored_t got;
     memset(&known, 0, sizeof known);
@@ -313,7 +311,7 @@ static void test_button_is_stored_and_read_back(void) {
 }
 
 /// Each member is needed, of its own kind.
-static void test_button_stored_wrongly_is_refused(void) {
+TEST(test_button_stored_wrongly_is_refused) {
     static const char *const members[] = {
         "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
         "{\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
@@ -335,28 +333,4 @@ static void test_button_stored_wrongly_is_refused(void) {
         TEST_ASSERT_TRUE(iwn_json_check(members[i], strlen(members[i]), &work, &root, &reason));
         TEST_ASSERT_EQUAL_MESSAGE(i == 0U, gw_tried_read(root, &got), members[i]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_button_pressed_and_released_is_tried_on_this_wiring);
-    RUN_TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise);
-    RUN_TEST(test_button_press_is_not_longer_by_its_debounce_time);
-    RUN_TEST(test_button_pressed_at_the_start_shows_nothing);
-    RUN_TEST(test_button_unreadable_or_gone_breaks_the_press);
-    RUN_TEST(test_button_that_is_simulated_or_absent_is_never_tried);
-    RUN_TEST(test_button_of_any_other_wiring_is_void);
-    RUN_TEST(test_button_whose_line_cannot_be_read_is_not_void);
-    RUN_TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both);
-    RUN_TEST(test_button_of_two_contacts_is_not_tried_by_a_moment_of_both);
-    RUN_TEST(test_button_of_two_contacts_pressed_at_the_start_shows_nothing);
-    RUN_TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing);
-    RUN_TEST(test_button_with_another_second_contact_is_void);
-    RUN_TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round);
-    RUN_TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again);
-    RUN_TEST(test_button_stored_without_a_second_contact_is_that_of_one);
-    RUN_TEST(test_button_that_says_the_same_is_not_asked_for_its_names);
-    RUN_TEST(test_button_is_stored_and_read_back);
-    RUN_TEST(test_button_stored_wrongly_is_refused);
-    return UNITY_END();
 }

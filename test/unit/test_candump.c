@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "candump.h"
 
+#include "unit.h"
 #include <stdio.h>
 #include <string.h>
-#include <unity.h>
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 /// Parses from memory without a terminator behind it, so that a sanitizer sees a read beyond the length.
 static candump_result_t parse(const char *line, candump_t *out, const char **out_why) {
@@ -37,7 +33,7 @@ static void check_bad(const char *line, const char *part_of_why) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &frame, sizeof frame);
 }
 
-static void test_line_of_a_standard_frame_gives_its_parts(void) {
+TEST(test_line_of_a_standard_frame_gives_its_parts) {
     const candump_t frame = good("(1760000000.123456) can0 10A#0101F40064");
     const uint8_t data[] = {1, 1, 0xF4, 0, 0x64};
     TEST_ASSERT_EQUAL_INT64(1760000000123456, frame.time_us);
@@ -49,7 +45,7 @@ static void test_line_of_a_standard_frame_gives_its_parts(void) {
     TEST_ASSERT_FALSE(frame.extended || frame.remote || frame.error || frame.fd);
 }
 
-static void test_mark_tells_who_sent_it(void) {
+TEST(test_mark_tells_who_sent_it) {
     TEST_ASSERT_EQUAL(CANDUMP_RECEIVED, good("(1.0) can0 100#00 R").mark);
     TEST_ASSERT_EQUAL(CANDUMP_SENT, good("(1.0) can0 100#00  T").mark);
     TEST_ASSERT_EQUAL(CANDUMP_SENT, good("(1.0) can0 100# t").mark);
@@ -57,12 +53,12 @@ static void test_mark_tells_who_sent_it(void) {
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, candump_to_core(&(candump_t){.mark = CANDUMP_UNMARKED}).kind);
 }
 
-static void test_line_end_of_any_kind_is_no_part_of_the_frame(void) {
+TEST(test_line_end_of_any_kind_is_no_part_of_the_frame) {
     TEST_ASSERT_EQUAL(1, good("(1.000001) can0 100#AB\r\n").length);
     TEST_ASSERT_EQUAL(1, good("  (1.000001)\tcan0\t100#ab  \t\n").length);
 }
 
-static void test_time_takes_one_to_nine_decimals_or_none(void) {
+TEST(test_time_takes_one_to_nine_decimals_or_none) {
     TEST_ASSERT_EQUAL_INT64(1500000, good("(1.5) c 100#").time_us);
     TEST_ASSERT_EQUAL_INT64(1000001, good("(1.000001999) c 100#").time_us);
     TEST_ASSERT_EQUAL_INT64(7000000, good("(7) c 100#").time_us);
@@ -76,7 +72,7 @@ static void test_time_takes_one_to_nine_decimals_or_none(void) {
     check_bad("(1.5 c 100#", "time");
 }
 
-static void test_extended_remote_error_and_fd_frames_are_told_apart(void) {
+TEST(test_extended_remote_error_and_fd_frames_are_told_apart) {
     candump_t frame = good("(1.0) can0 0000010A#00");
     TEST_ASSERT_TRUE(frame.extended);
     TEST_ASSERT_EQUAL_HEX32(266U | IW_CAN_EXTENDED, candump_to_core(&frame).id);
@@ -98,7 +94,7 @@ static void test_extended_remote_error_and_fd_frames_are_told_apart(void) {
     TEST_ASSERT_EQUAL(2, good("(1.0) can0 100#11.22").length);
 }
 
-static void test_blank_lines_and_comments_are_empty(void) {
+TEST(test_blank_lines_and_comments_are_empty) {
     candump_t frame;
     const char *why;
     const char *const lines[] = {"", "\n", " \t\r\n", "# a comment", "; another", "  # (1.0) can0 100#00"};
@@ -107,7 +103,7 @@ static void test_blank_lines_and_comments_are_empty(void) {
     }
 }
 
-static void test_bad_line_tells_cause_and_cure(void) {
+TEST(test_bad_line_tells_cause_and_cure) {
     check_bad("can0  10A   [5]  01 01 F4 00 64", "candump -L");
     check_bad("(1.0)  can0  10A   [5]  01 01 F4 00 64", "screen form");
     check_bad("(1.0)", "cut");
@@ -133,7 +129,7 @@ static void test_bad_line_tells_cause_and_cure(void) {
     check_bad("(1.0) ca\x01n 10A#00", "interface");
 }
 
-static void test_fd_frame_holds_64_bytes_and_not_more(void) {
+TEST(test_fd_frame_holds_64_bytes_and_not_more) {
     char line[256] = "(1.0) can0 10A##0";
     for (int i = 0; i < 64; i++) {
         (void)strcat(line, "5A");
@@ -149,7 +145,7 @@ static void check_round_trip(const char *line) {
     TEST_ASSERT_EQUAL_STRING(line, written);
 }
 
-static void test_writing_what_was_read_gives_the_same_line(void) {
+TEST(test_writing_what_was_read_gives_the_same_line) {
     check_round_trip("(1760000000.000001) can0 10A#0101F40064\n");
     check_round_trip("(0.000000) vcan1 7FF# R\n");
     check_round_trip("(999999999999.999999) can0 1FFFFFFF#1122334455667788 T\n");
@@ -160,7 +156,7 @@ static void test_writing_what_was_read_gives_the_same_line(void) {
     check_round_trip("(1.000000) can0 123##0\n");
 }
 
-static void test_longest_line_fits(void) {
+TEST(test_longest_line_fits) {
     char line[CANDUMP_LINE_SIZE];
     candump_t frame = {.time_us = 999999999999999999, .id = CANDUMP_ID_MASK, .extended = true, .fd = true};
     frame.mark = CANDUMP_SENT;
@@ -170,7 +166,7 @@ static void test_longest_line_fits(void) {
     TEST_ASSERT_EQUAL(64, good(line).length);
 }
 
-static void test_written_interface_has_letters_and_digits_only(void) {
+TEST(test_written_interface_has_letters_and_digits_only) {
     char line[CANDUMP_LINE_SIZE];
     const iw_can_frame_t core = {.id = 266, .dlc = 1, .kind = IW_CAN_ECHO, .data = {7}};
     candump_t frame = candump_from_core(&core, 1, "unix:/run/iwheel/a-bus_1.sock.that.is.longer.than.any");
@@ -181,7 +177,7 @@ static void test_written_interface_has_letters_and_digits_only(void) {
     TEST_ASSERT_EQUAL_STRING("(0.000001) can 10A#07 T\n", line);
 }
 
-static void test_core_frame_comes_back_the_same(void) {
+TEST(test_core_frame_comes_back_the_same) {
     static const uint32_t ids[] = {0, 0x7FF, 266, 0x1FFFFFFF | IW_CAN_EXTENDED, 266 | IW_CAN_REMOTE, 266 | IW_CAN_FD};
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         for (uint8_t dlc = 0; dlc <= IW_CAN_DATA_MAX; dlc++) {
@@ -203,7 +199,7 @@ static void test_core_frame_comes_back_the_same(void) {
 }
 
 /// Every prefix and every single wrong byte of lines of every kind: an answer, and never a read outside.
-static void test_damaged_lines_are_judged_without_reading_outside(void) {
+TEST(test_damaged_lines_are_judged_without_reading_outside) {
     static const char *const lines[] = {"(1.5) can0 10A#0101F40064 T", "(1.5) can0 10A##1001122 R",
                                         "(1.5) can0 0000010A#R5", "(1.5) can0 100#1122334455667788_F"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
@@ -220,22 +216,4 @@ static void test_damaged_lines_are_judged_without_reading_outside(void) {
             }
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_line_of_a_standard_frame_gives_its_parts);
-    RUN_TEST(test_mark_tells_who_sent_it);
-    RUN_TEST(test_line_end_of_any_kind_is_no_part_of_the_frame);
-    RUN_TEST(test_time_takes_one_to_nine_decimals_or_none);
-    RUN_TEST(test_extended_remote_error_and_fd_frames_are_told_apart);
-    RUN_TEST(test_blank_lines_and_comments_are_empty);
-    RUN_TEST(test_bad_line_tells_cause_and_cure);
-    RUN_TEST(test_fd_frame_holds_64_bytes_and_not_more);
-    RUN_TEST(test_writing_what_was_read_gives_the_same_line);
-    RUN_TEST(test_longest_line_fits);
-    RUN_TEST(test_written_interface_has_letters_and_digits_only);
-    RUN_TEST(test_core_frame_comes_back_the_same);
-    RUN_TEST(test_damaged_lines_are_judged_without_reading_outside);
-    return UNITY_END();
 }

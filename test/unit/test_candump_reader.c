@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "candump_reader.h"
 
+#include "unit.h"
 #include <string.h>
 #include <unistd.h>
-#include <unity.h>
 
 static candump_reader_t reader;
 static int ends[2];
@@ -53,7 +53,7 @@ static void expect_end(void) {
     TEST_ASSERT_EQUAL(CANDUMP_READ_END, candump_reader_next(&reader, &frame));
 }
 
-static void test_reader_byte_order_mark_is_passed_over(void) {
+TEST(test_reader_byte_order_mark_is_passed_over) {
     give("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
     end_input();
     expect_frame(0x100, 1);
@@ -61,7 +61,7 @@ static void test_reader_byte_order_mark_is_passed_over(void) {
     expect_end();
 }
 
-static void test_reader_foreign_form_is_named_once(void) {
+TEST(test_reader_foreign_form_is_named_once) {
     candump_t frame;
     give("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
     end_input();
@@ -70,7 +70,7 @@ static void test_reader_foreign_form_is_named_once(void) {
     expect_end();
 }
 
-static void test_reader_form_is_not_guessed_from_a_frame(void) {
+TEST(test_reader_form_is_not_guessed_from_a_frame) {
     static const char *const lines[] = {"(1.0) can0 100#00\n",
                                         "# a, b [1]\n(1.0) can0 100#00\n",
                                         "; a, b [1]\n(1.0) can0 100#00\n",
@@ -85,7 +85,7 @@ static void test_reader_form_is_not_guessed_from_a_frame(void) {
     }
 }
 
-static void test_lines_come_in_order_with_their_numbers(void) {
+TEST(test_lines_come_in_order_with_their_numbers) {
     give("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
     end_input();
     expect_frame(0x100, 1);
@@ -95,12 +95,12 @@ static void test_lines_come_in_order_with_their_numbers(void) {
     expect_end();
 }
 
-static void test_empty_input_ends(void) {
+TEST(test_empty_input_ends) {
     end_input();
     expect_end();
 }
 
-static void test_line_is_handed_out_while_the_writer_goes_on(void) {
+TEST(test_line_is_handed_out_while_the_writer_goes_on) {
     give("(1.0) can0 100#00\n(1.1) can");
     expect_frame(0x100, 1);
     give("0 101#00\n");
@@ -109,7 +109,7 @@ static void test_line_is_handed_out_while_the_writer_goes_on(void) {
     expect_end();
 }
 
-static void test_last_line_without_end_is_left_out_and_told(void) {
+TEST(test_last_line_without_end_is_left_out_and_told) {
     give("(1.0) can0 100#0011\n(1.1) can0 100#00");
     end_input();
     expect_frame(0x100, 1);
@@ -117,14 +117,14 @@ static void test_last_line_without_end_is_left_out_and_told(void) {
     expect_end();
 }
 
-static void test_blank_rest_is_no_line(void) {
+TEST(test_blank_rest_is_no_line) {
     give("(1.0) can0 100#0011\n \t");
     end_input();
     expect_frame(0x100, 1);
     expect_end();
 }
 
-static void test_endless_line_is_told_once_and_the_next_is_read(void) {
+TEST(test_endless_line_is_told_once_and_the_next_is_read) {
     char long_line[5000];
     memset(long_line, '(', sizeof long_line);
     long_line[sizeof long_line - 1U] = '\n';
@@ -140,7 +140,7 @@ static void test_endless_line_is_told_once_and_the_next_is_read(void) {
     expect_end();
 }
 
-static void test_zero_bytes_are_told_as_bad_and_lose_nothing_else(void) {
+TEST(test_zero_bytes_are_told_as_bad_and_lose_nothing_else) {
     static const char text[] = "(1.0) can0 100#00\n\0\0\0\n(1.1) can0 101#00\n";
     give_bytes(text, sizeof text - 1U);
     end_input();
@@ -150,13 +150,13 @@ static void test_zero_bytes_are_told_as_bad_and_lose_nothing_else(void) {
     expect_end();
 }
 
-static void test_what_cannot_be_read_is_no_end_of_file(void) {
+TEST(test_what_cannot_be_read_is_no_end_of_file) {
     candump_t frame;
     candump_reader_init(&reader, -1);
     TEST_ASSERT_EQUAL(CANDUMP_READ_FAILED, candump_reader_next(&reader, &frame));
 }
 
-static void test_more_than_the_buffer_holds_comes_whole(void) {
+TEST(test_more_than_the_buffer_holds_comes_whole) {
     uint64_t line = 0;
     for (unsigned round = 0; round < 30U; round++) {
         for (unsigned i = 0; i < 200U; i++) {
@@ -168,21 +168,4 @@ static void test_more_than_the_buffer_holds_comes_whole(void) {
     }
     end_input();
     expect_end();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_reader_byte_order_mark_is_passed_over);
-    RUN_TEST(test_reader_foreign_form_is_named_once);
-    RUN_TEST(test_reader_form_is_not_guessed_from_a_frame);
-    RUN_TEST(test_lines_come_in_order_with_their_numbers);
-    RUN_TEST(test_empty_input_ends);
-    RUN_TEST(test_line_is_handed_out_while_the_writer_goes_on);
-    RUN_TEST(test_last_line_without_end_is_left_out_and_told);
-    RUN_TEST(test_blank_rest_is_no_line);
-    RUN_TEST(test_endless_line_is_told_once_and_the_next_is_read);
-    RUN_TEST(test_zero_bytes_are_told_as_bad_and_lose_nothing_else);
-    RUN_TEST(test_what_cannot_be_read_is_no_end_of_file);
-    RUN_TEST(test_more_than_the_buffer_holds_comes_whole);
-    return UNITY_END();
 }

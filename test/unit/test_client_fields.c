@@ -5,7 +5,7 @@
 
 #include "iwheel_northbound/json_in.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -51,13 +51,13 @@ static void compare(const char *text, size_t length) {
     }
 }
 
-static void test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson(void) {
+TEST(test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson) {
     for (size_t length = 0; length < sizeof(STATUS); length++) {
         compare(STATUS, length);
     }
 }
 
-static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
+TEST(test_json_every_change_of_a_byte_is_judged_as_by_jansson) {
     static const char bytes[] = "\"\\{}[],:0-.eE+ x\x01\x7f\xc3\xa4\xed\xf5\nnu/";
     char text[sizeof(STATUS)];
     unsigned taken = 0;
@@ -72,7 +72,7 @@ static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
     TEST_ASSERT_GREATER_THAN(1000, taken); // Both sides saw good ones too.
 }
 
-static void test_json_hard_cases_are_judged_as_by_jansson(void) {
+TEST(test_json_hard_cases_are_judged_as_by_jansson) {
     static const char *const texts[] = {"{}",
                                         " {} ",
                                         "{ }",
@@ -127,7 +127,7 @@ static void test_json_hard_cases_are_judged_as_by_jansson(void) {
     }
 }
 
-static void test_json_a_nul_stands_nowhere(void) {
+TEST(test_json_a_nul_stands_nowhere) {
     char text[sizeof(STATUS)];
     for (size_t at = 0; at < sizeof(STATUS); at++) {
         memcpy(text, STATUS, sizeof(STATUS));
@@ -136,7 +136,7 @@ static void test_json_a_nul_stands_nowhere(void) {
     }
 }
 
-static void test_json_depth_is_bounded(void) {
+TEST(test_json_depth_is_bounded) {
     char text[200] = "{\"a\":";
     const char *const inner = text + 5;
     for (unsigned depth = 1; depth < 40; depth++) {
@@ -148,7 +148,7 @@ static void test_json_depth_is_bounded(void) {
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
 
-static void test_json_many_keys_cost_no_more_than_their_length(void) {
+TEST(test_json_many_keys_cost_no_more_than_their_length) {
     static char text[IWC_LINE_MAX];
     size_t used = (size_t)snprintf(text, sizeof text, "{\"a\":1");
     for (unsigned i = 0; used < sizeof text - 30U; i++) {
@@ -158,7 +158,7 @@ static void test_json_many_keys_cost_no_more_than_their_length(void) {
     TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are remembered to the end.
 }
 
-static void test_field_integers_are_whole_and_fit(void) {
+TEST(test_field_integers_are_whole_and_fit) {
     const iwc_message_t message =
         message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"d\":1.0,\"e\":null,\"f\":true,\"g\":\"1\","
                    "\"h\":1e2,\"i\":{\"a\":5},\"k\":-0}");
@@ -175,7 +175,7 @@ static void test_field_integers_are_whole_and_fit(void) {
     }
 }
 
-static void test_field_texts_move_no_terminal_and_are_cut_between_characters(void) {
+TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters) {
     const iwc_message_t message = message_of(STATUS);
     const iwc_message_t umlauts = message_of("{\"a\":\"\xc3\xa4\xc3\xa4\\u001b\"}");
     char text[20];
@@ -192,7 +192,7 @@ static void test_field_texts_move_no_terminal_and_are_cut_between_characters(voi
     TEST_ASSERT_FALSE(iwc_is(&message, "t_us", "99000000"));
 }
 
-static void test_field_json_is_what_stands_there(void) {
+TEST(test_field_json_is_what_stands_there) {
     size_t length = 0;
     const iwc_message_t message = message_of(STATUS);
     const char *bus = iwc_json(&message, "bus", &length);
@@ -202,7 +202,7 @@ static void test_field_json_is_what_stands_there(void) {
     TEST_ASSERT_EQUAL_size_t(0, length);
 }
 
-static void test_state_of_a_snapshot_is_read_and_unknown_is_not_zero(void) {
+TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero) {
     const iwc_message_t message = message_of(STATUS);
     iwc_state_t state;
     TEST_ASSERT_TRUE(iwc_state(gateway, &message, &state));
@@ -229,7 +229,7 @@ static void test_state_of_a_snapshot_is_read_and_unknown_is_not_zero(void) {
     TEST_ASSERT_EQUAL_INT64(0, state.right.force_net_mN.value);
 }
 
-static void test_state_of_what_is_no_snapshot_is_untouched(void) {
+TEST(test_state_of_what_is_no_snapshot_is_untouched) {
     static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}",
                                         "{\"event\":\"bus\",\"state\":\"down\"}"};
     iwc_state_t state = {.t_us = 42};
@@ -238,20 +238,4 @@ static void test_state_of_what_is_no_snapshot_is_untouched(void) {
         TEST_ASSERT_FALSE(iwc_state(gateway, &message, &state));
         TEST_ASSERT_EQUAL_INT64(42, state.t_us);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson);
-    RUN_TEST(test_json_every_change_of_a_byte_is_judged_as_by_jansson);
-    RUN_TEST(test_json_hard_cases_are_judged_as_by_jansson);
-    RUN_TEST(test_json_a_nul_stands_nowhere);
-    RUN_TEST(test_json_depth_is_bounded);
-    RUN_TEST(test_json_many_keys_cost_no_more_than_their_length);
-    RUN_TEST(test_field_integers_are_whole_and_fit);
-    RUN_TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters);
-    RUN_TEST(test_field_json_is_what_stands_there);
-    RUN_TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero);
-    RUN_TEST(test_state_of_what_is_no_snapshot_is_untouched);
-    return UNITY_END();
 }

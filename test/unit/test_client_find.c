@@ -2,7 +2,7 @@
 // The search for the only gateway.
 #include "iwheel_client/client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,19 +43,19 @@ void tearDown(void) {
     TEST_ASSERT_EQUAL_INT(0, system(command));
 }
 
-static void test_find_missing_directory_is_none(void) {
+TEST(test_find_missing_directory_is_none) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find("/nonexistent", out, sizeof out));
     TEST_ASSERT_EQUAL_STRING("", out);
 }
 
-static void test_find_only_sockets_with_the_suffix_count(void) {
+TEST(test_find_only_sockets_with_the_suffix_count) {
     add_file("gateway.sock");
     add_socket("control");
     add_socket(".sock");
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof out));
 }
 
-static void test_find_the_only_one_is_taken(void) {
+TEST(test_find_the_only_one_is_taken) {
     char path[128];
     add_file("gateway.lock");
     add_socket("can0.sock");
@@ -64,7 +64,7 @@ static void test_find_the_only_one_is_taken(void) {
     TEST_ASSERT_EQUAL_STRING(path, out);
 }
 
-static void test_find_several_are_listed(void) {
+TEST(test_find_several_are_listed) {
     add_socket("can0.sock");
     add_socket("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
@@ -72,7 +72,7 @@ static void test_find_several_are_listed(void) {
     TEST_ASSERT_NOT_NULL(strstr(out, "/can1.sock"));
 }
 
-static void test_find_list_that_does_not_fit_is_cut_between_paths(void) {
+TEST(test_find_list_that_does_not_fit_is_cut_between_paths) {
     char little[48];
     add_socket("can0.sock");
     add_socket("can1.sock");
@@ -96,13 +96,13 @@ static void add_pair(void) {
     TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0666));
 }
 
-static void test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first(void) {
+TEST(test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first) {
     add_pair();
     TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
 }
 
-static void test_find_who_may_not_drive_gets_the_socket_to_watch_by(void) {
+TEST(test_find_who_may_not_drive_gets_the_socket_to_watch_by) {
     if (geteuid() != 0) {
         TEST_IGNORE_MESSAGE("needs root to become somebody else");
     }
@@ -114,7 +114,7 @@ static void test_find_who_may_not_drive_gets_the_socket_to_watch_by(void) {
     TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
 }
 
-static void test_find_who_may_use_neither_is_led_to_the_one_to_drive_by(void) {
+TEST(test_find_who_may_use_neither_is_led_to_the_one_to_drive_by) {
     if (geteuid() != 0) {
         TEST_IGNORE_MESSAGE("needs root to become somebody else");
     }
@@ -127,25 +127,11 @@ static void test_find_who_may_use_neither_is_led_to_the_one_to_drive_by(void) {
     TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
 }
 
-static void test_find_a_socket_to_watch_by_alone_counts_as_a_gateway(void) {
+TEST(test_find_a_socket_to_watch_by_alone_counts_as_a_gateway) {
     add_pair();
     TEST_ASSERT_EQUAL_INT(0, unlink(path_of("can0.sock")));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
     add_socket("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_find_missing_directory_is_none);
-    RUN_TEST(test_find_only_sockets_with_the_suffix_count);
-    RUN_TEST(test_find_the_only_one_is_taken);
-    RUN_TEST(test_find_several_are_listed);
-    RUN_TEST(test_find_list_that_does_not_fit_is_cut_between_paths);
-    RUN_TEST(test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first);
-    RUN_TEST(test_find_who_may_not_drive_gets_the_socket_to_watch_by);
-    RUN_TEST(test_find_who_may_use_neither_is_led_to_the_one_to_drive_by);
-    RUN_TEST(test_find_a_socket_to_watch_by_alone_counts_as_a_gateway);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // iwc_recording against a gateway that a test plays itself: pieces are taken only if they are what was asked for, and whole.
 #include "iwheel_client/client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -48,7 +48,7 @@ static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
 /// "123456789" and its parts, as zlib.crc32 has them.
 #define WHOLE "\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780262"
 
-static void test_last_piece_is_taken_with_both_checksums(void) {
+TEST(test_last_piece_is_taken_with_both_checksums) {
     char heard[256] = "";
     TEST_ASSERT_EQUAL(IWC_OK, ask(0, 0, "\"offset\":0,\"size\":9," WHOLE ",\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL_STRING_LEN("123456789", out, 9);
@@ -59,7 +59,7 @@ static void test_last_piece_is_taken_with_both_checksums(void) {
     TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"recording\",\"name\":\"" NAME "\",\"offset\":0}\n", heard);
 }
 
-static void test_second_piece_carries_the_checksum_on(void) {
+TEST(test_second_piece_carries_the_checksum_on) {
     TEST_ASSERT_EQUAL(
         IWC_OK,
         ask(4, 0x9BE3E0A3U,
@@ -68,13 +68,13 @@ static void test_second_piece_carries_the_checksum_on(void) {
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
 }
 
-static void test_end_of_the_file_is_an_empty_piece(void) {
+TEST(test_end_of_the_file_is_an_empty_piece) {
     TEST_ASSERT_EQUAL(
         IWC_OK, ask(9, 0xCBF43926U, "\"offset\":9,\"size\":9,\"data\":\"\",\"crc32\":0,\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL(0, piece.length);
 }
 
-static void test_piece_that_is_not_right_ends_the_connection(void) {
+TEST(test_piece_that_is_not_right_ends_the_connection) {
     static const char *const bad[] = {
         "\"offset\":0,\"size\":9,\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780263,\"file_crc32\":null",
         "\"offset\":3,\"size\":9," WHOLE ",\"file_crc32\":null",
@@ -95,7 +95,7 @@ static void test_piece_that_is_not_right_ends_the_connection(void) {
     }
 }
 
-static void test_piece_longer_than_room_is_not_written(void) {
+TEST(test_piece_longer_than_room_is_not_written) {
     static char line[50000];
     int n = snprintf(line, sizeof line,
                      "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",\"offset\":0,\"size\":99999,\"data\":\"");
@@ -108,7 +108,7 @@ static void test_piece_longer_than_room_is_not_written(void) {
     TEST_ASSERT_EQUAL('X', guarded[IWC_PIECE_MAX]);
 }
 
-static void test_name_that_could_not_stand_in_a_request_is_not_sent(void) {
+TEST(test_name_that_could_not_stand_in_a_request_is_not_sent) {
     char byte;
     static const char *const bad[] = {
         "", "a\"b", "../a", "a\\b", "a b", "a\nb", "0123456789012345678901234567890123456789012345678901234567890123"};
@@ -119,21 +119,9 @@ static void test_name_that_could_not_stand_in_a_request_is_not_sent(void) {
     TEST_ASSERT_EQUAL(-1, recv(server, &byte, 1, MSG_DONTWAIT));
 }
 
-static void test_refusal_leaves_the_connection(void) {
+TEST(test_refusal_leaves_the_connection) {
     say("{\"id\":2,\"ok\":false,\"error\":\"bad_value\",\"message\":\"gone\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_recording(gateway, NAME, SOON, out, &piece));
     TEST_ASSERT_EQUAL_STRING("gone", iwc_reason(gateway));
     TEST_ASSERT_NOT_EQUAL(-1, iwc_fd(gateway));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_last_piece_is_taken_with_both_checksums);
-    RUN_TEST(test_second_piece_carries_the_checksum_on);
-    RUN_TEST(test_end_of_the_file_is_an_empty_piece);
-    RUN_TEST(test_piece_that_is_not_right_ends_the_connection);
-    RUN_TEST(test_piece_longer_than_room_is_not_written);
-    RUN_TEST(test_name_that_could_not_stand_in_a_request_is_not_sent);
-    RUN_TEST(test_refusal_leaves_the_connection);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // libiwheel-client against a gateway that a test plays itself, at the other end of a socket pair.
 #include "iwheel_client/client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -80,13 +80,13 @@ static void expect_event(const char *text) {
 
 // ---- connecting ---------------------------------------------------------------------------------------------------
 
-static void test_connect_greeting_tells_our_number_and_sends_nothing(void) {
+TEST(test_connect_greeting_tells_our_number_and_sends_nothing) {
     TEST_ASSERT_EQUAL_INT64(7, iwc_number(gateway));
     TEST_ASSERT_EQUAL_STRING("", hear());
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-static void test_connect_too_many_clients_is_refused_with_its_words(void) {
+TEST(test_connect_too_many_clients_is_refused_with_its_words) {
     TEST_ASSERT_EQUAL(
         IWC_REFUSED,
         adopt_with("{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"16 of 16\"}\n"));
@@ -95,13 +95,13 @@ static void test_connect_too_many_clients_is_refused_with_its_words(void) {
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
 }
 
-static void test_connect_without_greeting_is_given_up(void) {
+TEST(test_connect_without_greeting_is_given_up) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, adopt_with("{\"event\":\"hel"));
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
-static void test_connect_another_service_is_garbled(void) {
+TEST(test_connect_another_service_is_garbled) {
     static const char *const first[] = {
         "ok iwheel-sim\n",          "[1]\n", "{\"event\":\"hi\"}\n",
         "{\"id\":1,\"ok\":true}\n", "{}\n",  "{\"event\":\"hello\",\"event\":\"hello\"}\n"};
@@ -111,7 +111,7 @@ static void test_connect_another_service_is_garbled(void) {
     }
 }
 
-static void test_connect_nobody_there_is_told_with_the_reason(void) {
+TEST(test_connect_nobody_there_is_told_with_the_reason) {
     char path[200];
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_connect(gateway, "/nonexistent/x.sock", 0));
     TEST_ASSERT_EQUAL_INT(ENOENT, iwc_errno(gateway));
@@ -122,7 +122,7 @@ static void test_connect_nobody_there_is_told_with_the_reason(void) {
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwc_errno(gateway));
 }
 
-static void test_connect_newer_protocol_only_reads_and_stops(void) {
+TEST(test_connect_newer_protocol_only_reads_and_stops) {
     const iwc_drive_t command = {.left_mm_s = 1};
     TEST_ASSERT_EQUAL(IWC_NEWER, adopt_with("{\"event\":\"hello\",\"api\":2,\"client\":1}\n"));
     TEST_ASSERT_EQUAL(IWC_NEWER, iwc_arm(gateway, NULL, false, 0, NULL));
@@ -139,7 +139,7 @@ static void test_connect_newer_protocol_only_reads_and_stops(void) {
 
 // ---- asking -------------------------------------------------------------------------------------------------------
 
-static void test_ask_reply_with_its_id_is_the_answer_and_events_are_kept(void) {
+TEST(test_ask_reply_with_its_id_is_the_answer_and_events_are_kept) {
     say("{\"event\":\"a\"}\n{\"id\":99,\"ok\":true}\n{\"id\":2,\"ok\":true,\"x\":5}\n{\"event\":\"b\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_ask(gateway, "{\"cmd\":\"status\"}", SOON, &message));
     TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"status\"}\n", hear());
@@ -152,7 +152,7 @@ static void test_ask_reply_with_its_id_is_the_answer_and_events_are_kept(void) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-static void test_ask_late_reply_answers_nothing_else(void) {
+TEST(test_ask_late_reply_answers_nothing_else) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"why\"}", 1, &message));
     say("{\"id\":2,\"ok\":false,\"error\":\"late\",\"message\":\"\"}\n{\"id\":4,\"ok\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_reset(gateway, SOON));
@@ -160,7 +160,7 @@ static void test_ask_late_reply_answers_nothing_else(void) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-static void test_ask_refusal_tells_name_and_words(void) {
+TEST(test_ask_refusal_tells_name_and_words) {
     say("{\"id\":2,\"ok\":false,\"error\":\"estop_pressed\",\"message\":\"release \\\"it\\\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_arm(gateway, "test", false, SOON, NULL));
     TEST_ASSERT_EQUAL_STRING("estop_pressed", iwc_error(gateway));
@@ -168,13 +168,13 @@ static void test_ask_refusal_tells_name_and_words(void) {
     TEST_ASSERT_GREATER_OR_EQUAL(0, iwc_fd(gateway));
 }
 
-static void test_ask_refusal_without_id_is_for_who_waits(void) {
+TEST(test_ask_refusal_without_id_is_for_who_waits) {
     say("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
     TEST_ASSERT_EQUAL_STRING("bad_json", iwc_error(gateway));
 }
 
-static void test_ask_events_without_end_do_not_outlast_the_timeout(void) {
+TEST(test_ask_events_without_end_do_not_outlast_the_timeout) {
     const pid_t flood = fork();
     if (flood == 0) {
         for (;;) {
@@ -189,7 +189,7 @@ static void test_ask_events_without_end_do_not_outlast_the_timeout(void) {
     TEST_ASSERT_EQUAL(IWC_OK, latest);
 }
 
-static void test_ask_what_is_no_request_is_not_sent(void) {
+TEST(test_ask_what_is_no_request_is_not_sent) {
     char text[IWC_REQUEST_MAX + 10U];
     int64_t id = 0;
     static const char *const bad[] = {"",
@@ -213,7 +213,7 @@ static void test_ask_what_is_no_request_is_not_sent(void) {
     TEST_ASSERT_EQUAL_STRING("", hear());
 }
 
-static void test_ask_helpers_send_what_the_protocol_says(void) {
+TEST(test_ask_helpers_send_what_the_protocol_says) {
     const iwc_drive_t plain = {.left_mm_s = -300, .right_mm_s = 200};
     const iwc_drive_t full = {.left_mm_s = 1, .right_mm_s = 2, .has_current = true, .left_mA = 3, .right_mA = -4};
     (void)iwc_arm(gateway, "a \"b\\", true, 0, NULL);
@@ -236,7 +236,7 @@ static void test_ask_helpers_send_what_the_protocol_says(void) {
         hear());
 }
 
-static void test_ask_terms_and_applied_values_come_back(void) {
+TEST(test_ask_terms_and_applied_values_come_back) {
     iwc_terms_t terms;
     iwc_applied_t applied;
     const iwc_drive_t command = {.left_mm_s = 2000, .right_mm_s = 2000};
@@ -264,7 +264,7 @@ static void test_ask_terms_and_applied_values_come_back(void) {
 
 // ---- lines --------------------------------------------------------------------------------------------------------
 
-static void test_line_in_single_bytes_is_one_message(void) {
+TEST(test_line_in_single_bytes_is_one_message) {
     static const char text[] = "{\"event\":\"a\"}\n{\"event\":\"b\"}\n";
     char byte[2] = "";
     for (size_t i = 0; text[i] != '\0'; i++) {
@@ -288,7 +288,7 @@ static void say_long(size_t length) {
     say(text);
 }
 
-static void test_line_of_the_longest_length_is_taken_again_and_again(void) {
+TEST(test_line_of_the_longest_length_is_taken_again_and_again) {
     for (int i = 0; i < 10; i++) {
         say_long(IWC_LINE_MAX);
         TEST_ASSERT_EQUAL(IWC_OK, iwc_next(gateway, SOON, &message));
@@ -296,7 +296,7 @@ static void test_line_of_the_longest_length_is_taken_again_and_again(void) {
     }
 }
 
-static void test_line_longer_than_that_ends_the_connection(void) {
+TEST(test_line_longer_than_that_ends_the_connection) {
     say("{\"event\":\"a\"}\n");
     say_long(IWC_LINE_MAX + 1U);
     expect_event("{\"event\":\"a\"}");
@@ -304,14 +304,14 @@ static void test_line_longer_than_that_ends_the_connection(void) {
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
-static void test_line_without_end_ends_the_connection(void) {
+TEST(test_line_without_end_ends_the_connection) {
     for (unsigned i = 0; i <= IWC_LINE_MAX / 64U; i++) {
         say("{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{");
     }
     TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_next(gateway, SOON, &message));
 }
 
-static void test_line_of_garbage_ends_the_connection_behind_the_good_ones(void) {
+TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones) {
     static const char *const bad[] = {"x\n", "\n", "{\"ok\":true,\"event\":\"both\"}\n", "{\"neither\":1}\n",
                                       "{\"event\":\"\xff\"}\n"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -325,7 +325,7 @@ static void test_line_of_garbage_ends_the_connection_behind_the_good_ones(void) 
     }
 }
 
-static void test_line_that_the_dead_gateway_left_half_is_no_message(void) {
+TEST(test_line_that_the_dead_gateway_left_half_is_no_message) {
     const iwc_drive_t command = {.left_mm_s = 100};
     say("{\"event\":\"a\"}\n{\"event\":\"b\"}");
     (void)shutdown(server, SHUT_RDWR);
@@ -342,7 +342,7 @@ static void test_line_that_the_dead_gateway_left_half_is_no_message(void) {
 
 // ---- more than is taken -------------------------------------------------------------------------------------------
 
-static void test_flood_nobody_takes_leaves_the_newest_and_the_count(void) {
+TEST(test_flood_nobody_takes_leaves_the_newest_and_the_count) {
     char text[300];
     uint64_t told = 0;
     int64_t last = -1;
@@ -363,7 +363,7 @@ static void test_flood_nobody_takes_leaves_the_newest_and_the_count(void) {
     TEST_ASSERT_EQUAL_UINT64(5000, told);
 }
 
-static void test_flood_of_different_things_drops_the_oldest(void) {
+TEST(test_flood_of_different_things_drops_the_oldest) {
     char text[100];
     uint64_t told = 0;
     int64_t last = -1;
@@ -380,7 +380,7 @@ static void test_flood_of_different_things_drops_the_oldest(void) {
     TEST_ASSERT_EQUAL_UINT64(300, told);
 }
 
-static void test_latest_keeps_one_of_each_thing_in_order(void) {
+TEST(test_latest_keeps_one_of_each_thing_in_order) {
     say("{\"event\":\"fault\",\"cause\":\"overspeed\"}\n{\"event\":\"state\",\"n\":1}\n{\"id\":1,\"ok\":true}\n"
         "{\"event\":\"fault\",\"cause\":\"bus_down\"}\n{\"event\":\"lost\",\"count\":10}\n{\"event\":\"state\",\"n\":2}"
         "\n"
@@ -401,7 +401,7 @@ static void test_latest_keeps_one_of_each_thing_in_order(void) {
     TEST_ASSERT_FALSE(iwc_pending(gateway));
 }
 
-static void test_latest_leaves_the_message_in_hand_alone(void) {
+TEST(test_latest_leaves_the_message_in_hand_alone) {
     say("{\"event\":\"a\"}\n");
     expect_event("{\"event\":\"a\"}");
     say("{\"event\":\"b\"}\n{\"event\":\"b\"}\n{\"event\":");
@@ -415,7 +415,7 @@ static void test_latest_leaves_the_message_in_hand_alone(void) {
 
 // ---- driving ------------------------------------------------------------------------------------------------------
 
-static void test_drive_leaves_once_and_is_never_repeated(void) {
+TEST(test_drive_leaves_once_and_is_never_repeated) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL_STRING("{\"id\":1,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n", hear());
@@ -426,7 +426,7 @@ static void test_drive_leaves_once_and_is_never_repeated(void) {
     TEST_ASSERT_EQUAL_STRING("", hear());
 }
 
-static void test_drive_to_a_gateway_that_hangs_is_told_and_forgotten(void) {
+TEST(test_drive_to_a_gateway_that_hangs_is_told_and_forgotten) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     for (unsigned i = 0; i < IWC_DRIVES_MAX; i++) {
         TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
@@ -459,7 +459,7 @@ static void stuff(void) {
     TEST_FAIL_MESSAGE("the socket never fills");
 }
 
-static void test_drive_that_cannot_leave_never_leaves_later(void) {
+TEST(test_drive_that_cannot_leave_never_leaves_later) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     stuff();
     for (unsigned i = 0; i <= IWC_DRIVES_MAX; i++) {
@@ -474,7 +474,7 @@ static void test_drive_that_cannot_leave_never_leaves_later(void) {
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL)); // What did not leave counts not as unanswered.
 }
 
-static void test_drive_of_which_half_has_left_ends_the_connection(void) {
+TEST(test_drive_of_which_half_has_left_ends_the_connection) {
     char text[IWC_REQUEST_MAX - 20U];
     char line[] = "{\"id\":1,\"cmd\":\"hello\"}\n";
     int64_t id = 0;
@@ -487,7 +487,7 @@ static void test_drive_of_which_half_has_left_ends_the_connection(void) {
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
-static void test_stop_that_is_not_answered_ends_the_connection(void) {
+TEST(test_stop_that_is_not_answered_ends_the_connection) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_stop(gateway, 1));
     TEST_ASSERT_TRUE(server_sees_the_end());
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_next(gateway, 0, &message));
@@ -497,7 +497,7 @@ static void test_stop_that_is_not_answered_ends_the_connection(void) {
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
 }
 
-static void test_drive_to_a_gateway_that_is_gone_raises_no_signal(void) {
+TEST(test_drive_to_a_gateway_that_is_gone_raises_no_signal) {
     const iwc_drive_t command = {.left_mm_s = 300};
     say("{\"event\":\"stop\"}\n");
     (void)shutdown(server, SHUT_RDWR);
@@ -508,14 +508,14 @@ static void test_drive_to_a_gateway_that_is_gone_raises_no_signal(void) {
 
 // ---- processes and signals ----------------------------------------------------------------------------------------
 
-static void test_close_ends_the_connection_although_a_copy_of_it_is_open(void) {
+TEST(test_close_ends_the_connection_although_a_copy_of_it_is_open) {
     const int copy = dup(iwc_fd(gateway));
     iwc_close(gateway);
     TEST_ASSERT_TRUE(server_sees_the_end());
     (void)close(copy);
 }
 
-static void test_fork_child_neither_drives_nor_ends_the_connection(void) {
+TEST(test_fork_child_neither_drives_nor_ends_the_connection) {
     int status = -1;
     const iwc_drive_t command = {.left_mm_s = 300};
     const pid_t child = fork();
@@ -535,7 +535,7 @@ static void note(int number) {
     (void)number;
 }
 
-static void test_signal_let_in_ends_the_wait(void) {
+TEST(test_signal_let_in_ends_the_wait) {
     struct sigaction action = {.sa_handler = note};
     struct sigaction before;
     sigset_t blocked;
@@ -553,48 +553,9 @@ static void test_signal_let_in_ends_the_wait(void) {
     (void)sigaction(SIGUSR1, &before, NULL);
 }
 
-static void test_words_every_result_has_some(void) {
+TEST(test_words_every_result_has_some) {
     for (int i = IWC_OK; i <= IWC_SEVERAL; i++) {
         TEST_ASSERT_GREATER_THAN(3, strlen(iwc_words((iwc_result_t)i)));
     }
     TEST_ASSERT_EQUAL_STRING("", iwc_words((iwc_result_t)99));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_connect_greeting_tells_our_number_and_sends_nothing);
-    RUN_TEST(test_connect_too_many_clients_is_refused_with_its_words);
-    RUN_TEST(test_connect_without_greeting_is_given_up);
-    RUN_TEST(test_connect_another_service_is_garbled);
-    RUN_TEST(test_connect_nobody_there_is_told_with_the_reason);
-    RUN_TEST(test_connect_newer_protocol_only_reads_and_stops);
-    RUN_TEST(test_ask_reply_with_its_id_is_the_answer_and_events_are_kept);
-    RUN_TEST(test_ask_late_reply_answers_nothing_else);
-    RUN_TEST(test_ask_refusal_tells_name_and_words);
-    RUN_TEST(test_ask_refusal_without_id_is_for_who_waits);
-    RUN_TEST(test_ask_events_without_end_do_not_outlast_the_timeout);
-    RUN_TEST(test_ask_what_is_no_request_is_not_sent);
-    RUN_TEST(test_ask_helpers_send_what_the_protocol_says);
-    RUN_TEST(test_ask_terms_and_applied_values_come_back);
-    RUN_TEST(test_line_in_single_bytes_is_one_message);
-    RUN_TEST(test_line_of_the_longest_length_is_taken_again_and_again);
-    RUN_TEST(test_line_longer_than_that_ends_the_connection);
-    RUN_TEST(test_line_without_end_ends_the_connection);
-    RUN_TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones);
-    RUN_TEST(test_line_that_the_dead_gateway_left_half_is_no_message);
-    RUN_TEST(test_flood_nobody_takes_leaves_the_newest_and_the_count);
-    RUN_TEST(test_flood_of_different_things_drops_the_oldest);
-    RUN_TEST(test_latest_keeps_one_of_each_thing_in_order);
-    RUN_TEST(test_latest_leaves_the_message_in_hand_alone);
-    RUN_TEST(test_drive_leaves_once_and_is_never_repeated);
-    RUN_TEST(test_drive_to_a_gateway_that_hangs_is_told_and_forgotten);
-    RUN_TEST(test_drive_that_cannot_leave_never_leaves_later);
-    RUN_TEST(test_drive_of_which_half_has_left_ends_the_connection);
-    RUN_TEST(test_stop_that_is_not_answered_ends_the_connection);
-    RUN_TEST(test_drive_to_a_gateway_that_is_gone_raises_no_signal);
-    RUN_TEST(test_close_ends_the_connection_although_a_copy_of_it_is_open);
-    RUN_TEST(test_fork_child_neither_drives_nor_ends_the_connection);
-    RUN_TEST(test_signal_let_in_ends_the_wait);
-    RUN_TEST(test_words_every_result_has_some);
-    return UNITY_END();
 }

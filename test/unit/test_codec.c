@@ -3,13 +3,9 @@
 #include <string.h>
 
 #include "golden_vectors.h"
-#include "unity.h"
+#include "unit.h"
 
 #define POISON 0xA5
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static void assert_same_bytes(const iw_can_frame_t *expected, const iw_can_frame_t *actual, const char *name) {
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(expected->id, actual->id, name);
@@ -62,7 +58,7 @@ static void assert_untouched(const void *object, size_t size, const char *name) 
     }
 }
 
-static void test_golden_table_covers_all_eleven_messages(void) {
+TEST(test_golden_table_covers_all_eleven_messages) {
     static const uint32_t ids[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         unsigned found = 0;
@@ -74,7 +70,7 @@ static void test_golden_table_covers_all_eleven_messages(void) {
     TEST_ASSERT_EQUAL_UINT(55, GOLDEN_VECTORS);
 }
 
-static void test_decode_golden_frame_gives_golden_values(void) {
+TEST(test_decode_golden_frame_gives_golden_values) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         message_t message;
@@ -84,7 +80,7 @@ static void test_decode_golden_frame_gives_golden_values(void) {
     }
 }
 
-static void test_encode_golden_values_gives_golden_frame(void) {
+TEST(test_encode_golden_values_gives_golden_frame) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         iw_can_frame_t frame;
@@ -94,7 +90,7 @@ static void test_encode_golden_values_gives_golden_frame(void) {
     }
 }
 
-static void test_decode_longer_frame_ignores_what_is_behind_the_table(void) {
+TEST(test_decode_longer_frame_ignores_what_is_behind_the_table) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         for (uint8_t dlc = golden->frame.dlc; dlc <= IW_CAN_DATA_MAX; dlc++) {
@@ -109,7 +105,7 @@ static void test_decode_longer_frame_ignores_what_is_behind_the_table(void) {
     }
 }
 
-static void test_decode_shorter_frame_is_refused_and_leaves_output_alone(void) {
+TEST(test_decode_shorter_frame_is_refused_and_leaves_output_alone) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         for (uint8_t dlc = 0; dlc < golden->frame.dlc; dlc++) {
@@ -134,7 +130,7 @@ static void place_of(iw_codec_kind_t kind, size_t *out_at, size_t *out_size) {
     *out_size = places[kind][1];
 }
 
-static void test_decode_touches_only_what_the_frame_speaks_of(void) {
+TEST(test_decode_touches_only_what_the_frame_speaks_of) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         iw_codec_wheel_t told[IW_SIDES];
@@ -148,7 +144,7 @@ static void test_decode_touches_only_what_the_frame_speaks_of(void) {
     }
 }
 
-static void test_rows_are_the_eleven_messages_and_nothing_else_is_found(void) {
+TEST(test_rows_are_the_eleven_messages_and_nothing_else_is_found) {
     for (uint32_t id = 0; id <= IW_CAN_ID_MASK; id++) {
         const iw_codec_row_t *row = iw_codec_find(id);
         iw_codec_wheel_t told[IW_SIDES];
@@ -163,7 +159,7 @@ static void test_rows_are_the_eleven_messages_and_nothing_else_is_found(void) {
     }
 }
 
-static void test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives(void) {
+TEST(test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives) {
     for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         const iw_codec_wheel_t zero = {.pose = {0, 0, 0, 0}};
@@ -178,7 +174,7 @@ static void test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives
     }
 }
 
-static void test_name_is_that_of_the_kind(void) {
+TEST(test_name_is_that_of_the_kind) {
     TEST_ASSERT_EQUAL_STRING("speed", iw_codec_name(IW_CODEC_SPEED));
     TEST_ASSERT_EQUAL_STRING("status", iw_codec_name(IW_CODEC_STATUS));
     TEST_ASSERT_EQUAL_STRING("force", iw_codec_name(IW_CODEC_FORCE));
@@ -187,7 +183,7 @@ static void test_name_is_that_of_the_kind(void) {
     TEST_ASSERT_EQUAL_STRING("setpoint", iw_codec_name(IW_CODEC_SETPOINT));
 }
 
-static void test_decode_own_echo_gives_the_same_values(void) {
+TEST(test_decode_own_echo_gives_the_same_values) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         iw_can_frame_t frame = golden_vectors[v].frame;
         message_t message;
@@ -198,7 +194,7 @@ static void test_decode_own_echo_gives_the_same_values(void) {
     }
 }
 
-static void test_decode_does_not_clamp_what_others_send(void) {
+TEST(test_decode_does_not_clamp_what_others_send) {
     const iw_can_frame_t frame = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .data = {0xEE, 0x80, 0x00, 0x7F, 0xFF}};
     message_t message;
     memset(&message, POISON, sizeof message);
@@ -208,7 +204,7 @@ static void test_decode_does_not_clamp_what_others_send(void) {
     TEST_ASSERT_EQUAL_INT16(32767, message.as.setpoint.current_mA);
 }
 
-static void test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone(void) {
+TEST(test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone) {
     const message_t message = {IW_CODEC_POSE, IW_LEFT, {.pose = {1, 2, 3, 4}}};
     iw_can_frame_t frame;
     memset(&frame, POISON, sizeof frame);
@@ -216,7 +212,7 @@ static void test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone(vo
     assert_untouched(&frame, sizeof frame, "left pose");
 }
 
-static void test_encode_setpoint_pads_every_length_with_zeros(void) {
+TEST(test_encode_setpoint_pads_every_length_with_zeros) {
     static const uint8_t bytes[IW_CAN_DATA_MAX] = {0x5A, 0x12, 0x34, 0xFF, 0xFE, 0, 0, 0};
     static const uint32_t ids[IW_SIDES] = {266, 298};
     const iw_codec_setpoint_t setpoint = {.type = 0x5A, .speed_mm_s = 0x1234, .current_mA = -2};
@@ -243,7 +239,7 @@ static int32_t current_of(const iw_can_frame_t *frame) {
     return (value >= 32768) ? value - 65536 : value;
 }
 
-static void test_encode_setpoint_clamps_every_current_and_reports_it(void) {
+TEST(test_encode_setpoint_clamps_every_current_and_reports_it) {
     for (int32_t current = -32768; current <= 32767; current++) {
         const iw_codec_setpoint_t setpoint = {.type = 1, .speed_mm_s = -5, .current_mA = (int16_t)current};
         iw_can_frame_t frame;
@@ -255,7 +251,7 @@ static void test_encode_setpoint_clamps_every_current_and_reports_it(void) {
     }
 }
 
-static void test_encode_message_clamps_a_setpoint_too(void) {
+TEST(test_encode_message_clamps_a_setpoint_too) {
     static const int16_t wanted[] = {-32767 - 1, -2001, -2000, 2000, 2001, 32767};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         const message_t message = {IW_CODEC_SETPOINT, IW_LEFT, {.setpoint = {.current_mA = wanted[i]}}};
@@ -265,30 +261,9 @@ static void test_encode_message_clamps_a_setpoint_too(void) {
     }
 }
 
-static void test_encode_setpoint_leaves_its_argument_alone(void) {
+TEST(test_encode_setpoint_leaves_its_argument_alone) {
     iw_codec_setpoint_t setpoint = {.type = 9, .speed_mm_s = 7, .current_mA = 30000};
     iw_can_frame_t frame;
     TEST_ASSERT_TRUE(iw_codec_encode_setpoint(IW_LEFT, &setpoint, 5, &frame));
     TEST_ASSERT_EQUAL_INT16(30000, setpoint.current_mA);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_golden_table_covers_all_eleven_messages);
-    RUN_TEST(test_decode_touches_only_what_the_frame_speaks_of);
-    RUN_TEST(test_rows_are_the_eleven_messages_and_nothing_else_is_found);
-    RUN_TEST(test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives);
-    RUN_TEST(test_name_is_that_of_the_kind);
-    RUN_TEST(test_decode_golden_frame_gives_golden_values);
-    RUN_TEST(test_encode_golden_values_gives_golden_frame);
-    RUN_TEST(test_decode_longer_frame_ignores_what_is_behind_the_table);
-    RUN_TEST(test_decode_shorter_frame_is_refused_and_leaves_output_alone);
-    RUN_TEST(test_decode_own_echo_gives_the_same_values);
-    RUN_TEST(test_decode_does_not_clamp_what_others_send);
-    RUN_TEST(test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone);
-    RUN_TEST(test_encode_setpoint_pads_every_length_with_zeros);
-    RUN_TEST(test_encode_setpoint_clamps_every_current_and_reports_it);
-    RUN_TEST(test_encode_message_clamps_a_setpoint_too);
-    RUN_TEST(test_encode_setpoint_leaves_its_argument_alone);
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 
 #define POISON      0xA5
 #define FIELDS_MAX  4
@@ -75,10 +75,6 @@ static const layout_t layouts[] = {
     {545, 2, IW_CODEC_OFFSET, IW_RIGHT, OFFSET_FIELDS},
 };
 #define LAYOUTS (sizeof layouts / sizeof layouts[0])
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static const layout_t *layout_of(uint32_t id) {
     for (size_t i = 0; i < LAYOUTS; i++) {
@@ -226,7 +222,7 @@ static void sweep_wide_field(const layout_t *layout, const field_t *field, uint8
     }
 }
 
-static void test_every_value_of_every_field_passes_both_ways(void) {
+TEST(test_every_value_of_every_field_passes_both_ways) {
     static const uint8_t backgrounds[] = {0x00, 0xFF, 0x80, 0x5A};
     for (size_t i = 0; i < LAYOUTS * sizeof backgrounds; i++) {
         const layout_t *layout = &layouts[i / sizeof backgrounds];
@@ -270,7 +266,7 @@ static void check_kind(const iw_can_frame_t *frame, iw_codec_kind_t expected) {
     }
 }
 
-static void test_decode_every_id_length_format_and_kind_gives_the_documented_kind(void) {
+TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_kind) {
     static const uint32_t formats[FORMAT_BITS] = {IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD};
     for (uint32_t number = 0; number <= IW_CAN_ID_MASK; number++) {
         for (unsigned rest = 0; rest < 2U * 16U * 16U; rest++) {
@@ -286,7 +282,7 @@ static void test_decode_every_id_length_format_and_kind_gives_the_documented_kin
     }
 }
 
-static void test_decode_absurd_lengths_are_refused(void) {
+TEST(test_decode_absurd_lengths_are_refused) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         for (unsigned dlc = 9; dlc < 256; dlc++) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);
@@ -297,7 +293,7 @@ static void test_decode_absurd_lengths_are_refused(void) {
 }
 
 /// A 29-bit id whose low 11 bits look like ours is another number, with and without the flag that says so.
-static void test_decode_wider_number_with_our_low_bits_is_not_ours(void) {
+TEST(test_decode_wider_number_with_our_low_bits_is_not_ours) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         for (unsigned bit = 11; bit < 28; bit++) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);
@@ -308,13 +304,4 @@ static void test_decode_wider_number_with_our_low_bits_is_not_ours(void) {
             check_kind(&frame, IW_CODEC_UNKNOWN);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_value_of_every_field_passes_both_ways);
-    RUN_TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_kind);
-    RUN_TEST(test_decode_absurd_lengths_are_refused);
-    RUN_TEST(test_decode_wider_number_with_our_low_bits_is_not_ours);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "iwheel/config.h"
-#include "unity.h"
+#include "unit.h"
 
 #define POISON 0xA5
 
@@ -52,8 +52,6 @@ void setUp(void) {
     iw_config_default(&config);
 }
 
-void tearDown(void) {}
-
 static void put(const limit_t *limit, uint16_t value) {
     memcpy((uint8_t *)&config + limit->member, &value, sizeof value);
 }
@@ -69,7 +67,7 @@ static void make_room(uint16_t gear) {
     config.rest_rpm = 0;
 }
 
-static void test_default_is_the_documented_one(void) {
+TEST(test_default_is_the_documented_one) {
     TEST_ASSERT_EQUAL_UINT16(20, config.period_ms);
     TEST_ASSERT_EQUAL_UINT16(200, config.lease_ms);
     TEST_ASSERT_EQUAL_UINT16(800, config.accel_mm_s2);
@@ -103,17 +101,17 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_DN, config.force_unit[IW_RIGHT]);
 }
 
-static void test_default_leaves_open_what_nobody_can_know(void) {
+TEST(test_default_leaves_open_what_nobody_can_know) {
     TEST_ASSERT_FALSE(config.setpoint_type_set);
     TEST_ASSERT_EQUAL_INT(IW_ROLE_UNSET, config.current_role);
     TEST_ASSERT_EQUAL_UINT16(0, config.track_mm);
 }
 
-static void test_check_default_is_fine(void) {
+TEST(test_check_default_is_fine) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
 }
 
-static void test_range_is_the_documented_one(void) {
+TEST(test_range_is_the_documented_one) {
     for (size_t i = 0; i < LIMITS; i++) {
         const iw_config_range_t range = iw_config_range(limits[i].fault);
         TEST_ASSERT_EQUAL_UINT16(limits[i].min, range.min);
@@ -121,14 +119,14 @@ static void test_range_is_the_documented_one(void) {
     }
 }
 
-static void test_faults_of_numbers_stand_in_the_order_of_the_struct(void) {
+TEST(test_faults_of_numbers_stand_in_the_order_of_the_struct) {
     for (size_t i = 0; i < LIMITS; i++) {
         TEST_ASSERT_EQUAL_INT((int)i + 1, limits[i].fault);
         TEST_ASSERT_EQUAL_UINT(limits[0].member + i * sizeof(uint16_t), limits[i].member);
     }
 }
 
-static void test_check_every_value_of_every_field_is_judged_by_its_range(void) {
+TEST(test_check_every_value_of_every_field_is_judged_by_its_range) {
     for (size_t i = 0; i < LIMITS; i++) {
         for (uint32_t value = 0; value <= 65535; value++) {
             const bool unset = limits[i].fault == IW_CONFIG_TRACK && value == 0;
@@ -150,7 +148,7 @@ static void test_check_every_value_of_every_field_is_judged_by_its_range(void) {
     }
 }
 
-static void test_check_two_faults_names_the_first(void) {
+TEST(test_check_two_faults_names_the_first) {
     for (size_t first = 0; first < LIMITS; first++) {
         for (size_t second = first + 1; second < LIMITS; second++) {
             make_room(1);
@@ -161,7 +159,7 @@ static void test_check_two_faults_names_the_first(void) {
     }
 }
 
-static void test_check_field_fault_comes_before_a_broken_relation(void) {
+TEST(test_check_field_fault_comes_before_a_broken_relation) {
     config.lease_ms = 500;
     config.decel_mm_s2 = 100;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_STOP_BUDGET, iw_config_check(&config));
@@ -169,7 +167,7 @@ static void test_check_field_fault_comes_before_a_broken_relation(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_SETPOINT_DLC, iw_config_check(&config));
 }
 
-static void test_check_every_role_and_unit_that_exists_is_fine(void) {
+TEST(test_check_every_role_and_unit_that_exists_is_fine) {
     for (int role = IW_ROLE_UNSET; role <= IW_ROLE_SETPOINT; role++) {
         for (unsigned units = 0; units < 4; units++) {
             config.current_role = (iw_current_role_t)role;
@@ -180,7 +178,7 @@ static void test_check_every_role_and_unit_that_exists_is_fine(void) {
     }
 }
 
-static void test_check_role_or_unit_that_does_not_exist_is_a_fault(void) {
+TEST(test_check_role_or_unit_that_does_not_exist_is_a_fault) {
     for (int value = IW_ROLE_SETPOINT + 1; value <= UINT8_MAX;
          value++) { // All that an enumeration has room for on Cortex-M.
         setUp();
@@ -195,7 +193,7 @@ static void test_check_role_or_unit_that_does_not_exist_is_a_fault(void) {
     }
 }
 
-static void test_check_switches_and_types_are_never_at_fault(void) {
+TEST(test_check_switches_and_types_are_never_at_fault) {
     for (unsigned bits = 0; bits < 32; bits++) {
         config.setpoint_type_set = (bits & 1U) != 0;
         config.rpm_of_rotor = (bits & 2U) != 0;
@@ -209,7 +207,7 @@ static void test_check_switches_and_types_are_never_at_fault(void) {
     }
 }
 
-static void test_check_every_gear_ratio_is_judged_by_one_and_one_hundred(void) {
+TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred) {
     for (uint16_t turns = 1; turns <= 1000; turns++) {
         for (uint16_t per = 1; per <= 1000; per++) {
             config.gear_turns = turns;
@@ -223,7 +221,7 @@ static void test_check_every_gear_ratio_is_judged_by_one_and_one_hundred(void) {
     }
 }
 
-static void test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not(void) {
+TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not) {
     static const struct {
         uint16_t lease_ms;
         uint16_t period_ms;
@@ -277,7 +275,7 @@ static void set_rest_case(size_t i) {
     config.gear_per = rests[i].per;
 }
 
-static void test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel(void) {
+TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel) {
     for (size_t i = 0; i < sizeof rests / sizeof rests[0]; i++) {
         set_rest_case(i);
         TEST_ASSERT_EQUAL_UINT16(rests[i].rest.standard, iw_config_rest(&config).standard);
@@ -294,7 +292,7 @@ static void test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel(voi
 }
 
 /// The default is at least 1, and with every radius it is permitted.
-static void test_rest_default_is_permitted_with_every_radius(void) {
+TEST(test_rest_default_is_permitted_with_every_radius) {
     for (uint16_t radius = 60; radius <= 400; radius++) {
         config.radius_mm = radius;
         config.rest_rpm = iw_config_rest(&config).standard;
@@ -303,7 +301,7 @@ static void test_rest_default_is_permitted_with_every_radius(void) {
     }
 }
 
-static void test_check_current_floor_is_at_most_the_maximum(void) {
+TEST(test_check_current_floor_is_at_most_the_maximum) {
     for (uint16_t max_mA = 300; max_mA <= 2000U; max_mA = (uint16_t)(max_mA + 100U)) {
         config.max_current_mA = max_mA;
         config.min_current_mA = max_mA;
@@ -314,7 +312,7 @@ static void test_check_current_floor_is_at_most_the_maximum(void) {
     }
 }
 
-static void test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget(void) {
+TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget) {
     config.decel_mm_s2 = 100;
     config.rest_rpm = 3;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_REST_SPEED, iw_config_check(&config));
@@ -323,7 +321,7 @@ static void test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_bud
 }
 
 /// What a setpoint means is fixed at 192 mm: with another wheel the ways differ, not the times.
-static void test_stop_budget_is_of_the_configured_radius(void) {
+TEST(test_stop_budget_is_of_the_configured_radius) {
     static const struct {
         uint16_t radius_mm;
         uint32_t client_lost_mm;
@@ -340,7 +338,7 @@ static void test_stop_budget_is_of_the_configured_radius(void) {
     }
 }
 
-static void test_check_gear_ratio_comes_before_the_stop_budget(void) {
+TEST(test_check_gear_ratio_comes_before_the_stop_budget) {
     config.decel_mm_s2 = 100;
     config.gear_turns = 1000;
     config.gear_per = 1;
@@ -348,7 +346,7 @@ static void test_check_gear_ratio_comes_before_the_stop_budget(void) {
 }
 
 /// The way has two legs, and each may have been rounded up: 1 mm more than worked out is no fault, less is.
-static void test_stop_budget_rounds_up_what_was_worked_out_by_hand(void) {
+TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand) {
     static const struct {
         uint16_t lease_ms;
         uint16_t period_ms;
@@ -377,29 +375,4 @@ static void test_stop_budget_rounds_up_what_was_worked_out_by_hand(void) {
         TEST_ASSERT_EQUAL_UINT32(cases[i].budget.killed_ms, budget.killed_ms);
         TEST_ASSERT_EQUAL_UINT32(cases[i].budget.killed_mm, budget.killed_mm);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_default_is_the_documented_one);
-    RUN_TEST(test_default_leaves_open_what_nobody_can_know);
-    RUN_TEST(test_check_default_is_fine);
-    RUN_TEST(test_range_is_the_documented_one);
-    RUN_TEST(test_faults_of_numbers_stand_in_the_order_of_the_struct);
-    RUN_TEST(test_check_every_value_of_every_field_is_judged_by_its_range);
-    RUN_TEST(test_check_two_faults_names_the_first);
-    RUN_TEST(test_check_field_fault_comes_before_a_broken_relation);
-    RUN_TEST(test_check_every_role_and_unit_that_exists_is_fine);
-    RUN_TEST(test_check_role_or_unit_that_does_not_exist_is_a_fault);
-    RUN_TEST(test_check_switches_and_types_are_never_at_fault);
-    RUN_TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred);
-    RUN_TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not);
-    RUN_TEST(test_check_gear_ratio_comes_before_the_stop_budget);
-    RUN_TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel);
-    RUN_TEST(test_rest_default_is_permitted_with_every_radius);
-    RUN_TEST(test_check_current_floor_is_at_most_the_maximum);
-    RUN_TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget);
-    RUN_TEST(test_stop_budget_is_of_the_configured_radius);
-    RUN_TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand);
-    return UNITY_END();
 }

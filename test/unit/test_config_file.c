@@ -2,7 +2,7 @@
 // The gateway's configuration file: what is accepted, what is refused, and what the refusal says.
 #include "config/gateway_config.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -67,11 +67,7 @@ static void assert_fixed_point(const gateway_config_t *from) {
     free(second);
 }
 
-void setUp(void) {}
-
-void tearDown(void) {}
-
-static void test_parse_empty_file_gives_documented_defaults(void) {
+TEST(test_parse_empty_file_gives_documented_defaults) {
     accepted("");
     TEST_ASSERT_EQUAL_STRING("can0", config.bus.interface);
     TEST_ASSERT_EQUAL_UINT32(1000000, config.bus.bitrate);
@@ -93,7 +89,7 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL(IW_CONFIG_OK, iw_config_check(&config.core));
 }
 
-static void test_parse_empty_file_leaves_type_role_and_track_unset(void) {
+TEST(test_parse_empty_file_leaves_type_role_and_track_unset) {
     accepted("");
     TEST_ASSERT_EQUAL_UINT16(0, config.core.track_mm);
     TEST_ASSERT_FALSE(config.core.setpoint_type_set);
@@ -101,7 +97,7 @@ static void test_parse_empty_file_leaves_type_role_and_track_unset(void) {
     TEST_ASSERT_FALSE(config.core.listen_only);
 }
 
-static void test_parse_every_key_reaches_its_field(void) {
+TEST(test_parse_every_key_reaches_its_field) {
     accepted(
         "[bus]\ninterface=unix:/tmp/bus\nbitrate=500000\nsample_point_permille=750\non_mismatch=warn\n"
         "[wheels]\nsetpoint_type=0\ncurrent_role=setpoint\nrpm_of=rotor\nradius_mm=200\ngear_ratio=27/2\ntrack_mm=600\n"
@@ -165,7 +161,7 @@ static void test_parse_every_key_reaches_its_field(void) {
     assert_fixed_point(&before);
 }
 
-static void test_parse_accepts_comments_indentation_crlf_and_bom(void) {
+TEST(test_parse_accepts_comments_indentation_crlf_and_bom) {
     accepted("\xEF\xBB\xBF; comment\r\n# another\r\n[drive] ; here too\r\n\tlease_ms = 300\t; three periods\r\n"
              "  period_ms=10\r\n\r\n[bus]\r\n[drive]\r\n  zero_hold_ms = 1600");
     TEST_ASSERT_EQUAL_UINT16(300, config.core.lease_ms);
@@ -173,7 +169,7 @@ static void test_parse_accepts_comments_indentation_crlf_and_bom(void) {
     TEST_ASSERT_EQUAL_UINT16(1600, config.core.zero_hold_ms);
 }
 
-static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
+TEST(test_parse_range_ends_are_accepted_and_beyond_refused) {
     static const struct {
         const char *section, *key;
         long min, max;
@@ -226,7 +222,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
     }
 }
 
-static void test_parse_numbers_with_anything_around_them_are_refused(void) {
+TEST(test_parse_numbers_with_anything_around_them_are_refused) {
     static const char *const values[] = {"20ms", "20 ms", "0x14", "2e1", "20.0", "+20",
                                          "--20", "-",     "abc",  "20,", "2 0",  "20\\"};
     char text[64];
@@ -237,7 +233,7 @@ static void test_parse_numbers_with_anything_around_them_are_refused(void) {
 }
 
 /// Whatever the key, a value in quotes is refused with the cure, never taken with the quotes as part of it.
-static void test_parse_value_in_quotes_is_refused_for_every_key(void) {
+TEST(test_parse_value_in_quotes_is_refused_for_every_key) {
     gateway_config_t whole;
     unsigned keys = 0;
     gateway_config_default(&whole);
@@ -272,12 +268,12 @@ static void test_parse_value_in_quotes_is_refused_for_every_key(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(38U, keys);
 }
 
-static void test_parse_lease_zero_says_that_it_cannot_be_disabled(void) {
+TEST(test_parse_lease_zero_says_that_it_cannot_be_disabled) {
     refused("[drive]\n\nlease_ms = 0\n", "iw.conf:3: ", "cannot be disabled");
     refused("[drive]\nlease_ms = 5000\n", "iw.conf:2: lease_ms = 5000 is out of range", "20..500 ms");
 }
 
-static void test_parse_words_other_than_the_listed_are_refused(void) {
+TEST(test_parse_words_other_than_the_listed_are_refused) {
     refused("[left]\ninvert = true\n", "iw.conf:2: ", "no or yes");
     refused("[left]\ninvert = Yes\n", "iw.conf:2: ", "no or yes");
     refused("[right]\nforce_unit = N\n", "iw.conf:2: ", "cN or dN");
@@ -287,7 +283,7 @@ static void test_parse_words_other_than_the_listed_are_refused(void) {
     refused("[estop]\nactive = 1\n", "iw.conf:2: ", "low or high");
 }
 
-static void test_parse_gear_ratio_forms(void) {
+TEST(test_parse_gear_ratio_forms) {
     accepted("[wheels]\ngear_ratio = 1000/10\n");
     accepted("[wheels]\ngear_ratio = 100\n");
     TEST_ASSERT_EQUAL_UINT16(100, config.core.gear_turns);
@@ -301,7 +297,7 @@ static void test_parse_gear_ratio_forms(void) {
     }
 }
 
-static void test_parse_mode_is_octal_and_keeps_the_owner(void) {
+TEST(test_parse_mode_is_octal_and_keeps_the_owner) {
     accepted("[northbound]\nmode = 666\n");
     TEST_ASSERT_EQUAL_HEX16(0666, config.northbound.mode);
     refused("[northbound]\nmode = 0680\n", "iw.conf:2: ", "octal");
@@ -310,7 +306,7 @@ static void test_parse_mode_is_octal_and_keeps_the_owner(void) {
     refused("[northbound]\nmode = rw-rw----\n", "iw.conf:2: ", "octal");
 }
 
-static void test_parse_texts_that_cannot_be_names_are_refused(void) {
+TEST(test_parse_texts_that_cannot_be_names_are_refused) {
     refused("[bus]\ninterface = averylonginterfacename\n", "iw.conf:2: ", "at most 15 characters");
     refused("[bus]\ninterface = /dev/can0\n", "iw.conf:2: ", "unix:PATH");
     refused("[bus]\ninterface = unix:\n", "iw.conf:2: ", "no path");
@@ -320,7 +316,7 @@ static void test_parse_texts_that_cannot_be_names_are_refused(void) {
     refused("[record]\ndirectory = /var/\xC3\xA4\n", "iw.conf:2: ", "printable ASCII");
 }
 
-static void test_parse_socket_path_as_long_as_an_address_allows(void) {
+TEST(test_parse_socket_path_as_long_as_an_address_allows) {
     char text[512];
     char path[GATEWAY_PATH_SIZE + 1U];
     memset(path, 'a', sizeof path);
@@ -338,20 +334,20 @@ static void test_parse_socket_path_as_long_as_an_address_allows(void) {
     refused(text, "iw.conf:2: ", "too long");
 }
 
-static void test_parse_missing_value_is_refused(void) {
+TEST(test_parse_missing_value_is_refused) {
     refused("[drive]\nlease_ms =\n", "iw.conf:2: ", "no value");
     refused("[drive]\nlease_ms = ; none\n", "iw.conf:2: ", "no value");
     refused("[northbound]\ngroup =\n", "iw.conf:2: ", "no value");
 }
 
-static void test_parse_line_without_equals_sign_is_refused(void) {
+TEST(test_parse_line_without_equals_sign_is_refused) {
     refused("[drive]\nlease_ms 200\nperiod_ms = 20\n", "iw.conf:2: \"lease_ms 200\"", "'='");
     refused("[drive]\nperiod_ms = 20\nlease_ms", "iw.conf:3: ", "'='");
     refused("[drive]\nlease_ms =\n   200\n", "iw.conf:3: \"200\"", "'='");
     refused("[drive]\n= 200\n", "iw.conf:2: ", "no key");
 }
 
-static void test_parse_unknown_key_names_the_nearest(void) {
+TEST(test_parse_unknown_key_names_the_nearest) {
     refused("[drive]\nlease = 200\n", "iw.conf:2: unknown key lease", "did you mean lease_ms?");
     refused("[drive]\nperiode_ms = 20\n", "iw.conf:2: ", "did you mean period_ms?");
     refused("[drive]\nLease_ms = 20\n", "iw.conf:2: ", "did you mean lease_ms?");
@@ -360,7 +356,7 @@ static void test_parse_unknown_key_names_the_nearest(void) {
     refused("lease_ms = 200\n", "iw.conf:1: ", "put it under [drive]");
 }
 
-static void test_parse_ids_cannot_be_configured(void) {
+TEST(test_parse_ids_cannot_be_configured) {
     static const char *const keys[] = {"id", "left_id", "id_left", "can_id", "right_ids"};
     char text[64];
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
@@ -369,7 +365,7 @@ static void test_parse_ids_cannot_be_configured(void) {
     }
 }
 
-static void test_parse_unknown_section_is_told_once_and_hides_no_other_error(void) {
+TEST(test_parse_unknown_section_is_told_once_and_hides_no_other_error) {
     refused("[drives]\nlease_ms = 1\nfoo = 2\n[drive]\nperiod_ms = 1\n", "iw.conf:1: unknown section [drives]",
             "iw.conf:5: ");
     TEST_ASSERT_EQUAL_UINT(2, lines_in(messages));
@@ -379,12 +375,12 @@ static void test_parse_unknown_section_is_told_once_and_hides_no_other_error(voi
     refused("[drive] lease_ms = 300\n", "iw.conf:1: ", "follows");
 }
 
-static void test_parse_duplicate_key_is_refused_even_in_a_repeated_section(void) {
+TEST(test_parse_duplicate_key_is_refused_even_in_a_repeated_section) {
     refused("[drive]\nlease_ms = 200\nlease_ms = 200\n", "iw.conf:3: ", "first on line 2");
     refused("[drive]\nlease_ms = 200\n[bus]\n[drive]\nlease_ms = 300\n", "iw.conf:5: ", "first on line 2");
 }
 
-static void test_parse_overlong_line_is_refused_wherever_the_cut_would_be(void) {
+TEST(test_parse_overlong_line_is_refused_wherever_the_cut_would_be) {
     char text[512];
     for (size_t length = 190; length < 420; length++) {
         memset(text, ' ', sizeof text);
@@ -400,7 +396,7 @@ static void test_parse_overlong_line_is_refused_wherever_the_cut_would_be(void) 
     }
 }
 
-static void test_parse_nul_and_control_characters_are_refused(void) {
+TEST(test_parse_nul_and_control_characters_are_refused) {
     static const char nul[] = "[drive]\nlease_ms = 300\0 0\nperiod_ms = 20\n";
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, parse_bytes(nul, sizeof nul - 1U));
     TEST_ASSERT_NOT_NULL(strstr(messages, "iw.conf:2: holds the control character 0x00"));
@@ -410,7 +406,7 @@ static void test_parse_nul_and_control_characters_are_refused(void) {
             "iw.conf:2: ", "lease_ms = 3?2J??");
 }
 
-static void test_parse_tells_all_errors_up_to_twenty(void) {
+TEST(test_parse_tells_all_errors_up_to_twenty) {
     char text[1024] = "[drive]\n";
     for (unsigned i = 0; i < 20; i++) {
         strcat(text, "nonsense = 1\n");
@@ -423,7 +419,7 @@ static void test_parse_tells_all_errors_up_to_twenty(void) {
     TEST_ASSERT_NOT_NULL(strstr(messages, "iw.conf: 2 more errors"));
 }
 
-static void test_parse_stop_budget_over_one_second_names_last_key_and_what_fits(void) {
+TEST(test_parse_stop_budget_over_one_second_names_last_key_and_what_fits) {
     refused("[drive]\nmax_speed_mm_s = 2000\nlease_ms = 300\naccel_mm_s2 = 900\n", "iw.conf:3: ", "= 1654 ms to stop");
     TEST_ASSERT_NOT_NULL(strstr(messages, "write max_speed_mm_s = 1020 at most, or decel_mm_s2 = 2942 at least\n"));
     accepted("[drive]\nmax_speed_mm_s = 1020\nlease_ms = 300\n");
@@ -432,13 +428,13 @@ static void test_parse_stop_budget_over_one_second_names_last_key_and_what_fits(
     refused("[drive]\nmax_speed_mm_s = 2000\nlease_ms = 300\ndecel_mm_s2 = 2941\n", "iw.conf:4: ", "1001 ms");
 }
 
-static void test_parse_stop_budget_offers_a_lease_that_fits(void) {
+TEST(test_parse_stop_budget_offers_a_lease_that_fits) {
     refused("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 350\n", "iw.conf:3: ", "or lease_ms = 313 at most");
     accepted("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 313\n");
     refused("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 314\n", "iw.conf:3: ", "1001 ms");
 }
 
-static void test_print_and_load_is_a_fixed_point_for_defaults_and_every_word(void) {
+TEST(test_print_and_load_is_a_fixed_point_for_defaults_and_every_word) {
     gateway_config_t wanted;
     gateway_config_default(&wanted);
     assert_fixed_point(&wanted);
@@ -458,7 +454,7 @@ static void test_print_and_load_is_a_fixed_point_for_defaults_and_every_word(voi
     TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, sizeof wanted);
 }
 
-static void test_print_shows_unset_keys_as_comments(void) {
+TEST(test_print_shows_unset_keys_as_comments) {
     gateway_config_default(&config);
     char *text = printed(&config);
     TEST_ASSERT_NOT_NULL(strstr(text, "\n;setpoint_type = ? "));
@@ -472,7 +468,7 @@ static void test_print_shows_unset_keys_as_comments(void) {
     free(text);
 }
 
-static void test_print_fits_the_line_limit_with_the_longest_texts(void) {
+TEST(test_print_fits_the_line_limit_with_the_longest_texts) {
     gateway_config_default(&before);
     memset(before.bus.interface, 'a', sizeof before.bus.interface - 1U);
     memcpy(before.bus.interface, "unix:", 5);
@@ -483,7 +479,7 @@ static void test_print_fits_the_line_limit_with_the_longest_texts(void) {
     assert_fixed_point(&before);
 }
 
-static void test_shipped_example_is_what_print_gives_for_the_defaults(void) {
+TEST(test_shipped_example_is_what_print_gives_for_the_defaults) {
     static char shipped[32768];
     FILE *file = fopen(IWHEEL_SHARE_DIR "/gateway.conf", "r");
     TEST_ASSERT_NOT_NULL_MESSAGE(file, IWHEEL_SHARE_DIR "/gateway.conf is missing");
@@ -507,7 +503,7 @@ static int load(const char *path) {
     return result;
 }
 
-static void test_load_reads_a_file_and_names_it_in_errors(void) {
+TEST(test_load_reads_a_file_and_names_it_in_errors) {
     char path[] = "/tmp/iwheel-config-XXXXXX";
     const int file = mkstemp(path);
     TEST_ASSERT_TRUE(file >= 0);
@@ -526,7 +522,7 @@ static void test_load_reads_a_file_and_names_it_in_errors(void) {
     unlink(path);
 }
 
-static void test_load_missing_directory_and_device_are_refused(void) {
+TEST(test_load_missing_directory_and_device_are_refused) {
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/nonexistent/gateway.conf"));
     TEST_ASSERT_NOT_NULL(strstr(messages, "/nonexistent/gateway.conf: cannot be opened (No such file or directory); "));
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/tmp"));
@@ -544,7 +540,7 @@ static int override(const char *name, const char *value) {
     return result;
 }
 
-static void test_override_changes_one_key_by_the_same_rules(void) {
+TEST(test_override_changes_one_key_by_the_same_rules) {
     accepted("");
     TEST_ASSERT_EQUAL_INT(0, override("bus.interface", "unix:/tmp/bus"));
     TEST_ASSERT_EQUAL_STRING("unix:/tmp/bus", config.bus.interface);
@@ -559,40 +555,4 @@ static void test_override_changes_one_key_by_the_same_rules(void) {
     TEST_ASSERT_NOT_NULL(strstr(messages, "to stop, more than the 1000 ms"));
     TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
     assert_fixed_point(&before);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_parse_empty_file_gives_documented_defaults);
-    RUN_TEST(test_parse_empty_file_leaves_type_role_and_track_unset);
-    RUN_TEST(test_parse_every_key_reaches_its_field);
-    RUN_TEST(test_parse_accepts_comments_indentation_crlf_and_bom);
-    RUN_TEST(test_parse_range_ends_are_accepted_and_beyond_refused);
-    RUN_TEST(test_parse_numbers_with_anything_around_them_are_refused);
-    RUN_TEST(test_parse_value_in_quotes_is_refused_for_every_key);
-    RUN_TEST(test_parse_lease_zero_says_that_it_cannot_be_disabled);
-    RUN_TEST(test_parse_words_other_than_the_listed_are_refused);
-    RUN_TEST(test_parse_gear_ratio_forms);
-    RUN_TEST(test_parse_mode_is_octal_and_keeps_the_owner);
-    RUN_TEST(test_parse_texts_that_cannot_be_names_are_refused);
-    RUN_TEST(test_parse_socket_path_as_long_as_an_address_allows);
-    RUN_TEST(test_parse_missing_value_is_refused);
-    RUN_TEST(test_parse_line_without_equals_sign_is_refused);
-    RUN_TEST(test_parse_unknown_key_names_the_nearest);
-    RUN_TEST(test_parse_ids_cannot_be_configured);
-    RUN_TEST(test_parse_unknown_section_is_told_once_and_hides_no_other_error);
-    RUN_TEST(test_parse_duplicate_key_is_refused_even_in_a_repeated_section);
-    RUN_TEST(test_parse_overlong_line_is_refused_wherever_the_cut_would_be);
-    RUN_TEST(test_parse_nul_and_control_characters_are_refused);
-    RUN_TEST(test_parse_tells_all_errors_up_to_twenty);
-    RUN_TEST(test_parse_stop_budget_over_one_second_names_last_key_and_what_fits);
-    RUN_TEST(test_parse_stop_budget_offers_a_lease_that_fits);
-    RUN_TEST(test_print_and_load_is_a_fixed_point_for_defaults_and_every_word);
-    RUN_TEST(test_print_shows_unset_keys_as_comments);
-    RUN_TEST(test_print_fits_the_line_limit_with_the_longest_texts);
-    RUN_TEST(test_shipped_example_is_what_print_gives_for_the_defaults);
-    RUN_TEST(test_load_reads_a_file_and_names_it_in_errors);
-    RUN_TEST(test_load_missing_directory_and_device_are_refused);
-    RUN_TEST(test_override_changes_one_key_by_the_same_rules);
-    return UNITY_END();
 }

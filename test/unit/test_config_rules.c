@@ -2,7 +2,7 @@
 // Values in the gateway's configuration file that would undo a safety rule: refused, with key, rule, value and what is permitted.
 #include "config/gateway_config.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -41,12 +41,8 @@ static void assert_fixed_point(void) {
     free(text);
 }
 
-void setUp(void) {}
-
-void tearDown(void) {}
-
 /// A refusal names key, rule, the value that was written and what is permitted.
-static void test_parse_value_that_undoes_a_rule_is_refused_with_the_rule(void) {
+TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule) {
     static const struct {
         const char *line, *rule, *permitted;
     } rows[] = {
@@ -74,7 +70,7 @@ static void test_parse_value_that_undoes_a_rule_is_refused_with_the_rule(void) {
 }
 
 /// Left out, it follows from radius and gear, wherever these stand in the file; given, it is judged by them.
-static void test_parse_rest_rpm_is_by_radius_and_gear(void) {
+TEST(test_parse_rest_rpm_is_by_radius_and_gear) {
     accepted("[limits]\nrest_ms = 300\n[wheels]\nradius_mm = 60\n");
     TEST_ASSERT_EQUAL_UINT16(7, config.core.rest_rpm);
     accepted("[wheels]\nradius_mm = 400\n");
@@ -89,7 +85,7 @@ static void test_parse_rest_rpm_is_by_radius_and_gear(void) {
     refused("[wheels]\nradius_mm = 400\n[limits]\nrest_rpm = 2\n", "iw.conf:4: ", "write 0..1 rpm");
 }
 
-static void test_parse_second_contact_must_be_another_line_of_the_same_kind(void) {
+TEST(test_parse_second_contact_must_be_another_line_of_the_same_kind) {
     accepted("[estop]\nline = A\nline2 = B\n");
     accepted("[estop]\nline = unix:/a\nline2 = unix:/b\n");
     accepted("[estop]\nline = none\nline2 = none\n");
@@ -103,12 +99,4 @@ static void test_parse_second_contact_must_be_another_line_of_the_same_kind(void
     refused("[estop]\nline = A\nline2 = unix:/b\n", "iw.conf:3: line = A and line2 = unix:/b", "simulated");
     refused("[estop]\nline2 = B\ndebounce_ms = 200\n", "estop_discrepancy_ms = 200", "debounce_ms = 200");
     refused("[estop]\nline2 = B\nestop_discrepancy_ms = 50\ndebounce_ms = 60\n", "iw.conf:3: ", "shorter debounce_ms");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule);
-    RUN_TEST(test_parse_rest_rpm_is_by_radius_and_gear);
-    RUN_TEST(test_parse_second_contact_must_be_another_line_of_the_same_kind);
-    return UNITY_END();
 }

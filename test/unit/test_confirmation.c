@@ -4,7 +4,7 @@
 
 #include "iwheel/codec.h"
 #include "iwheel/private/transmit.h"
-#include "unity.h"
+#include "unit.h"
 
 static iw_confirmation_t account;
 
@@ -12,8 +12,6 @@ void setUp(void) {
     memset(&account, 0, sizeof account);
     iw_confirmation_clear(&account);
 }
-
-void tearDown(void) {}
 
 static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
     const iw_codec_setpoint_t value = {speed_mm_s, current_mA, 7};
@@ -153,16 +151,16 @@ static uint32_t walk_all(iw_side_t first, iw_side_t last, uint32_t length) {
     return walk(first, last, nothing, 1, length);
 }
 
-static void test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model(void) {
+TEST(test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model) {
     TEST_ASSERT_EQUAL_UINT32(390625, walk_all(IW_LEFT, IW_LEFT, 8));
     TEST_ASSERT_EQUAL_UINT32(390625, walk_all(IW_RIGHT, IW_RIGHT, 8));
 }
 
-static void test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model(void) {
+TEST(test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model) {
     TEST_ASSERT_EQUAL_UINT32(1000000, walk_all(IW_LEFT, IW_RIGHT, 6));
 }
 
-static void test_init_owes_nothing(void) {
+TEST(test_init_owes_nothing) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
     TEST_ASSERT_TRUE(may_send(IW_RIGHT, false));
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
@@ -170,7 +168,7 @@ static void test_init_owes_nothing(void) {
     TEST_ASSERT_EQUAL_UINT32(0, account.stray);
 }
 
-static void test_may_send_zero_never_waits_for_an_echo(void) {
+TEST(test_may_send_zero_never_waits_for_an_echo) {
     sent(IW_LEFT, 100, true);
     TEST_ASSERT_FALSE(may_send(IW_LEFT, false));
     TEST_ASSERT_TRUE(may_send(IW_LEFT, true));
@@ -179,7 +177,7 @@ static void test_may_send_zero_never_waits_for_an_echo(void) {
     TEST_ASSERT_TRUE(may_send(IW_RIGHT, false));
 }
 
-static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
+TEST(test_waiting_refused_frame_waits_from_the_first_refusal) {
     sent(IW_RIGHT, 1000, false);
     sent(IW_RIGHT, 2000, false);
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
@@ -189,7 +187,7 @@ static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
 }
 
-static void test_rest_ends_the_waiting_of_what_was_only_refused(void) {
+TEST(test_rest_ends_the_waiting_of_what_was_only_refused) {
     sent(IW_LEFT, 1000, false);
     sent(IW_RIGHT, 1000, false);
     iw_confirmation_rest(&account);
@@ -197,7 +195,7 @@ static void test_rest_ends_the_waiting_of_what_was_only_refused(void) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
 }
 
-static void test_rest_forgets_nothing_that_was_handed_over(void) {
+TEST(test_rest_forgets_nothing_that_was_handed_over) {
     sent(IW_LEFT, 1000, false);
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 500, false);
@@ -212,7 +210,7 @@ static void test_rest_forgets_nothing_that_was_handed_over(void) {
     TEST_ASSERT_TRUE((iw_confirmation_proven_us(&account) >= 2000));
 }
 
-static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
+TEST(test_waiting_is_that_of_the_wheel_that_waits_longest) {
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 1000, true);
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
@@ -220,7 +218,7 @@ static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 2000);
 }
 
-static void test_proven_since_needs_both_wheels(void) {
+TEST(test_proven_since_needs_both_wheels) {
     sent(IW_LEFT, 5000, true);
     sent(IW_RIGHT, 5001, true);
     echo(IW_LEFT);
@@ -230,7 +228,7 @@ static void test_proven_since_needs_both_wheels(void) {
     TEST_ASSERT_FALSE((iw_confirmation_proven_us(&account) >= 5001));
 }
 
-static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(void) {
+TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer) {
     sent(IW_LEFT, 1000, true);
     sent(IW_LEFT, 9000, true);
     sent(IW_RIGHT, 9000, true);
@@ -241,7 +239,7 @@ static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(voi
     TEST_ASSERT_TRUE((iw_confirmation_proven_us(&account) >= 9000));
 }
 
-static void test_echo_after_clear_is_stray_and_proves_nothing(void) {
+TEST(test_echo_after_clear_is_stray_and_proves_nothing) {
     sent(IW_LEFT, 1000, true);
     sent(IW_RIGHT, 1000, true);
     iw_confirmation_clear(&account);
@@ -252,7 +250,7 @@ static void test_echo_after_clear_is_stray_and_proves_nothing(void) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
 }
 
-static void test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it(void) {
+TEST(test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it) {
     sent_value(IW_LEFT, 1000, 0, 2000);
     iw_confirmation_clear(&account);
     sent_value(IW_LEFT, 2000, 300, 2000);
@@ -264,7 +262,7 @@ static void test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
 }
 
-static void test_echo_that_differs_in_one_byte_is_stray(void) {
+TEST(test_echo_that_differs_in_one_byte_is_stray) {
     const int16_t others[][2] = {
         {0x0201, 0x0304}, {0x0102, 0x0304}, {0x0203, 0x0304}, {0x0202, 0x0305}, {0x0202, 0x0404}};
     sent_value(IW_RIGHT, 1000, 0x0202, 0x0304);
@@ -276,7 +274,7 @@ static void test_echo_that_differs_in_one_byte_is_stray(void) {
     TEST_ASSERT_TRUE(may_send(IW_RIGHT, false));
 }
 
-static void test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo(void) {
+TEST(test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo) {
     sent_value(IW_LEFT, 1000, 300, 2000);
     sent_value(IW_LEFT, 2000, 0, 2000);
     echo_value(IW_LEFT, 300, 2000);
@@ -285,23 +283,4 @@ static void test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo(void) 
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 2000);
     echo_value(IW_LEFT, 0, 2000);
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_init_owes_nothing);
-    RUN_TEST(test_may_send_zero_never_waits_for_an_echo);
-    RUN_TEST(test_waiting_refused_frame_waits_from_the_first_refusal);
-    RUN_TEST(test_rest_ends_the_waiting_of_what_was_only_refused);
-    RUN_TEST(test_rest_forgets_nothing_that_was_handed_over);
-    RUN_TEST(test_waiting_is_that_of_the_wheel_that_waits_longest);
-    RUN_TEST(test_proven_since_needs_both_wheels);
-    RUN_TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer);
-    RUN_TEST(test_echo_after_clear_is_stray_and_proves_nothing);
-    RUN_TEST(test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it);
-    RUN_TEST(test_echo_that_differs_in_one_byte_is_stray);
-    RUN_TEST(test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo);
-    RUN_TEST(test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model);
-    RUN_TEST(test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model);
-    return UNITY_END();
 }

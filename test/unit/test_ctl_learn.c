@@ -4,7 +4,7 @@
 
 #include "message.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 
@@ -58,9 +58,7 @@ void setUp(void) {
     learn_drives_init(&drives, &config);
 }
 
-void tearDown(void) {}
-
-static void test_learn_counts_each_wheel_for_itself(void) {
+TEST(test_learn_counts_each_wheel_for_itself) {
     setpoint(IW_RIGHT, 300, 500, CANDUMP_RECEIVED);
     speed(IW_RIGHT, 15);
     ticks(IW_LEFT, 7);
@@ -76,7 +74,7 @@ static void test_learn_counts_each_wheel_for_itself(void) {
     TEST_ASSERT_GREATER_THAN_INT32(learn.wheel[IW_RIGHT].force.high, learn.wheel[IW_RIGHT].force.low);
 }
 
-static void test_learn_keeps_currents_apart_by_the_direction_they_come_with(void) {
+TEST(test_learn_keeps_currents_apart_by_the_direction_they_come_with) {
     setpoint(IW_LEFT, 300, 500, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, -300, -700, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, 0, 20, CANDUMP_RECEIVED);
@@ -89,7 +87,7 @@ static void test_learn_keeps_currents_apart_by_the_direction_they_come_with(void
     TEST_ASSERT_EQUAL_INT32(20, left->current_at_rest_mA.high);
 }
 
-static void test_learn_counts_as_sent_only_what_is_marked_so(void) {
+TEST(test_learn_counts_as_sent_only_what_is_marked_so) {
     setpoint(IW_LEFT, 0, 0, CANDUMP_SENT);
     setpoint(IW_LEFT, 0, 0, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, 0, 0, CANDUMP_UNMARKED);
@@ -106,7 +104,7 @@ static void drive(unsigned ms, int16_t speed_mm_s, int16_t rpm) {
     }
 }
 
-static void test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_sooner(void) {
+TEST(test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_sooner) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     drive(996, 300, -15);
     TEST_ASSERT_EQUAL_INT64(0, left->forward.against_us);
@@ -119,7 +117,7 @@ static void test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_soo
     TEST_ASSERT_EQUAL_INT64(8 * MS, left->steady_us);
 }
 
-static void test_learn_keeps_answers_apart_by_the_direction_that_was_told(void) {
+TEST(test_learn_keeps_answers_apart_by_the_direction_that_was_told) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     drive(996, 300, 15);
     drive(4, 300, -15);
@@ -134,7 +132,7 @@ static void test_learn_keeps_answers_apart_by_the_direction_that_was_told(void) 
     TEST_ASSERT_EQUAL_INT64(0, left->backward.still_us);
 }
 
-static void test_learn_judges_no_speed_that_is_no_longer_told(void) {
+TEST(test_learn_judges_no_speed_that_is_no_longer_told) {
     drive(1000, 300, 15);
     TEST_ASSERT_EQUAL_INT64(4 * MS, learn.wheel[IW_LEFT].forward.with_us);
     for (int64_t passed_us = 0; passed_us <= (int64_t)IW_WHEEL_WATCHDOG_US; passed_us += 4 * MS) {
@@ -157,7 +155,7 @@ static void turn(unsigned ms, int16_t rpm) {
     }
 }
 
-static void test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_only(void) {
+TEST(test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_only) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 0);
     turn(490, 0);
@@ -175,7 +173,7 @@ static void test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_o
     TEST_ASSERT_EQUAL_UINT64(1, left->rest_force_count);
 }
 
-static void test_learn_takes_no_force_of_a_wheel_that_was_not_heard(void) {
+TEST(test_learn_takes_no_force_of_a_wheel_that_was_not_heard) {
     speed(IW_LEFT, 0);
     turn(500, 0);
     now_us += 100 * MS;
@@ -190,7 +188,7 @@ static void test_learn_takes_no_force_of_a_wheel_that_was_not_heard(void) {
     TEST_ASSERT_EQUAL_UINT64(3, learn.wheel[IW_LEFT].forces);
 }
 
-static void test_learn_turns_and_ticks_leave_out_gaps_and_reboots(void) {
+TEST(test_learn_turns_and_ticks_leave_out_gaps_and_reboots) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 60);
     ticks(IW_LEFT, 1000);
@@ -213,7 +211,7 @@ static void test_learn_turns_and_ticks_leave_out_gaps_and_reboots(void) {
     TEST_ASSERT_EQUAL_INT64(6000 * MS, left->turned_rpm_us);
 }
 
-static void test_learn_turns_and_ticks_leave_out_what_is_too_slow_or_turns_round(void) {
+TEST(test_learn_turns_and_ticks_leave_out_what_is_too_slow_or_turns_round) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 60);
     ticks(IW_LEFT, 1000);
@@ -231,7 +229,7 @@ static void test_learn_turns_and_ticks_leave_out_what_is_too_slow_or_turns_round
     TEST_ASSERT_EQUAL_INT64(3000 * MS, left->turned_rpm_us);
 }
 
-static void test_learn_pose_may_wrap(void) {
+TEST(test_learn_pose_may_wrap) {
     pose(INT16_MAX - 1);
     pose(INT16_MIN + 1);
     TEST_ASSERT_EQUAL_UINT64(3, learn.pose.way_big);
@@ -257,7 +255,7 @@ static const int16_t still[IW_SIDES] = {0, 0};
 static const int16_t straight[IW_SIDES] = {1005, 1005}; // 50 rpm.
 static const int16_t level[IW_SIDES] = {50, 50};
 
-static void test_learn_drive_that_keeps_its_path_has_no_deviation(void) {
+TEST(test_learn_drive_that_keeps_its_path_has_no_deviation) {
     drive_both(100, still, still);
     const int64_t begin_us = now_us;
     drive_both(2000, straight, level);
@@ -270,7 +268,7 @@ static void test_learn_drive_that_keeps_its_path_has_no_deviation(void) {
 }
 
 /// A fifth of the speed less, 4 % of it ordinary and 7/8 of an rpm: 142 mm/s too slow, for 0.3 s; of it some leaks.
-static void test_learn_deviation_is_the_one_by_which_the_gateway_judges(void) {
+TEST(test_learn_deviation_is_the_one_by_which_the_gateway_judges) {
     drive_both(1000, straight, level);
     drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
     TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm);
@@ -279,7 +277,7 @@ static void test_learn_deviation_is_the_one_by_which_the_gateway_judges(void) {
     TEST_ASSERT_EQUAL_UINT32(drives.drive[0].deviation_mm, drives.largest_mm);
 }
 
-static void test_learn_each_drive_has_its_own_deviation(void) {
+TEST(test_learn_each_drive_has_its_own_deviation) {
     drive_both(1000, straight, level);
     drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
     drive_both(300, straight, level);
@@ -290,7 +288,7 @@ static void test_learn_each_drive_has_its_own_deviation(void) {
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[1].deviation_mm);
 }
 
-static void test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does(void) {
+TEST(test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does) {
     drive_both(500, straight, level);
     drive_both(500, still, still);
     drive_both(500, straight, level);
@@ -300,7 +298,7 @@ static void test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does(void
     TEST_ASSERT_EQUAL_UINT32(2, drives.count);
 }
 
-static void test_learn_nothing_is_compared_while_a_wheel_is_not_heard(void) {
+TEST(test_learn_nothing_is_compared_while_a_wheel_is_not_heard) {
     drive_both(1000, straight, level);
     for (unsigned i = 0; i < 100U; i++) { // The left wheel stands, unheard.
         setpoint(IW_LEFT, 1005, 500, CANDUMP_RECEIVED);
@@ -314,7 +312,7 @@ static void test_learn_nothing_is_compared_while_a_wheel_is_not_heard(void) {
 }
 
 /// Both wheels 10 % slow: straight ahead that cancels out, unless one counts the other way.
-static void test_learn_mirrored_wheel_is_compared_as_it_is_mounted(void) {
+TEST(test_learn_mirrored_wheel_is_compared_as_it_is_mounted) {
     const int16_t told[IW_SIDES] = {1005, -1005};
     const int16_t slow[IW_SIDES] = {45, -45};
     config.invert[IW_RIGHT] = true;
@@ -327,7 +325,7 @@ static void test_learn_mirrored_wheel_is_compared_as_it_is_mounted(void) {
     TEST_ASSERT_GREATER_THAN_UINT32(40, drives.largest_mm);
 }
 
-static void test_learn_of_more_drives_than_can_be_told_the_largest_counts(void) {
+TEST(test_learn_of_more_drives_than_can_be_told_the_largest_counts) {
     for (unsigned i = 0; i < LEARN_DRIVES_MAX + 2U; i++) {
         drive_both(40, straight, level);
         now_us += 1100 * MS;
@@ -377,7 +375,7 @@ static void assert_lag(double lag_ms, double droop) {
     TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].most_ms);
 }
 
-static void test_learn_lag_is_that_of_the_wheel_whatever_its_droop(void) {
+TEST(test_learn_lag_is_that_of_the_wheel_whatever_its_droop) {
     assert_lag(30.0, 0.0);
     assert_lag(60.0, 0.04);
     assert_lag(120.0, 0.1);
@@ -390,7 +388,7 @@ static const learn_finding_t *lag_found(unsigned side, const char *item) {
     return learn_find(&findings, item, side);
 }
 
-static void test_learn_lag_speaks_against_what_the_gateway_assumes(void) {
+TEST(test_learn_lag_speaks_against_what_the_gateway_assumes) {
     assert_lag(60.0, 0.0);
     TEST_ASSERT_EQUAL_CHAR('+', lag_found(IW_LEFT, "wheel_lag")->mark);
     assert_lag(120.0, 0.0);
@@ -401,7 +399,7 @@ static void test_learn_lag_speaks_against_what_the_gateway_assumes(void) {
     TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
 }
 
-static void test_learn_lag_of_changes_that_differ_is_no_value(void) {
+TEST(test_learn_lag_of_changes_that_differ_is_no_value) {
     assert_lag(60.0, 0.0);
     drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
     drives.lag[IW_RIGHT].most_ms = 100.0;
@@ -410,7 +408,7 @@ static void test_learn_lag_of_changes_that_differ_is_no_value(void) {
 }
 
 /// Small changes, a wheel that does not follow, a gap in its speed frames, no second of rest before: none of them counts.
-static void test_learn_lag_needs_a_change_from_steady_to_steady(void) {
+TEST(test_learn_lag_needs_a_change_from_steady_to_steady) {
     model_t wheel = {.lag_ms = 60.0};
     follow(&wheel, 900, 0);
     follow(&wheel, 2500, 600); // Of 0.9 s it had the speed for 0.4.
@@ -428,31 +426,4 @@ static void test_learn_lag_needs_a_change_from_steady_to_steady(void) {
     follow(&wheel, 2500, 0);
     follow(&wheel, 2500, 600);
     TEST_ASSERT_EQUAL_UINT32(1, drives.lag[IW_LEFT].count);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_learn_lag_is_that_of_the_wheel_whatever_its_droop);
-    RUN_TEST(test_learn_lag_speaks_against_what_the_gateway_assumes);
-    RUN_TEST(test_learn_lag_of_changes_that_differ_is_no_value);
-    RUN_TEST(test_learn_lag_needs_a_change_from_steady_to_steady);
-    RUN_TEST(test_learn_drive_that_keeps_its_path_has_no_deviation);
-    RUN_TEST(test_learn_deviation_is_the_one_by_which_the_gateway_judges);
-    RUN_TEST(test_learn_each_drive_has_its_own_deviation);
-    RUN_TEST(test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does);
-    RUN_TEST(test_learn_nothing_is_compared_while_a_wheel_is_not_heard);
-    RUN_TEST(test_learn_mirrored_wheel_is_compared_as_it_is_mounted);
-    RUN_TEST(test_learn_of_more_drives_than_can_be_told_the_largest_counts);
-    RUN_TEST(test_learn_counts_each_wheel_for_itself);
-    RUN_TEST(test_learn_keeps_currents_apart_by_the_direction_they_come_with);
-    RUN_TEST(test_learn_counts_as_sent_only_what_is_marked_so);
-    RUN_TEST(test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_sooner);
-    RUN_TEST(test_learn_keeps_answers_apart_by_the_direction_that_was_told);
-    RUN_TEST(test_learn_judges_no_speed_that_is_no_longer_told);
-    RUN_TEST(test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_only);
-    RUN_TEST(test_learn_takes_no_force_of_a_wheel_that_was_not_heard);
-    RUN_TEST(test_learn_turns_and_ticks_leave_out_gaps_and_reboots);
-    RUN_TEST(test_learn_turns_and_ticks_leave_out_what_is_too_slow_or_turns_round);
-    RUN_TEST(test_learn_pose_may_wrap);
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 
 #include "iwheel_linux/backend.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <string.h>
@@ -31,8 +31,6 @@ void setUp(void) {
     error = 0;
 }
 
-void tearDown(void) {}
-
 static void stored(const char *chip, const char *line, unsigned notes) {
     bringup_store_wiring(&bringup);
     TEST_ASSERT_EQUAL_STRING(chip, bringup.config.estop.chip);
@@ -42,21 +40,21 @@ static void stored(const char *chip, const char *line, unsigned notes) {
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2_line);
 }
 
-static void test_wiring_is_stored_with_a_note_for_each_name(void) {
+TEST(test_wiring_is_stored_with_a_note_for_each_name) {
     stored("pinctrl-bcm2711", "ESTOP", 2);
 }
 
-static void test_wiring_of_a_line_without_a_name_is_that_of_its_chip(void) {
+TEST(test_wiring_of_a_line_without_a_name_is_that_of_its_chip) {
     seen.line[0] = '\0';
     stored("pinctrl-bcm2711", "any", 1);
 }
 
-static void test_wiring_that_cannot_be_read_is_not_stored(void) {
+TEST(test_wiring_that_cannot_be_read_is_not_stored) {
     error = ENOTSUP;
     stored("any", "any", 0);
 }
 
-static void test_wiring_that_a_configuration_cannot_hold_is_left_out(void) {
+TEST(test_wiring_that_a_configuration_cannot_hold_is_left_out) {
     strcpy(seen.chip, "a;b");
     stored("any", "ESTOP", 1);
 }
@@ -65,7 +63,7 @@ static void use_two_contacts(void) {
     strcpy(bringup.config.estop.line2, "ESTOP2");
 }
 
-static void test_wiring_of_both_contacts_is_stored(void) {
+TEST(test_wiring_of_both_contacts_is_stored) {
     use_two_contacts();
     bringup_store_wiring(&bringup);
     TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", bringup.config.estop.chip);
@@ -75,7 +73,7 @@ static void test_wiring_of_both_contacts_is_stored(void) {
     TEST_ASSERT_EQUAL_UINT(4, bringup.notes);
 }
 
-static void test_wiring_of_an_earlier_bringup_is_forgotten(void) {
+TEST(test_wiring_of_an_earlier_bringup_is_forgotten) {
     use_two_contacts();
     bringup_store_wiring(&bringup);
     bringup_forget_wiring(&bringup);
@@ -83,15 +81,4 @@ static void test_wiring_of_an_earlier_bringup_is_forgotten(void) {
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2_line);
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip);
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip_line);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_wiring_is_stored_with_a_note_for_each_name);
-    RUN_TEST(test_wiring_of_a_line_without_a_name_is_that_of_its_chip);
-    RUN_TEST(test_wiring_that_cannot_be_read_is_not_stored);
-    RUN_TEST(test_wiring_that_a_configuration_cannot_hold_is_left_out);
-    RUN_TEST(test_wiring_of_both_contacts_is_stored);
-    RUN_TEST(test_wiring_of_an_earlier_bringup_is_forgotten);
-    return UNITY_END();
 }

@@ -3,15 +3,11 @@
 #include "config/similar.h"
 #include "text/duration.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 
-void setUp(void) {}
-
-void tearDown(void) {}
-
-static void test_duration_in_every_unit_with_decimals_is_read(void) {
+TEST(test_duration_in_every_unit_with_decimals_is_read) {
     static const struct {
         const char *text;
         int64_t us;
@@ -26,7 +22,7 @@ static void test_duration_in_every_unit_with_decimals_is_read(void) {
     }
 }
 
-static void test_duration_that_is_none_is_refused_and_touches_nothing(void) {
+TEST(test_duration_that_is_none_is_refused_and_touches_nothing) {
     static const char *const cases[] = {"",        "2",    "s",        "2 s", "-1s",  "+1s", "1.s",
                                         "1.2345s", ".5s",  "1,5s",     "2m",  "2sec", "2S",  "1.5.2s",
                                         "1e3s",    "0x1s", "1234567s", "2s ", " 2s",  "infs"};
@@ -37,7 +33,7 @@ static void test_duration_that_is_none_is_refused_and_touches_nothing(void) {
     }
 }
 
-static void test_duration_option_out_of_range_tells_the_range_as_it_is_written(void) {
+TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written) {
     static const duration_range_t range = {20000, 600000000};
     char why[DURATION_WHY_SIZE];
     int64_t us = 77;
@@ -52,7 +48,7 @@ static void test_duration_option_out_of_range_tells_the_range_as_it_is_written(v
     TEST_ASSERT_EQUAL_INT64(20000, us);
 }
 
-static void test_duration_option_without_its_unit_is_told_as_it_should_be_written(void) {
+TEST(test_duration_option_without_its_unit_is_told_as_it_should_be_written) {
     static const duration_range_t range = {20000, 600000000};
     static const struct {
         const char *text;
@@ -81,7 +77,7 @@ static void test_duration_option_without_its_unit_is_told_as_it_should_be_writte
     }
 }
 
-static void test_word_nearly_right_is_near_and_a_strange_one_is_not(void) {
+TEST(test_word_nearly_right_is_near_and_a_strange_one_is_not) {
     TEST_ASSERT_EQUAL_size_t(0, settings_word_distance("stat", "status"));
     TEST_ASSERT_EQUAL_size_t(1, settings_word_distance("staus", "status"));
     TEST_ASSERT_EQUAL_size_t(2, settings_word_distance("hlep", "help"));
@@ -91,14 +87,4 @@ static void test_word_nearly_right_is_near_and_a_strange_one_is_not(void) {
     TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE, settings_word_distance("", "top"));
     TEST_ASSERT_EQUAL_size_t(SETTINGS_WORD_STRANGE,
                              settings_word_distance("period_msperiod_msperiod_msperiod_msperiod_ms", "period_ms"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_duration_in_every_unit_with_decimals_is_read);
-    RUN_TEST(test_duration_that_is_none_is_refused_and_touches_nothing);
-    RUN_TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written);
-    RUN_TEST(test_duration_option_without_its_unit_is_told_as_it_should_be_written);
-    RUN_TEST(test_word_nearly_right_is_near_and_a_strange_one_is_not);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Current limits of a client: what becomes of each pair of them, and how fast they fall.
 #include "iwheel/private/current.h"
-#include "unity.h"
+#include "unit.h"
 
 static iw_config_t config;
 
@@ -9,8 +9,6 @@ void setUp(void) {
     iw_config_default(&config);
     config.current_role = IW_ROLE_LIMIT;
 }
-
-void tearDown(void) {}
 
 static int32_t larger(int32_t a, int32_t b) {
     return (a > b) ? a : b;
@@ -32,25 +30,25 @@ static void sweep(int32_t lowest, bool zero) {
     }
 }
 
-static void test_current_sides_get_the_larger_limit_and_the_floor(void) {
+TEST(test_current_sides_get_the_larger_limit_and_the_floor) {
     sweep(300, false);
     config.min_current_mA = 1234;
     sweep(1234, false);
 }
 
-static void test_current_sides_may_differ_only_if_configured(void) {
+TEST(test_current_sides_may_differ_only_if_configured) {
     config.asymmetric_current = true;
     sweep(300, false);
 }
 
-static void test_current_of_two_zero_speeds_is_the_maximum(void) {
+TEST(test_current_of_two_zero_speeds_is_the_maximum) {
     config.max_current_mA = 1500;
     sweep(1500, true);
     config.asymmetric_current = true;
     sweep(1500, true);
 }
 
-static void test_current_floor_is_never_above_the_maximum(void) {
+TEST(test_current_floor_is_never_above_the_maximum) {
     config.max_current_mA = 200;
     TEST_ASSERT_EQUAL_INT32(200, iw_current_floor(&config));
     sweep(200, false);
@@ -60,7 +58,7 @@ static void test_current_floor_is_never_above_the_maximum(void) {
     TEST_ASSERT_EQUAL_INT32(300, iw_current_floor(&config));
 }
 
-static void test_current_limit_falls_with_time_and_rises_without(void) {
+TEST(test_current_limit_falls_with_time_and_rises_without) {
     static const struct {
         int16_t from, target;
         uint32_t elapsed_us;
@@ -84,14 +82,4 @@ static void test_current_limit_falls_with_time_and_rises_without(void) {
         TEST_ASSERT_EQUAL_INT16(700, limit[IW_LEFT]);
         TEST_ASSERT_EQUAL_INT16(cases[i].expected, limit[IW_RIGHT]);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_current_sides_get_the_larger_limit_and_the_floor);
-    RUN_TEST(test_current_sides_may_differ_only_if_configured);
-    RUN_TEST(test_current_of_two_zero_speeds_is_the_maximum);
-    RUN_TEST(test_current_floor_is_never_above_the_maximum);
-    RUN_TEST(test_current_limit_falls_with_time_and_rises_without);
-    return UNITY_END();
 }

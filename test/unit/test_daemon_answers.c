@@ -2,7 +2,7 @@
 // What the daemon answers, notes in the black box and warns of, in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include "iwheel_server/target.h"
 #include <stdlib.h>
@@ -39,7 +39,7 @@ static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
     return (blackbox_entry_t){0};
 }
 
-static void test_each_request_is_noted_with_who_asked_and_what_became_of_it(void) {
+TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it) {
     const iw_client_t id = daemon_rig.daemon->clients.client[0].id;
     uint64_t at = noted_so_far();
     daemon_rig_arm(client);
@@ -67,7 +67,7 @@ static void test_each_request_is_noted_with_who_asked_and_what_became_of_it(void
     TEST_ASSERT_EQUAL_UINT8(IW_TARE_OK, tare.b);
 }
 
-static void test_tare_tells_of_each_wheel_the_zero_it_had(void) {
+TEST(test_tare_tells_of_each_wheel_the_zero_it_had) {
     iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     daemon_rig_run(3000);
     assert_reply("{\"cmd\":\"tare\"}", "\"ok\":true");
@@ -85,7 +85,7 @@ static void test_tare_tells_of_each_wheel_the_zero_it_had(void) {
     TEST_ASSERT_TRUE_MESSAGE(strstr(reply, left) < second, reply);
 }
 
-static void test_tare_of_one_wheel_tells_of_that_wheel(void) {
+TEST(test_tare_of_one_wheel_tells_of_that_wheel) {
     static const char *const sides[] = {"left", "right"};
     iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     char line[64];
@@ -112,7 +112,7 @@ static void carry_out(const char *line) {
     daemon->clients.handler.carry_out(daemon->clients.handler.context, &daemon->clients.client[0], line, strlen(line));
 }
 
-static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void) {
+TEST(test_request_happens_when_it_is_carried_out_and_asks_for_a_step) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     daemon_rig_arm(client);
     carry_out("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}");
@@ -137,7 +137,7 @@ static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void
     TEST_ASSERT_TRUE(daemon->wheels.requested);
 }
 
-static void test_reset_that_waited_through_a_stop_is_refused(void) {
+TEST(test_reset_that_waited_through_a_stop_is_refused) {
     sock_client_t *own = &daemon_rig.daemon->clients.client[0];
     assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
     daemon_rig_run(2000);
@@ -149,7 +149,7 @@ static void test_reset_that_waited_through_a_stop_is_refused(void) {
     TEST_ASSERT_TRUE(daemon_rig_state() != IW_STATE_LATCHED);
 }
 
-static void test_change_of_state_is_noted_with_what_each_wheel_was_told(void) {
+TEST(test_change_of_state_is_noted_with_what_each_wheel_was_told) {
     daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
@@ -166,7 +166,7 @@ static void test_change_of_state_is_noted_with_what_each_wheel_was_told(void) {
     TEST_ASSERT_EQUAL_INT(900, state.as.drive.current_mA[IW_RIGHT]);
 }
 
-static void test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on(void) {
+TEST(test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on) {
     const iw_assumption_entry_t known = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     uint64_t at = noted_so_far();
     gw_wheels_set_assumption(&daemon_rig.daemon->wheels, IW_ASSUMPTION_TRACK, &known);
@@ -176,7 +176,7 @@ static void test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on(void) {
 }
 
 /// At rest: a step with frames is noted by them, and they have its time.
-static void test_frames_are_noted_at_the_time_of_the_step_that_took_them(void) {
+TEST(test_frames_are_noted_at_the_time_of_the_step_that_took_them) {
     unsigned frames = 0;
     for (unsigned ms = 0; ms < 100U; ms++) {
         const iw_time_us_t begin_us = daemon_rig.now_us;
@@ -193,7 +193,7 @@ static void test_frames_are_noted_at_the_time_of_the_step_that_took_them(void) {
     TEST_ASSERT_GREATER_THAN_UINT(20U, frames);
 }
 
-static void test_reply_to_each_request_is_whole(void) {
+TEST(test_reply_to_each_request_is_whole) {
     static const char *const replies[][2] = {
         {"{\"cmd\":\"watch\",\"topics\":[\"stop\",\"bus\"],\"rate_hz\":7}",
          "\"topics\":[\"bus\",\"stop\"],\"rate_hz\":7,\"limited\":false"},
@@ -209,7 +209,7 @@ static void test_reply_to_each_request_is_whole(void) {
     }
 }
 
-static void test_status_tells_of_each_wheel_its_own_zero(void) {
+TEST(test_status_tells_of_each_wheel_its_own_zero) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     daemon->assumptions.known.offset[IW_LEFT].samples = 11;
     daemon->assumptions.known.offset[IW_RIGHT].samples = 22;
@@ -219,7 +219,7 @@ static void test_status_tells_of_each_wheel_its_own_zero(void) {
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].samples);
 }
 
-static void test_arm_is_answered_once(void) {
+TEST(test_arm_is_answered_once) {
     char text[8192];
     unsigned answers = 0;
     daemon_rig_run(10);
@@ -237,7 +237,7 @@ static void test_arm_is_answered_once(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1U, answers, text);
 }
 
-static void test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_the_reason(void) {
+TEST(test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_the_reason) {
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"900\"}", "\"state\":\"contradicted\"");
     daemon_rig_arm(client);
     assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":100}", "\"error\":\"denied\",\"message\":\"track");
@@ -245,7 +245,7 @@ static void test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_th
 }
 
 /// Answers of the port that have changed, told again and again: they are news once.
-static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
+TEST(test_facts_of_the_bus_are_taken_once_for_each_change) {
     daemon_rig.link.changes++;
     daemon_rig_run(20);
     uint64_t at = noted_so_far();
@@ -262,7 +262,7 @@ static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT(1U, facts); // And once a second.
 }
 
-static void test_purge_by_the_port_is_told_once_in_the_log(void) {
+TEST(test_purge_by_the_port_is_told_once_in_the_log) {
     static const char *const words[] = {[IWL_LINK_PURGE_DONE] = "taken down and up again",
                                         [IWL_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
                                         [IWL_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
@@ -278,7 +278,7 @@ static void test_purge_by_the_port_is_told_once_in_the_log(void) {
     }
 }
 
-static void test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link(void) {
+TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link) {
     daemon_rig.link =
         (iwl_bus_link_t){.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
     daemon_rig.daemon->answers.server.told.left_behind = true;
@@ -302,7 +302,7 @@ static void expect_contacts(int first, int second, const char *status, const cha
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), told), daemon_rig_log());
 }
 
-static void test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree(void) {
+TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     TEST_ASSERT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "pressed_at"));
     wheels->hal.two_contacts = true;
@@ -328,7 +328,7 @@ static void test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disag
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
 }
 
-static void test_refusal_names_the_contact_that_is_meant(void) {
+TEST(test_refusal_names_the_contact_that_is_meant) {
     static const struct {
         int first;
         int second;
@@ -356,7 +356,7 @@ static void test_refusal_names_the_contact_that_is_meant(void) {
     TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
 }
 
-static void test_warning_that_goes_on_is_said_once(void) {
+TEST(test_warning_that_goes_on_is_said_once) {
     static iwl_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
     none.present = false;
@@ -368,27 +368,4 @@ static void test_warning_that_goes_on_is_said_once(void) {
     const char *said = strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "there is no e-stop line");
     TEST_ASSERT_NOT_NULL(said);
     TEST_ASSERT_NULL(strstr(said + 1, "there is no e-stop line"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it);
-    RUN_TEST(test_tare_tells_of_each_wheel_the_zero_it_had);
-    RUN_TEST(test_tare_of_one_wheel_tells_of_that_wheel);
-    RUN_TEST(test_request_happens_when_it_is_carried_out_and_asks_for_a_step);
-    RUN_TEST(test_reply_to_each_request_is_whole);
-    RUN_TEST(test_status_tells_of_each_wheel_its_own_zero);
-    RUN_TEST(test_arm_is_answered_once);
-    RUN_TEST(test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_the_reason);
-    RUN_TEST(test_reset_that_waited_through_a_stop_is_refused);
-    RUN_TEST(test_change_of_state_is_noted_with_what_each_wheel_was_told);
-    RUN_TEST(test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on);
-    RUN_TEST(test_frames_are_noted_at_the_time_of_the_step_that_took_them);
-    RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
-    RUN_TEST(test_purge_by_the_port_is_told_once_in_the_log);
-    RUN_TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link);
-    RUN_TEST(test_warning_that_goes_on_is_said_once);
-    RUN_TEST(test_refusal_names_the_contact_that_is_meant);
-    RUN_TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree);
-    return UNITY_END();
 }

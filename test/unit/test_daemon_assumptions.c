@@ -5,7 +5,7 @@
 #include "inspect/assumption.h"
 #include "sockets/sock_clients.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <string.h>
@@ -108,28 +108,28 @@ void tearDown(void) {
     daemon_rig_end();
 }
 
-static void test_memory_finding_is_believed_for_the_value_it_was_found_for(void) {
+TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_BUS);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
     TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry(IW_ASSUMPTION_GEAR_RATIO)->source);
 }
 
-static void test_memory_finding_for_another_value_is_forgotten(void) {
+TEST(test_memory_finding_for_another_value_is_forgotten) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     (void)strcpy(stored.item[IW_ASSUMPTION_GEAR_RATIO].value, "7");
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
-static void test_memory_contradiction_stays_one(void) {
+TEST(test_memory_contradiction_stays_one) {
     store(IW_ASSUMPTION_SETPOINT_TYPE, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_SETPOINT_TYPE)->state);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
 }
 
-static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
+TEST(test_memory_contradiction_of_this_run_is_not_talked_over) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_BUS,
                              3000);
@@ -147,7 +147,7 @@ static bool is_warned_of(const char *what) {
     return false;
 }
 
-static void test_memory_button_that_was_tried_before_is_not_warned_of(void) {
+TEST(test_memory_button_that_was_tried_before_is_not_warned_of) {
     const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     tell_stored();
     daemon_rig_run(50);
@@ -169,7 +169,7 @@ static const iwl_estop_seen_t *see_line(const void *self) {
 }
 
 /// The file may come after the first look: what it says is compared with the wiring all the same, and is not newer than what was seen.
-static void test_memory_button_of_another_wiring_is_void_however_late_the_file(void) {
+TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file) {
     static iwl_estop_ops_t ops;
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     ops = *wheels->hal.estop_ops;
@@ -191,7 +191,7 @@ static void test_memory_button_of_another_wiring_is_void_however_late_the_file(v
 }
 
 /// A battery beyond its threshold is told and warned of, and stops nothing.
-static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
+TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     wheels->health.limits.battery_low_dV = 254;
     daemon_rig_begin_driving(client);
@@ -210,7 +210,7 @@ static void test_battery_below_its_threshold_is_a_fault_and_no_stop(void) {
     TEST_ASSERT_FALSE(is_warned_of("the right wheel's battery has "));
 }
 
-static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
+TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only) {
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
     tell_stored();
@@ -220,7 +220,7 @@ static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only
     TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
 }
 
-static void test_memory_offset_of_an_earlier_run_keeps_its_time(void) {
+TEST(test_memory_offset_of_an_earlier_run_keeps_its_time) {
     store_offset(IW_LEFT, IW_FORCE_CN, 4321);
     tell_stored();
     daemon_rig_run(3000);
@@ -229,7 +229,7 @@ static void test_memory_offset_of_an_earlier_run_keeps_its_time(void) {
     TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
 }
 
-static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
+TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel) {
     daemon_rig_run(3000);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
     const gw_stored_t *known = &daemon_rig.daemon->assumptions.known;
@@ -240,7 +240,7 @@ static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
     TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, known->offset[IW_LEFT].from);
 }
 
-static void test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second(void) {
+TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second) {
     daemon_rig.daemon->assumptions.write_us = 0;
     daemon_rig_run(3000);
     const unsigned before = writes;
@@ -312,7 +312,7 @@ static void change_item(iw_assumption_item_t item) {
     expect_new_status("as if it had never been asked");
 }
 
-static void test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before(void) {
+TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     assumptions->write_us = 0;
     daemon_rig_run(3000);
@@ -330,7 +330,7 @@ static void test_memory_that_could_not_be_written_is_written_again_after_its_tim
     TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
 }
 
-static void test_memory_whose_process_has_gone_says_so(void) {
+TEST(test_memory_whose_process_has_gone_says_so) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     assumptions->store.waits = true;
     news = GW_FILE_STORE_GONE;
@@ -340,7 +340,7 @@ static void test_memory_whose_process_has_gone_says_so(void) {
     TEST_ASSERT_EQUAL_INT(ECHILD, assumptions->error);
 }
 
-static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
+TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent) {
     iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
     force->provenance = IW_OFFSET_WHEEL;
     force->offset_us = daemon_rig.now_us;
@@ -351,7 +351,7 @@ static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
     TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
 }
 
-static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(void) {
+TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     const iw_assumption_item_t item = IW_ASSUMPTION_GEAR_RATIO;
     (void)snprintf(assumptions->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
@@ -365,13 +365,13 @@ static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(voi
     TEST_ASSERT_EQUAL_STRING("", assumptions->known.item[item].word.found);
 }
 
-static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
+TEST(test_status_after_a_change_of_an_item_is_as_written_anew) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         change_item((iw_assumption_item_t)item);
     }
 }
 
-static void test_status_after_a_change_of_the_configuration_is_as_written_anew(void) {
+TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew) {
     iw_config_t *core = &daemon_rig.daemon->config.core;
     core->setpoint_type++;
     expect_new_status("setpoint_type");
@@ -397,7 +397,7 @@ static void test_status_after_a_change_of_the_configuration_is_as_written_anew(v
     }
 }
 
-static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(void) {
+TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew) {
     daemon_rig_run(3000);
     expect_new_status("three seconds later");
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
@@ -409,7 +409,7 @@ static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(
     TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
 }
 
-static void test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept(void) {
+TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept) {
     static char next[SOCK_REPLY_MAX];
     (void)write_status(next);
     char *const kept = (char *)memchr(written()->text, 's', written()->length); // Of "setpoint_type".
@@ -418,7 +418,7 @@ static void test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_k
     TEST_ASSERT_NOT_NULL(strstr(write_status(next), "\"ledger\":{\"Setpoint_type\""));
 }
 
-static void test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time(void) {
+TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time) {
     static char first[SOCK_REPLY_MAX];
     static char again[SOCK_REPLY_MAX];
     (void)write_status(first);
@@ -436,7 +436,7 @@ static void test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time
     TEST_ASSERT_EQUAL_STRING(first, write_status(again));
 }
 
-static void test_status_that_does_not_fit_keeps_nothing(void) {
+TEST(test_status_that_does_not_fit_keeps_nothing) {
     char line[64];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
@@ -447,37 +447,10 @@ static void test_status_that_does_not_fit_keeps_nothing(void) {
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }
 
-static void test_memory_watches_the_button_of_the_configured_line(void) {
+TEST(test_memory_watches_the_button_of_the_configured_line) {
     const gateway_config_t *config = &daemon_rig.daemon->config;
     TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->assumptions.button.contact[0].line);
     TEST_ASSERT_EQUAL_STRING(config->estop.line2, daemon_rig.daemon->assumptions.button.contact[1].line);
     TEST_ASSERT_EQUAL(config->estop.active2_high, daemon_rig.daemon->assumptions.button.contact[1].active_high);
     TEST_ASSERT_EQUAL(config->estop.active_high, daemon_rig.daemon->assumptions.button.contact[0].active_high);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for);
-    RUN_TEST(test_memory_finding_for_another_value_is_forgotten);
-    RUN_TEST(test_memory_contradiction_stays_one);
-    RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
-    RUN_TEST(test_memory_button_that_was_tried_before_is_not_warned_of);
-    RUN_TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file);
-    RUN_TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop);
-    RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
-    RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
-    RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
-    RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
-    RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
-    RUN_TEST(test_memory_whose_process_has_gone_says_so);
-    RUN_TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent);
-    RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
-    RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
-    RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);
-    RUN_TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew);
-    RUN_TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept);
-    RUN_TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time);
-    RUN_TEST(test_status_that_does_not_fit_keeps_nothing);
-    RUN_TEST(test_memory_watches_the_button_of_the_configured_line);
-    return UNITY_END();
 }

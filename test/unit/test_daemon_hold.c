@@ -2,7 +2,7 @@
 // after_stop = hold through the daemon, in virtual time: zeros, the crash marker, the request that ends it, the end of the process.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <signal.h>
 #include <stdio.h>
@@ -58,7 +58,7 @@ static const char *aged_release(int64_t age_ms) {
     return line;
 }
 
-static void test_hold_lasts_until_release_and_so_does_its_marker(void) {
+TEST(test_hold_lasts_until_release_and_so_does_its_marker) {
     drive_and_stop();
     assert_held(IW_STATE_STOPPING, 120000);
     assert_reply("{\"cmd\":\"status\"}", "\"zeros hold the wheels until release (iwheelctl release) or arm;");
@@ -66,7 +66,7 @@ static void test_hold_lasts_until_release_and_so_does_its_marker(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-static void test_hold_of_a_latch_outlives_its_reset(void) {
+TEST(test_hold_of_a_latch_outlives_its_reset) {
     begin_again();
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
@@ -80,7 +80,7 @@ static void test_hold_of_a_latch_outlives_its_reset(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-static void test_hold_is_resumed_by_the_next_start(void) {
+TEST(test_hold_is_resumed_by_the_next_start) {
     drive_and_stop();
     daemon_rig_crash();
     daemon_rig_start();
@@ -92,7 +92,7 @@ static void test_hold_is_resumed_by_the_next_start(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static void test_hold_ends_with_the_process_which_warns(void) {
+TEST(test_hold_ends_with_the_process_which_warns) {
     drive_and_stop();
     daemon_rig_keep_log();
     TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
@@ -102,7 +102,7 @@ static void test_hold_ends_with_the_process_which_warns(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-static void test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns(void) {
+TEST(test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns) {
     for (unsigned crashed = 0; crashed < 2U; crashed++) {
         if (crashed != 0U) {
             drive_and_stop();
@@ -124,7 +124,7 @@ static void test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns(v
     }
 }
 
-static void test_process_that_sends_nothing_ends_without_a_warning(void) {
+TEST(test_process_that_sends_nothing_ends_without_a_warning) {
     daemon_rig_keep_log();
     TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
     daemon_rig_run(200);
@@ -132,7 +132,7 @@ static void test_process_that_sends_nothing_ends_without_a_warning(void) {
     TEST_ASSERT_NULL(strstr(daemon_rig_log(), "use its parking brake"));
 }
 
-static void test_release_that_is_too_old_changes_nothing(void) {
+TEST(test_release_that_is_too_old_changes_nothing) {
     static const int64_t late_ms[] = {1001, 1100, 60000};
     drive_and_stop();
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
@@ -143,7 +143,7 @@ static void test_release_that_is_too_old_changes_nothing(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-static void test_release_from_before_a_stop_of_somebody_else_changes_nothing(void) {
+TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing) {
     drive_and_stop();
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
@@ -154,7 +154,7 @@ static void test_release_from_before_a_stop_of_somebody_else_changes_nothing(voi
     (void)close(other);
 }
 
-static void test_release_is_refused_to_who_only_watches_and_while_somebody_drives(void) {
+TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives) {
     drive_and_stop();
     const int watcher = daemon_rig_connect_with(SOCK_WATCH);
     daemon_rig_run(20);
@@ -167,7 +167,7 @@ static void test_release_is_refused_to_who_only_watches_and_while_somebody_drive
     (void)close(watcher);
 }
 
-static void test_release_in_the_ramp_is_told_to_wait_for_its_end(void) {
+TEST(test_release_in_the_ramp_is_told_to_wait_for_its_end) {
     drive_and_stop();
     daemon_rig_arm(client);
     (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
@@ -175,19 +175,4 @@ static void test_release_in_the_ramp_is_told_to_wait_for_its_end(void) {
     (void)daemon_rig_ask(client, "{\"cmd\":\"stop\"}");
     assert_reply("{\"cmd\":\"release\"}",
                  "\"error\":\"not_at_rest\",\"message\":\"the wheels turn or are told to: left ");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_hold_lasts_until_release_and_so_does_its_marker);
-    RUN_TEST(test_hold_of_a_latch_outlives_its_reset);
-    RUN_TEST(test_hold_is_resumed_by_the_next_start);
-    RUN_TEST(test_hold_ends_with_the_process_which_warns);
-    RUN_TEST(test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns);
-    RUN_TEST(test_process_that_sends_nothing_ends_without_a_warning);
-    RUN_TEST(test_release_that_is_too_old_changes_nothing);
-    RUN_TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing);
-    RUN_TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives);
-    RUN_TEST(test_release_in_the_ramp_is_told_to_wait_for_its_end);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What wakes the daemon's loop, and what it looks at before anything leaves, in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 #include <sys/socket.h>
@@ -24,7 +24,7 @@ static void begin_driving_between_pairs(void) {
 
 #define SLOWER "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n"
 
-static void test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves(void) {
+TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -41,7 +41,7 @@ static void test_estop_pressed_between_a_command_and_its_wake_is_seen_before_any
     }
 }
 
-static void test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves(void) {
+TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves) {
     begin_driving_between_pairs();
     daemon_rig.estop_late = true;
     say(SLOWER);
@@ -52,7 +52,7 @@ static void test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anyth
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
 }
 
-static void test_command_of_who_drives_leaves_after_one_look(void) {
+TEST(test_command_of_who_drives_leaves_after_one_look) {
     begin_driving_between_pairs();
     const uint32_t looks = daemon_rig.looks;
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
@@ -63,7 +63,7 @@ static void test_command_of_who_drives_leaves_after_one_look(void) {
     TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
 }
 
-static void test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read(void) {
+TEST(test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read) {
     daemon_rig_run(100);
     TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
     daemon_rig_begin_driving(client);
@@ -75,7 +75,7 @@ static void test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_wha
     TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
 }
 
-static void test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next(void) {
+TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next) {
     begin_driving_between_pairs();
     for (unsigned ms = 0; ms < 150U; ms++) {
         const uint32_t sent = daemon_rig.sent[IW_LEFT];
@@ -95,7 +95,7 @@ static void assert_refused_behind_a_stop(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
 }
 
-static void test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop(void) {
+TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop) {
     begin_driving_between_pairs();
     say(SLOWER);
     daemon_rig.stolen_us = 150000U;
@@ -109,7 +109,7 @@ static void test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_
     assert_refused_behind_a_stop();
 }
 
-static void test_command_that_comes_with_the_estop_is_refused(void) {
+TEST(test_command_that_comes_with_the_estop_is_refused) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
@@ -124,19 +124,19 @@ static uint32_t waits_in_a_second(void) {
     return daemon_rig.waits;
 }
 
-static void test_frames_that_nobody_watches_are_taken_together(void) {
+TEST(test_frames_that_nobody_watches_are_taken_together) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
     (void)close(client);
     client = -1;
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
 }
 
-static void test_frames_that_somebody_watches_are_taken_one_by_one(void) {
+TEST(test_frames_that_somebody_watches_are_taken_one_by_one) {
     (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
     TEST_ASSERT_GREATER_THAN_UINT32(450, waits_in_a_second());
 }
 
-static void test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop(void) {
+TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop) {
     daemon_rig_begin_driving(client);
     daemon_rig.waits = 0;
     daemon_rig_run(190);
@@ -149,7 +149,7 @@ static void test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop(
     TEST_ASSERT_GREATER_THAN_UINT32(450, daemon_rig.waits);
 }
 
-static void test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait(void) {
+TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -166,7 +166,7 @@ static void test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_fr
     }
 }
 
-static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
+TEST(test_estop_wakes_a_loop_that_lets_frames_wait) {
     (void)close(client);
     client = -1;
     daemon_rig_run(100);
@@ -179,21 +179,4 @@ static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
         TEST_ASSERT_TRUE(daemon_rig.now_us - before_us <= MS(1));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves);
-    RUN_TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves);
-    RUN_TEST(test_command_of_who_drives_leaves_after_one_look);
-    RUN_TEST(test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read);
-    RUN_TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next);
-    RUN_TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop);
-    RUN_TEST(test_command_that_comes_with_the_estop_is_refused);
-    RUN_TEST(test_frames_that_nobody_watches_are_taken_together);
-    RUN_TEST(test_frames_that_somebody_watches_are_taken_one_by_one);
-    RUN_TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop);
-    RUN_TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait);
-    RUN_TEST(test_estop_wakes_a_loop_that_lets_frames_wait);
-    return UNITY_END();
 }

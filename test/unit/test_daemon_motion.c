@@ -2,7 +2,7 @@
 // The daemon's loop in motion, in virtual time: the crash marker, the e-stop, the clocks, the lease, the end.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <signal.h>
 #include <stdlib.h>
@@ -39,7 +39,7 @@ static void assert_next_start_sends_zeros(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-static void test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last(void) {
+TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
     daemon_rig_begin_driving(client);
     (void)close(client);
@@ -52,7 +52,7 @@ static void test_marker_is_there_before_the_first_nonzero_setpoint_and_until_aft
     TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
 }
 
-static void test_killed_before_anything_was_sent_the_next_start_sends_nothing(void) {
+TEST(test_killed_before_anything_was_sent_the_next_start_sends_nothing) {
     daemon_rig.full = true;
     (void)daemon_rig_ask(client, "{\"cmd\":\"arm\"}");
     TEST_ASSERT_FALSE(daemon_rig_marked());
@@ -64,7 +64,7 @@ static void test_killed_before_anything_was_sent_the_next_start_sends_nothing(vo
     TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_LEFT]);
 }
 
-static void test_marker_that_could_not_be_set_is_tried_again(void) {
+TEST(test_marker_that_could_not_be_set_is_tried_again) {
     char path[128];
     (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
@@ -85,7 +85,7 @@ static void test_marker_that_could_not_be_set_is_tried_again(void) {
     TEST_ASSERT_TRUE(daemon_rig_marked());
 }
 
-static void test_marker_outlives_a_latch_until_its_zeros_have_been_held(void) {
+TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
     daemon_rig_run(1000);
@@ -96,12 +96,12 @@ static void test_marker_outlives_a_latch_until_its_zeros_have_been_held(void) {
     TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
 }
 
-static void test_killed_while_armed_the_next_start_sends_zeros(void) {
+TEST(test_killed_while_armed_the_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     assert_next_start_sends_zeros();
 }
 
-static void test_killed_in_the_ramp_the_next_start_sends_zeros(void) {
+TEST(test_killed_in_the_ramp_the_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(60);
@@ -109,7 +109,7 @@ static void test_killed_in_the_ramp_the_next_start_sends_zeros(void) {
     assert_next_start_sends_zeros();
 }
 
-static void test_killed_in_the_hold_the_next_start_sends_zeros(void) {
+TEST(test_killed_in_the_hold_the_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(1000);
@@ -118,7 +118,7 @@ static void test_killed_in_the_hold_the_next_start_sends_zeros(void) {
     assert_next_start_sends_zeros();
 }
 
-static void test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew(void) {
+TEST(test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew) {
     daemon_rig_begin_driving(client);
     daemon_rig_crash();
     daemon_rig_start();
@@ -126,7 +126,7 @@ static void test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew
     assert_next_start_sends_zeros();
 }
 
-static void test_killed_while_listening_the_next_start_sends_nothing(void) {
+TEST(test_killed_while_listening_the_next_start_sends_nothing) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(4000);
@@ -137,7 +137,7 @@ static void test_killed_while_listening_the_next_start_sends_nothing(void) {
     TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_RIGHT]);
 }
 
-static void test_estop_edge_is_answered_with_zeros_in_the_same_millisecond(void) {
+TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -151,7 +151,7 @@ static void test_estop_edge_is_answered_with_zeros_in_the_same_millisecond(void)
     }
 }
 
-static void test_estop_that_goes_without_a_word_is_seen_within_milliseconds(void) {
+TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop_silent = true;
     daemon_rig.estop = -1;
@@ -160,7 +160,7 @@ static void test_estop_that_goes_without_a_word_is_seen_within_milliseconds(void
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
 
-static void test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds(void) {
+TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds) {
     for (unsigned phase = 0; phase < 20U; phase += 3U) {
         daemon_rig_begin_driving(client);
         if (phase % 2U == 1U) { // Then frames do not wait to be looked at.
@@ -179,7 +179,7 @@ static void test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within
     }
 }
 
-static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
+TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches) {
     daemon_rig_begin_driving(client);
     daemon_rig_run(7);
     daemon_rig.estop_pulse = true;
@@ -190,7 +190,7 @@ static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
 
-static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
+TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after) {
     static const unsigned hold_ms[] = {0, 100, 1000, 3000};
     for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
         const int other = daemon_rig_connect();
@@ -205,7 +205,7 @@ static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_a
     }
 }
 
-static void test_suspended_machine_latches_with_zeros_first(void) {
+TEST(test_suspended_machine_latches_with_zeros_first) {
     daemon_rig_begin_driving(client);
     daemon_rig.suspended_us += 2000000U;
     const uint32_t before = daemon_rig.sent[IW_LEFT];
@@ -216,7 +216,7 @@ static void test_suspended_machine_latches_with_zeros_first(void) {
     TEST_ASSERT_TRUE(is_cause("loop_hung"));
 }
 
-static void test_suspension_counts_once_and_one_from_before_the_start_not_at_all(void) {
+TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all) {
     daemon_rig_crash();
     daemon_rig.suspended_us += 3600000000U;
     daemon_rig_start();
@@ -233,7 +233,7 @@ static void test_suspension_counts_once_and_one_from_before_the_start_not_at_all
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static void test_time_never_goes_back_after_a_suspension_too_short_to_count(void) {
+TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count) {
     while (daemon_rig.now_us - daemon_rig.looked_us > MS(1)) {
         daemon_rig_run(1);
     }
@@ -252,7 +252,7 @@ static void test_time_never_goes_back_after_a_suspension_too_short_to_count(void
     TEST_ASSERT_EQUAL_UINT32(0, gw_wheels_look(&daemon_rig.daemon->wheels).counters->late_steps);
 }
 
-static void test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own(void) {
+TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     const iw_time_us_t read_us = daemon_rig.now_us;
     gw_wheels_time(wheels, read_us);
@@ -263,7 +263,7 @@ static void test_second_request_after_one_reading_of_the_clock_has_a_time_of_its
     TEST_ASSERT_EQUAL_UINT64(read_us + 300U, wheels->now_us);
 }
 
-static void test_suspension_counts_from_the_time_on_that_makes_a_step_late(void) {
+TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late) {
     daemon_rig_keep_log();
     daemon_rig_begin_driving(client);
     daemon_rig.suspended_us += IW_GATEWAY_LATE_US;
@@ -274,7 +274,7 @@ static void test_suspension_counts_from_the_time_on_that_makes_a_step_late(void)
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "the machine was suspended for 21 ms"));
 }
 
-static void test_loop_that_stood_still_goes_on_with_zeros(void) {
+TEST(test_loop_that_stood_still_goes_on_with_zeros) {
     daemon_rig_begin_driving(client);
     daemon_rig.stolen_us = 150000U;
     daemon_rig_run(1);
@@ -288,7 +288,7 @@ static void test_loop_that_stood_still_goes_on_with_zeros(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
 }
 
-static void test_lease_is_lost_when_commands_end_although_requests_go_on(void) {
+TEST(test_lease_is_lost_when_commands_end_although_requests_go_on) {
     daemon_rig_begin_driving(client);
     const iw_time_us_t last_us = daemon_rig.now_us;
     while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - last_us < MS(1000)) {
@@ -299,14 +299,14 @@ static void test_lease_is_lost_when_commands_end_although_requests_go_on(void) {
     TEST_ASSERT_TRUE(is_cause("lease_lost"));
 }
 
-static void test_clients_are_served_at_the_time_of_the_cycle(void) {
+TEST(test_clients_are_served_at_the_time_of_the_cycle) {
     for (unsigned ms = 0; ms < 50U; ms++) {
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_UINT64(daemon_rig.daemon->wheels.now_us, daemon_rig.daemon->clients.now_us);
     }
 }
 
-static void test_lease_ends_with_the_connection_at_once(void) {
+TEST(test_lease_ends_with_the_connection_at_once) {
     daemon_rig_begin_driving(client);
     (void)close(client);
     client = -1;
@@ -314,7 +314,7 @@ static void test_lease_ends_with_the_connection_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
 }
 
-static void test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last(void) {
+TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last) {
     static const char line[] = "{\"cmd\":\"stop\"}\n";
     daemon_rig_begin_driving(client);
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
@@ -351,7 +351,7 @@ static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
     return longest_us;
 }
 
-static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) {
+TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/notify", daemon_rig.folder);
@@ -375,7 +375,7 @@ static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) 
     TEST_ASSERT_TRUE(armed_us <= MS(220));
 }
 
-static void test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels(void) {
+TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels) {
     daemon_rig_begin_driving(client);
     for (unsigned ms = 0; ms < 2000U; ms++) {
         (void)((ms % 50U == 0U) ? daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}")
@@ -400,7 +400,7 @@ static void end_by(int number) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker) {
     static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         sigset_t none;
@@ -414,7 +414,7 @@ static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
 }
 
 /// Root's name on the bus is our own; only a gateway of another user looks for it.
-static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
+TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends) {
     if (geteuid() != 0) {
         return;
     }
@@ -433,7 +433,7 @@ static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), line), daemon_rig_log());
 }
 
-static void test_start_with_healthy_wheels_logs_no_fault(void) {
+TEST(test_start_with_healthy_wheels_logs_no_fault) {
     daemon_rig_crash();
     daemon_rig_start();
     TEST_ASSERT_EQUAL_UINT32(0,
@@ -446,7 +446,7 @@ static void test_start_with_healthy_wheels_logs_no_fault(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "fault: wheel_lost"), daemon_rig_log());
 }
 
-static void test_start_without_wheels_logs_the_fault_after_a_second(void) {
+TEST(test_start_without_wheels_logs_the_fault_after_a_second) {
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
     daemon_rig_crash();
     daemon_rig_start();
@@ -456,39 +456,4 @@ static void test_start_without_wheels_logs_the_fault_after_a_second(void) {
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());
     daemon_rig_run(200);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "fault: wheel_lost"), daemon_rig_log());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last);
-    RUN_TEST(test_killed_before_anything_was_sent_the_next_start_sends_nothing);
-    RUN_TEST(test_marker_that_could_not_be_set_is_tried_again);
-    RUN_TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held);
-    RUN_TEST(test_killed_while_armed_the_next_start_sends_zeros);
-    RUN_TEST(test_killed_in_the_ramp_the_next_start_sends_zeros);
-    RUN_TEST(test_killed_in_the_hold_the_next_start_sends_zeros);
-    RUN_TEST(test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew);
-    RUN_TEST(test_killed_while_listening_the_next_start_sends_nothing);
-    RUN_TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond);
-    RUN_TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds);
-    RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
-    RUN_TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches);
-    RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
-    RUN_TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count);
-    RUN_TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own);
-    RUN_TEST(test_suspended_machine_latches_with_zeros_first);
-    RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
-    RUN_TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late);
-    RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);
-    RUN_TEST(test_lease_is_lost_when_commands_end_although_requests_go_on);
-    RUN_TEST(test_clients_are_served_at_the_time_of_the_cycle);
-    RUN_TEST(test_lease_ends_with_the_connection_at_once);
-    RUN_TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last);
-    RUN_TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion);
-    RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
-    RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
-    RUN_TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends);
-    RUN_TEST(test_start_with_healthy_wheels_logs_no_fault);
-    RUN_TEST(test_start_without_wheels_logs_the_fault_after_a_second);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // A lease belongs to one person, and what permits motion or clears a latch says since when it is wanted: in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 #include <sys/socket.h>
@@ -55,7 +55,7 @@ static const char *drive_with(const char *key, int speed_mm_s) {
 /// Ages in ms beyond the default limit of 1000.
 static const int64_t late_ms[] = {1001, 1100, 2000, 10000, 60000};
 
-static void test_one_person_arm_too_old_changes_nothing(void) {
+TEST(test_one_person_arm_too_old_changes_nothing) {
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
         assert_reply(aged("arm", late_ms[i]), "\"error\":\"stale_command\"");
         TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
@@ -65,7 +65,7 @@ static void test_one_person_arm_too_old_changes_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static void test_one_person_reset_too_old_leaves_the_latch(void) {
+TEST(test_one_person_reset_too_old_leaves_the_latch) {
     latch();
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
         assert_reply(aged("reset", late_ms[i]), "\"error\":\"stale_command\"");
@@ -75,7 +75,7 @@ static void test_one_person_reset_too_old_leaves_the_latch(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
-static void test_one_person_confirm_too_old_is_refused(void) {
+TEST(test_one_person_confirm_too_old_is_refused) {
     iw_assumption_store_t *assumptions = &daemon_rig.daemon->wheels.core.assumptions;
     iw_assumption_contradict(assumptions, IW_ASSUMPTION_TRACK, IW_SOURCE_OPERATOR, 0);
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
@@ -87,7 +87,7 @@ static void test_one_person_confirm_too_old_is_refused(void) {
 }
 
 /// What a network held back comes at once.
-static void test_one_person_burst_of_old_requests_changes_nothing(void) {
+TEST(test_one_person_burst_of_old_requests_changes_nothing) {
     static const char *const cmds[] = {"reset", "arm", "confirm"};
     static const unsigned counts[] = {2, 10, 100};
     latch();
@@ -104,7 +104,7 @@ static void test_one_person_burst_of_old_requests_changes_nothing(void) {
     (void)close(late);
 }
 
-static void test_one_person_request_ahead_of_the_clock_is_refused(void) {
+TEST(test_one_person_request_ahead_of_the_clock_is_refused) {
     assert_reply(aged("arm", -101), "\"error\":\"stale_command\"");
     assert_reply("{\"cmd\":\"arm\",\"t_us\":9223372036854775807}", "\"error\":\"stale_command\"");
     assert_reply("{\"cmd\":\"arm\",\"t_us\":-9223372036854775808}", "\"error\":\"stale_command\"");
@@ -112,13 +112,13 @@ static void test_one_person_request_ahead_of_the_clock_is_refused(void) {
     assert_reply(aged("arm", -90), "\"ok\":true");
 }
 
-static void test_one_person_limit_of_the_age_is_configured(void) {
+TEST(test_one_person_limit_of_the_age_is_configured) {
     daemon_rig.daemon->answers.server.max_age_ms = 200;
     assert_reply(aged("arm", 250), "more than 200 ms");
     assert_reply(aged("arm", 150), "\"ok\":true");
 }
 
-static void test_one_person_arm_from_before_a_stop_is_refused(void) {
+TEST(test_one_person_arm_from_before_a_stop_is_refused) {
     const int other = daemon_rig_connect();
     daemon_rig_run(2000);
     (void)daemon_rig_ask(other, "{\"cmd\":\"stop\"}"); // Nothing moves: no stop is recorded, but one was wanted.
@@ -137,7 +137,7 @@ static void reset_of(unsigned stop, const char *part) {
     assert_reply(line_, part);
 }
 
-static void test_one_person_reset_of_another_stop_leaves_the_latch(void) {
+TEST(test_one_person_reset_of_another_stop_leaves_the_latch) {
     latch();
     const unsigned first = stop_number();
     reset_of(first, "\"ok\":true");
@@ -154,7 +154,7 @@ static void test_one_person_reset_of_another_stop_leaves_the_latch(void) {
 }
 
 /// The latch keeps its first cause and its number: an e-stop on top of it makes an older reset late.
-static void test_one_person_reset_from_before_a_second_estop_is_late(void) {
+TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     const int other = daemon_rig_connect();
     latch();
     const iw_time_us_t pressed_us = daemon_rig.now_us;
@@ -170,7 +170,7 @@ static void test_one_person_reset_from_before_a_second_estop_is_late(void) {
 
 // The key ------------------------------------------------------------------------------------------------------------------
 
-static void test_one_person_key_is_new_for_every_grant(void) {
+TEST(test_one_person_key_is_new_for_every_grant) {
     char key[4][KEY_DIGITS + 1U];
     for (unsigned i = 0; i < 4U; i++) {
         arm_with_key(client, key[i]); // The second of each two is the holder's own.
@@ -186,7 +186,7 @@ static void test_one_person_key_is_new_for_every_grant(void) {
     assert_reply(drive_with(key[3], 100), "\"ok\":true");
 }
 
-static void test_one_person_refused_arm_leaves_the_key(void) {
+TEST(test_one_person_refused_arm_leaves_the_key) {
     char key[KEY_DIGITS + 1U];
     arm_with_key(client, key);
     assert_reply(aged("arm", 5000), "\"error\":\"stale_command\"");
@@ -194,7 +194,7 @@ static void test_one_person_refused_arm_leaves_the_key(void) {
     TEST_ASSERT_NULL(strstr(daemon_rig.reply, "key"));
 }
 
-static void test_one_person_drive_with_another_key_feeds_nothing(void) {
+TEST(test_one_person_drive_with_another_key_feeds_nothing) {
     char key[KEY_DIGITS + 1U];
     arm_with_key(client, key);
     char other[KEY_DIGITS + 1U];
@@ -212,7 +212,7 @@ static void test_one_person_drive_with_another_key_feeds_nothing(void) {
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
 }
 
-static void test_one_person_twist_with_another_key_feeds_nothing(void) {
+TEST(test_one_person_twist_with_another_key_feeds_nothing) {
     char key[KEY_DIGITS + 1U];
     arm_with_key(client, key);
     assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":0,\"key\":\"0123456789abcdef0123456789abcdef\"}",
@@ -222,7 +222,7 @@ static void test_one_person_twist_with_another_key_feeds_nothing(void) {
 }
 
 /// Row 7 holds for every command, accepted or not.
-static void test_one_person_drive_with_another_key_is_a_deflected_stick(void) {
+TEST(test_one_person_drive_with_another_key_is_a_deflected_stick) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
     arm_with_key(client, key);
@@ -238,7 +238,7 @@ static void test_one_person_drive_with_another_key_is_a_deflected_stick(void) {
 }
 
 /// One wheel is enough, and in the role of a setpoint a current.
-static void test_one_person_other_key_is_a_stick_by_any_value(void) {
+TEST(test_one_person_other_key_is_a_stick_by_any_value) {
     static const char *const fields[] = {"\"left_mm_s\":300,\"right_mm_s\":0", "\"left_mm_s\":0,\"right_mm_s\":-300",
                                          "\"left_mm_s\":0,\"right_mm_s\":0,\"left_mA\":500,\"right_mA\":0",
                                          "\"left_mm_s\":0,\"right_mm_s\":0,\"left_mA\":0,\"right_mA\":500"};
@@ -256,11 +256,11 @@ static void test_one_person_other_key_is_a_stick_by_any_value(void) {
     (void)close(other);
 }
 
-static void test_one_person_without_lease_is_not_armed_with_any_key(void) {
+TEST(test_one_person_without_lease_is_not_armed_with_any_key) {
     assert_reply(drive_with("wrong", 300), "\"error\":\"not_armed\"");
 }
 
-static void test_one_person_turn_by_wrong_track_is_a_stick(void) {
+TEST(test_one_person_turn_by_wrong_track_is_a_stick) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_TRACK, IW_SOURCE_OPERATOR, 0);
@@ -270,7 +270,7 @@ static void test_one_person_turn_by_wrong_track_is_a_stick(void) {
     (void)close(other);
 }
 
-static void test_one_person_key_is_in_no_other_line(void) {
+TEST(test_one_person_key_is_in_no_other_line) {
     static const char *const asked[] = {"{\"cmd\":\"hello\"}", "{\"cmd\":\"status\"}", "{\"cmd\":\"why\"}",
                                         "{\"cmd\":\"stop\"}"};
     static char text[1U << 17];
@@ -299,7 +299,7 @@ static void test_one_person_key_is_in_no_other_line(void) {
 
 // Two people at the gateway ------------------------------------------------------------------------------------------------
 
-static void test_one_person_plain_arm_takes_no_lease_from_another(void) {
+TEST(test_one_person_plain_arm_takes_no_lease_from_another) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
     assert_reply("{\"cmd\":\"arm\",\"name\":\"Ann\"}", "\"ok\":true");
@@ -320,36 +320,11 @@ static void test_one_person_plain_arm_takes_no_lease_from_another(void) {
     (void)close(other);
 }
 
-static void test_one_person_key_of_another_connection_is_no_right(void) {
+TEST(test_one_person_key_of_another_connection_is_no_right) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
     arm_with_key(client, key);
     const char *reply = daemon_rig_ask(other, drive_with(key, 300));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"not_holder\""), reply);
     (void)close(other);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_one_person_arm_too_old_changes_nothing);
-    RUN_TEST(test_one_person_reset_too_old_leaves_the_latch);
-    RUN_TEST(test_one_person_confirm_too_old_is_refused);
-    RUN_TEST(test_one_person_burst_of_old_requests_changes_nothing);
-    RUN_TEST(test_one_person_request_ahead_of_the_clock_is_refused);
-    RUN_TEST(test_one_person_limit_of_the_age_is_configured);
-    RUN_TEST(test_one_person_arm_from_before_a_stop_is_refused);
-    RUN_TEST(test_one_person_reset_of_another_stop_leaves_the_latch);
-    RUN_TEST(test_one_person_reset_from_before_a_second_estop_is_late);
-    RUN_TEST(test_one_person_key_is_new_for_every_grant);
-    RUN_TEST(test_one_person_refused_arm_leaves_the_key);
-    RUN_TEST(test_one_person_drive_with_another_key_feeds_nothing);
-    RUN_TEST(test_one_person_twist_with_another_key_feeds_nothing);
-    RUN_TEST(test_one_person_drive_with_another_key_is_a_deflected_stick);
-    RUN_TEST(test_one_person_other_key_is_a_stick_by_any_value);
-    RUN_TEST(test_one_person_without_lease_is_not_armed_with_any_key);
-    RUN_TEST(test_one_person_turn_by_wrong_track_is_a_stick);
-    RUN_TEST(test_one_person_key_is_in_no_other_line);
-    RUN_TEST(test_one_person_plain_arm_takes_no_lease_from_another);
-    RUN_TEST(test_one_person_key_of_another_connection_is_no_right);
-    return UNITY_END();
 }

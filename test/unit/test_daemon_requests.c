@@ -2,7 +2,7 @@
 // Requests as the daemon carries them out, from the line to the wheels, in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ static bool says(const char *object, const char *words) {
     return found != NULL && (next == NULL || found < next);
 }
 
-static void test_drive_reaches_the_wheel_it_is_for(void) {
+TEST(test_drive_reaches_the_wheel_it_is_for) {
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 100, 1000);
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
@@ -33,7 +33,7 @@ static void test_drive_reaches_the_wheel_it_is_for(void) {
     TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
 }
 
-static void test_current_reaches_the_wheel_it_is_for(void) {
+TEST(test_current_reaches_the_wheel_it_is_for) {
     daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
@@ -45,7 +45,7 @@ static void test_current_reaches_the_wheel_it_is_for(void) {
     TEST_ASSERT_EQUAL_INT(900, daemon_rig.told_mA[IW_RIGHT]);
 }
 
-static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
+TEST(test_twist_to_the_left_turns_the_right_wheel_faster) {
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":250,\"yaw_mrad_s\":200}", "\"ok\":true");
@@ -57,7 +57,7 @@ static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
                           daemon_rig.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(void) {
+TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it) {
     static const char *const lines[] = {
         "{\"cmd\":\"drive\",\"left_mm_s\":4294967496,\"right_mm_s\":200}",
         "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":-4294967096}",
@@ -78,7 +78,7 @@ static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(vo
     }
 }
 
-static void test_battery_at_the_end_of_its_byte_is_flagged_and_only_then(void) {
+TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then) {
     daemon_rig.world.pair.battery_dV = 255;
     daemon_rig_run(100);
     TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":true"));
@@ -94,7 +94,7 @@ static void test_battery_at_the_end_of_its_byte_is_flagged_and_only_then(void) {
     TEST_ASSERT_TRUE(says(wheel("left"), "\"battery_dV\":null"));
 }
 
-static void test_tare_of_one_wheel_leaves_the_other(void) {
+TEST(test_tare_of_one_wheel_leaves_the_other) {
     daemon_rig_run(3000);
     const iw_time_us_t asked_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"tare\",\"side\":\"left\"}", "\"left\":{");
@@ -103,7 +103,7 @@ static void test_tare_of_one_wheel_leaves_the_other(void) {
     TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance != IW_OFFSET_OPERATOR);
 }
 
-static void test_tare_of_both_that_one_cannot_have_changes_neither(void) {
+TEST(test_tare_of_both_that_one_cannot_have_changes_neither) {
     daemon_rig_run(3000);
     daemon_rig_arm(client);
     daemon_rig_drive(client, 0, 100, 500);
@@ -113,7 +113,7 @@ static void test_tare_of_both_that_one_cannot_have_changes_neither(void) {
     TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance != IW_OFFSET_OPERATOR);
 }
 
-static void test_client_that_goes_while_it_arms_leaves_no_lease(void) {
+TEST(test_client_that_goes_while_it_arms_leaves_no_lease) {
     static const char line[] = "{\"cmd\":\"arm\"}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
     (void)close(client);
@@ -123,7 +123,7 @@ static void test_client_that_goes_while_it_arms_leaves_no_lease(void) {
     daemon_rig_arm(client);
 }
 
-static void test_command_behind_arm_in_one_breath_is_stale(void) {
+TEST(test_command_behind_arm_in_one_breath_is_stale) {
     static const char lines[] =
         "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
@@ -139,7 +139,7 @@ static void say_at_once(int who, const char *lines) {
 }
 
 /// Granted, but stopped by somebody else before the wheels answer.
-static void test_arm_that_a_stop_overtakes_is_refused(void) {
+TEST(test_arm_that_a_stop_overtakes_is_refused) {
     char text[4096];
     const int other = daemon_rig_connect();
     say_at_once(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
@@ -154,7 +154,7 @@ static void test_arm_that_a_stop_overtakes_is_refused(void) {
 }
 
 /// What somebody has sent behind an arm, waits here for its answer.
-static void test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else(void) {
+TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else) {
     static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\"}\n"};
     static const iw_state_t after[] = {IW_STATE_LISTENING, IW_STATE_LATCHED};
     const int other = daemon_rig_connect();
@@ -171,14 +171,14 @@ static void test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else(v
     (void)close(other);
 }
 
-static void test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out(void) {
+TEST(test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out) {
     daemon_rig_run(20);
     say_at_once(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static void test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now(void) {
+TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now) {
     static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
@@ -192,7 +192,7 @@ static void test_command_that_waited_in_the_socket_while_we_stood_still_does_not
     TEST_ASSERT_TRUE(daemon_rig.now_us - sent_us <= MS(202));
 }
 
-static void test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest(void) {
+TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 200, 200, 500);
@@ -205,14 +205,14 @@ static void test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest(void)
     (void)close(other);
 }
 
-static void test_arm_while_shutting_down_is_refused(void) {
+TEST(test_arm_while_shutting_down_is_refused) {
     daemon_rig.daemon->wheels.shutting_down = true;
     daemon_rig.daemon->wheels.core.permit.phase = IW_PHASE_HOLDING; // So that the loop goes on.
     daemon_rig.daemon->wheels.core.permit.hold_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"arm\"}", "shutting down");
 }
 
-static void test_arm_with_what_motion_depends_on_contradicted_is_denied(void) {
+TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied) {
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
                              IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"denied\"");
@@ -230,7 +230,7 @@ static unsigned events_waiting(const char *name) {
     return count;
 }
 
-static void test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall(void) {
+TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}", "\"ok\":true");
     (void)events_waiting("force");
     daemon_rig_run(1000);
@@ -240,7 +240,7 @@ static void test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall(vo
     TEST_ASSERT_UINT_WITHIN(2, 5, events_waiting("\"event\":\"force\""));
 }
 
-static void test_telemetry_leaves_in_the_cycle_in_which_it_is_due(void) {
+TEST(test_telemetry_leaves_in_the_cycle_in_which_it_is_due) {
     char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":5}", "\"ok\":true");
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // Else each frame wakes it.
@@ -256,7 +256,7 @@ static void test_telemetry_leaves_in_the_cycle_in_which_it_is_due(void) {
     }
 }
 
-static void test_burst_of_requests_is_answered_without_waiting_for_periods(void) {
+TEST(test_burst_of_requests_is_answered_without_waiting_for_periods) {
     static const char line[] = "{\"cmd\":\"why\"}\n";
     static char text[65536];
     unsigned answers = 0;
@@ -273,7 +273,7 @@ static void test_burst_of_requests_is_answered_without_waiting_for_periods(void)
     TEST_ASSERT_EQUAL_UINT(3U * SOCK_LINES_PER_CYCLE, answers);
 }
 
-static void test_stop_and_estop_need_no_lease(void) {
+TEST(test_stop_and_estop_need_no_lease) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 200, 200, 300);
@@ -284,7 +284,7 @@ static void test_stop_and_estop_need_no_lease(void) {
     (void)close(other);
 }
 
-static void test_lease_runs_from_the_command_and_not_from_the_look_before_it(void) {
+TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it) {
     const iw_time_us_t lease_us = MS(daemon_rig.daemon->config.core.lease_ms);
     daemon_rig_arm(client);
     for (unsigned ms = 1; ms < 20U; ms += 6U) { // At any place between two setpoints.
@@ -297,13 +297,13 @@ static void test_lease_runs_from_the_command_and_not_from_the_look_before_it(voi
     }
 }
 
-static void test_answer_to_arm_comes_without_waiting_for_the_next_period(void) {
+TEST(test_answer_to_arm_comes_without_waiting_for_the_next_period) {
     const iw_time_us_t asked_us = daemon_rig.now_us;
     daemon_rig_arm(client);
     TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(3), daemon_rig.now_us - asked_us);
 }
 
-static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
+TEST(test_reader_that_has_ended_leaves_nobody_waiting) {
     const int others[] = {daemon_rig_connect(), daemon_rig_connect(), daemon_rig_connect()};
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     int pair[2];
@@ -322,7 +322,7 @@ static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
     }
 }
 
-static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept(void) {
+TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept) {
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     daemon_rig.daemon->config.core.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
@@ -336,7 +336,7 @@ static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_i
     assert_reply("{\"cmd\":\"status\"}", "\"found\":\"7\"");
 }
 
-static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
+TEST(test_zero_that_changes_is_told_to_who_watches_the_force) {
     daemon_rig_run(3000);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":1}", "\"ok\":true");
     (void)events_waiting("force");
@@ -353,14 +353,14 @@ static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"provenance\":\"operator\",\"before_mN\":"), told);
 }
 
-static void test_stop_names_the_client_that_asked_for_it(void) {
+TEST(test_stop_names_the_client_that_asked_for_it) {
     assert_reply("{\"cmd\":\"arm\",\"name\":\"joystick\"}", "\"ok\":true");
     daemon_rig_drive(client, 100, 100, 200);
     assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     assert_reply("{\"cmd\":\"why\"}", "joystick");
 }
 
-static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
+TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     static char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
@@ -396,7 +396,7 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     return count;
 }
 
-static void test_end_of_zeros_is_told_before_it_comes(void) {
+TEST(test_end_of_zeros_is_told_before_it_comes) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
@@ -406,7 +406,7 @@ static void test_end_of_zeros_is_told_before_it_comes(void) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
 }
 
-static void test_rolling_is_told_when_it_begins_and_when_it_ends(void) {
+TEST(test_rolling_is_told_when_it_begins_and_when_it_ends) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"present\":true}"));
     TEST_ASSERT_EQUAL_UINT(0, count_told(true, false, "rolling"));
@@ -415,7 +415,7 @@ static void test_rolling_is_told_when_it_begins_and_when_it_ends(void) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"present\":false}"));
 }
 
-static void test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute(void) {
+TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute) {
     static const char *const fault = "\"cause\":\"rolling\"";
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, fault));
@@ -440,7 +440,7 @@ static unsigned take_orders(int writer, gw_box_order_t *out_last) {
     return orders;
 }
 
-static void test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told(void) {
+TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told) {
     static gw_box_order_t order;
     gw_box_t *box = &daemon_rig.daemon->box;
     int ends[2];
@@ -466,40 +466,4 @@ static void test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told(void) 
     box->config.blackbox_s = 0;
     box->writer.fd = -1;
     (void)close(ends[0]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told);
-    RUN_TEST(test_end_of_zeros_is_told_before_it_comes);
-    RUN_TEST(test_rolling_is_told_when_it_begins_and_when_it_ends);
-    RUN_TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute);
-    RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
-    RUN_TEST(test_current_reaches_the_wheel_it_is_for);
-    RUN_TEST(test_twist_to_the_left_turns_the_right_wheel_faster);
-    RUN_TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it);
-    RUN_TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then);
-    RUN_TEST(test_tare_of_one_wheel_leaves_the_other);
-    RUN_TEST(test_tare_of_both_that_one_cannot_have_changes_neither);
-    RUN_TEST(test_client_that_goes_while_it_arms_leaves_no_lease);
-    RUN_TEST(test_command_behind_arm_in_one_breath_is_stale);
-    RUN_TEST(test_arm_that_a_stop_overtakes_is_refused);
-    RUN_TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else);
-    RUN_TEST(test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out);
-    RUN_TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now);
-    RUN_TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest);
-    RUN_TEST(test_arm_while_shutting_down_is_refused);
-    RUN_TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied);
-    RUN_TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall);
-    RUN_TEST(test_telemetry_leaves_in_the_cycle_in_which_it_is_due);
-    RUN_TEST(test_burst_of_requests_is_answered_without_waiting_for_periods);
-    RUN_TEST(test_stop_and_estop_need_no_lease);
-    RUN_TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it);
-    RUN_TEST(test_answer_to_arm_comes_without_waiting_for_the_next_period);
-    RUN_TEST(test_reader_that_has_ended_leaves_nobody_waiting);
-    RUN_TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept);
-    RUN_TEST(test_zero_that_changes_is_told_to_who_watches_the_force);
-    RUN_TEST(test_stop_names_the_client_that_asked_for_it);
-    RUN_TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // A stop is never refused and never queues: with every place of both sockets taken, in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 #include <sys/resource.h>
@@ -93,7 +93,7 @@ static void come_to_rest(void) {
     daemon_rig_run(3500);
 }
 
-static void test_stop_never_refused_with_all_places_idle(void) {
+TEST(test_stop_never_refused_with_all_places_idle) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
@@ -114,7 +114,7 @@ static void test_stop_never_refused_with_all_places_idle(void) {
 }
 
 /// Eight connections wait for their first line; the next one at the same moment is refused without a wait.
-static void test_stop_places_are_eight_on_each_socket(void) {
+TEST(test_stop_places_are_eight_on_each_socket) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (unsigned i = 0; i < SOCK_STOP_PLACES; i++) {
@@ -130,7 +130,7 @@ static void test_stop_places_are_eight_on_each_socket(void) {
 }
 
 /// Each of the crowd asks for more than it reads, without end.
-static void test_stop_never_refused_with_all_places_polling(void) {
+TEST(test_stop_never_refused_with_all_places_polling) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         begin_driving();
@@ -147,7 +147,7 @@ static void test_stop_never_refused_with_all_places_polling(void) {
 }
 
 /// Its line comes a while after it, into a place that waits for it.
-static void test_stop_never_refused_if_its_line_comes_later(void) {
+TEST(test_stop_never_refused_if_its_line_comes_later) {
     take_all_places();
     begin_driving();
     const int fd = knock(SOCK_DRIVE);
@@ -161,7 +161,7 @@ static void test_stop_never_refused_if_its_line_comes_later(void) {
     (void)close(fd);
 }
 
-static void test_stop_never_refused_without_descriptors(void) {
+TEST(test_stop_never_refused_without_descriptors) {
     struct rlimit before;
     take_all_places();
     begin_driving();
@@ -192,7 +192,7 @@ static void flood(sock_right_t door, unsigned for_ms) {
     }
 }
 
-static void test_stop_never_refused_beside_1000_connections_a_second(void) {
+TEST(test_stop_never_refused_beside_1000_connections_a_second) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // The line, after its connection.
@@ -213,7 +213,7 @@ static void test_stop_never_refused_beside_1000_connections_a_second(void) {
 
 // What the places are not for ------------------------------------------------------------------------------------------------
 
-static void test_stop_place_for_anything_else_is_refused(void) {
+TEST(test_stop_place_for_anything_else_is_refused) {
     static const char *const others[] = {"{\"cmd\":\"status\"}\n",
                                          "{\"cmd\":\"hello\"}\n",
                                          "{\"cmd\":\"arm\"}\n",
@@ -239,7 +239,7 @@ static void test_stop_place_for_anything_else_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-static void test_stop_behind_another_line_is_carried_out(void) {
+TEST(test_stop_behind_another_line_is_carried_out) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         begin_driving();
@@ -272,7 +272,7 @@ static void ask_too_much_and_stop(int fd, const sock_client_t *greedy) {
     say(fd, text);
 }
 
-static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
+TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out) {
     take_all_places();
     begin_driving();
     ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
@@ -281,7 +281,7 @@ static void test_stop_of_a_connection_that_is_given_up_is_carried_out(void) {
 }
 
 /// An answer finds no room in the step, before its stop is read.
-static void test_stop_not_yet_read_of_a_broken_connection_is_carried_out(void) {
+TEST(test_stop_not_yet_read_of_a_broken_connection_is_carried_out) {
     take_all_places();
     begin_driving();
     say(crowd[0], "{\"cmd\":\"stop\"}\n");
@@ -291,14 +291,14 @@ static void test_stop_not_yet_read_of_a_broken_connection_is_carried_out(void) {
 }
 
 /// It has stopped before it is gone.
-static void test_stop_of_a_holder_that_is_given_up_is_its_own(void) {
+TEST(test_stop_of_a_holder_that_is_given_up_is_its_own) {
     begin_driving();
     ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
     assert_slower("given up");
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
 }
 
-static void test_stop_place_answers_one_line_and_all_stops(void) {
+TEST(test_stop_place_answers_one_line_and_all_stops) {
     take_all_places();
     const int fd = knock(SOCK_DRIVE);
     say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"reset\",\"stop\":1}\n");
@@ -311,7 +311,7 @@ static void test_stop_place_answers_one_line_and_all_stops(void) {
     (void)close(fd);
 }
 
-static void test_stop_place_of_the_silent_is_free_after_200_ms(void) {
+TEST(test_stop_place_of_the_silent_is_free_after_200_ms) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     take_all_places();
     const unsigned before = crowded;
@@ -351,7 +351,7 @@ static unsigned held_by(uid_t uid) {
     return held;
 }
 
-static void test_stop_places_of_one_user_are_half_of_them(void) {
+TEST(test_stop_places_of_one_user_are_half_of_them) {
     take_all_places();
     for (unsigned i = 0; i < 12U; i++) {
         const int fd = knock_as(FOREIGN, SOCK_DRIVE);
@@ -375,7 +375,7 @@ static void test_stop_places_of_one_user_are_half_of_them(void) {
     (void)close(fd);
 }
 
-static void test_stop_in_a_place_names_who_asked_for_it(void) {
+TEST(test_stop_in_a_place_names_who_asked_for_it) {
     char who[64];
     take_all_places();
     begin_driving();
@@ -386,24 +386,4 @@ static void test_stop_in_a_place_names_who_asked_for_it(void) {
     come_to_rest();
     (void)snprintf(who, sizeof who, "(pid %d)", (int)getpid());
     assert_reply("{\"cmd\":\"why\"}", who);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_stop_never_refused_with_all_places_idle);
-    RUN_TEST(test_stop_places_are_eight_on_each_socket);
-    RUN_TEST(test_stop_never_refused_with_all_places_polling);
-    RUN_TEST(test_stop_never_refused_if_its_line_comes_later);
-    RUN_TEST(test_stop_never_refused_without_descriptors);
-    RUN_TEST(test_stop_never_refused_beside_1000_connections_a_second);
-    RUN_TEST(test_stop_place_for_anything_else_is_refused);
-    RUN_TEST(test_stop_behind_another_line_is_carried_out);
-    RUN_TEST(test_stop_place_answers_one_line_and_all_stops);
-    RUN_TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out);
-    RUN_TEST(test_stop_not_yet_read_of_a_broken_connection_is_carried_out);
-    RUN_TEST(test_stop_of_a_holder_that_is_given_up_is_its_own);
-    RUN_TEST(test_stop_place_of_the_silent_is_free_after_200_ms);
-    RUN_TEST(test_stop_places_of_one_user_are_half_of_them);
-    RUN_TEST(test_stop_in_a_place_names_who_asked_for_it);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What the daemon tells of itself, and when: to watchers, in the log and in refusals, in virtual time.
 #include "daemon_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include "iwheel_server/target.h"
 #include "start/start_report.h"
@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-static void test_bus_that_cannot_be_opened_is_named_with_the_cure(void) {
+TEST(test_bus_that_cannot_be_opened_is_named_with_the_cure) {
     const gateway_config_t *config = &daemon_rig.daemon->config;
     char *text = NULL;
     size_t length = 0;
@@ -27,7 +27,7 @@ static void test_bus_that_cannot_be_opened_is_named_with_the_cure(void) {
 }
 
 /// Until then its first telemetry may still come.
-static void test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on(void) {
+TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on) {
     const uint32_t lost = 1U << IW_CAUSE_WHEEL_LOST;
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
     daemon_rig_crash();
@@ -38,7 +38,7 @@ static void test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on
     TEST_ASSERT_EQUAL_UINT32(lost, daemon_rig.daemon->answers.server.told.present & lost);
 }
 
-static void test_status_has_no_more_warnings_than_places_for_them(void) {
+TEST(test_status_has_no_more_warnings_than_places_for_them) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     iw_snapshot_t seen = gw_wheels_look(wheels);
     seen.holding = seen.rolling = true;
@@ -48,7 +48,7 @@ static void test_status_has_no_more_warnings_than_places_for_them(void) {
     }
 }
 
-static void test_hello_has_the_time_of_its_cycle(void) {
+TEST(test_hello_has_the_time_of_its_cycle) {
     char text[1024];
     daemon_rig_run(7);
     const iw_time_us_t before_us = daemon_rig.now_us;
@@ -63,19 +63,19 @@ static void test_hello_has_the_time_of_its_cycle(void) {
     (void)close(other);
 }
 
-static void test_arm_without_a_setpoint_type_says_where_it_is_set(void) {
+TEST(test_arm_without_a_setpoint_type_says_where_it_is_set) {
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"arm\"}", "under [wheels] in the configuration");
 }
 
-static void test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it(void) {
+TEST(test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it) {
     daemon_rig.daemon->wheels.core.config.track_mm = 0;
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"track_not_set\"");
     assert_reply("{\"cmd\":\"arm\"}", "\"track_mm not configured, and every bound of turning rests on it; set it under "
                                       "[wheels] in the configuration (iwheelctl bringup measures it)\"");
 }
 
-static void test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not(void) {
+TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not) {
     daemon_rig_keep_log();
     daemon_rig.estop = 1;
     daemon_rig_run(20);
@@ -109,7 +109,7 @@ static void assert_told(const char *said, const char *name, const char *part) {
     TEST_ASSERT_EQUAL_CHAR('}', line[strlen(line) - 1U]);
 }
 
-static void test_events_are_whole_and_come_at_once_to_who_is_due_later(void) {
+TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"bus\",\"lease\",\"stop\",\"state\"],\"rate_hz\":1}\n");
     daemon_rig_run(1000);
     do {
@@ -127,7 +127,7 @@ static void test_events_are_whole_and_come_at_once_to_who_is_due_later(void) {
     assert_told(said_after(""), "bus", "\"state\":\"bus_off\"");
 }
 
-static void test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence(void) {
+TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence) {
     char sentence[1024];
     daemon_rig_keep_log();
     assert_reply("{\"cmd\":\"arm\",\"name\":\"pendant\"}", "\"ok\":true");
@@ -140,7 +140,7 @@ static void test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence(vo
 }
 
 /// Before the next step: whoever asked may be gone then.
-static void test_stop_is_told_with_the_request_that_asks_for_it(void) {
+TEST(test_stop_is_told_with_the_request_that_asks_for_it) {
     static const char line[] = "{\"cmd\":\"stop\"}";
     gw_daemon_t *daemon = daemon_rig.daemon;
     const sock_handler_t *handler = &daemon->clients.handler;
@@ -151,7 +151,7 @@ static void test_stop_is_told_with_the_request_that_asks_for_it(void) {
     TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
 }
 
-static void test_arm_that_an_estop_ends_is_refused_with_its_id_and_why(void) {
+TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why) {
     static const char estop[] = "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n";
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
@@ -166,7 +166,7 @@ static void test_arm_that_an_estop_ends_is_refused_with_its_id_and_why(void) {
     (void)close(other);
 }
 
-static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
+TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window) {
     static const char *const sides[IW_SIDES] = {"left", "right"};
     char told[64];
     daemon_rig_run(3000);
@@ -182,7 +182,7 @@ static void test_tare_tells_and_keeps_of_each_wheel_its_own_window(void) {
     }
 }
 
-static void test_request_behind_an_arm_is_answered_after_it(void) {
+TEST(test_request_behind_an_arm_is_answered_after_it) {
     (void)said_after("");
     const char *said = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
     const char *first = strstr(said, "\"id\":1,\"ok\":true");
@@ -190,14 +190,14 @@ static void test_request_behind_an_arm_is_answered_after_it(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), said);
 }
 
-static void test_refusal_of_recordings_and_of_a_contradicted_arm_says_why(void) {
+TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why) {
     assert_reply("{\"cmd\":\"recordings\"}", "nothing is recorded: [record] blackbox_s is 0");
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
                              IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
 }
 
-static void test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both(void) {
+TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both) {
     static const char *const sentences[IW_SIDES] = {"the left wheel's battery", "the right wheel's battery"};
     gw_health_t *health = &daemon_rig.daemon->wheels.health;
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}\n");
@@ -220,37 +220,15 @@ static void test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for
     }
 }
 
-static void test_frame_is_told_whole(void) {
+TEST(test_frame_is_told_whole) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     daemon_rig_run(200);
     const char *said = said_after("");
     assert_told(said, "frame", "\"data\":");
 }
 
-static void test_assumption_of_the_button_is_of_its_time_in_force(void) {
+TEST(test_assumption_of_the_button_is_of_its_time_in_force) {
     const gw_daemon_t *daemon = daemon_rig.daemon;
     TEST_ASSERT_NOT_EQUAL_UINT(0, daemon->config.estop.debounce_ms);
     TEST_ASSERT_EQUAL_UINT64(MS(daemon->config.estop.debounce_ms), daemon->assumptions.button.debounce_us);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bus_that_cannot_be_opened_is_named_with_the_cure);
-    RUN_TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on);
-    RUN_TEST(test_status_has_no_more_warnings_than_places_for_them);
-    RUN_TEST(test_hello_has_the_time_of_its_cycle);
-    RUN_TEST(test_arm_without_a_setpoint_type_says_where_it_is_set);
-    RUN_TEST(test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it);
-    RUN_TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not);
-    RUN_TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later);
-    RUN_TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence);
-    RUN_TEST(test_stop_is_told_with_the_request_that_asks_for_it);
-    RUN_TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why);
-    RUN_TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window);
-    RUN_TEST(test_request_behind_an_arm_is_answered_after_it);
-    RUN_TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why);
-    RUN_TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both);
-    RUN_TEST(test_frame_is_told_whole);
-    RUN_TEST(test_assumption_of_the_button_is_of_its_time_in_force);
-    return UNITY_END();
 }

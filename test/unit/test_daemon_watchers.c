@@ -4,7 +4,7 @@
 #include "daemon_rig.h"
 #include "sockets/sock_clients.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <string.h>
@@ -88,7 +88,7 @@ static void connect_crowd(unsigned count) {
 
 // Rights -------------------------------------------------------------------------------------------------------------------
 
-static void test_right_of_each_request_on_each_socket_is_as_listed(void) {
+TEST(test_right_of_each_request_on_each_socket_is_as_listed) {
     for (unsigned cmd = 0; cmd < IWN_CMDS; cmd++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(rights[cmd].line, "a command is missing in the table of this test");
         TEST_ASSERT_EQUAL_INT_MESSAGE(!rights[cmd].watch, is_denied(daemon_rig_ask(watcher, rights[cmd].line)),
@@ -97,7 +97,7 @@ static void test_right_of_each_request_on_each_socket_is_as_listed(void) {
     }
 }
 
-static void test_denial_names_the_socket_and_the_group_that_cure_it(void) {
+TEST(test_denial_names_the_socket_and_the_group_that_cure_it) {
     const char *reply = daemon_rig_ask(watcher, "{\"id\":7,\"cmd\":\"arm\"}");
     assert_has(reply, "\"id\":7");
     assert_has(reply, daemon_rig.daemon->config.northbound.socket);
@@ -108,12 +108,12 @@ static void test_denial_names_the_socket_and_the_group_that_cure_it(void) {
     TEST_ASSERT_NULL(strstr(reply, "none"));
 }
 
-static void test_hello_tells_the_right(void) {
+TEST(test_hello_tells_the_right) {
     assert_has(daemon_rig_ask(driver, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
 }
 
-static void test_watcher_who_asks_to_drive_changes_nothing(void) {
+TEST(test_watcher_who_asks_to_drive_changes_nothing) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"denied\"");
@@ -127,7 +127,7 @@ static void test_watcher_who_asks_to_drive_changes_nothing(void) {
     daemon_rig_arm(driver); // What a watcher said is no command that somebody might arm into.
 }
 
-static void test_stop_of_a_watcher_stops_whoever_drives(void) {
+TEST(test_stop_of_a_watcher_stops_whoever_drives) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"stop\"}"), "\"ok\":true");
@@ -140,7 +140,7 @@ static void test_stop_of_a_watcher_stops_whoever_drives(void) {
     assert_has(reply, who);
 }
 
-static void test_reset_that_an_estop_keeps_away_names_user_and_process(void) {
+TEST(test_reset_that_an_estop_keeps_away_names_user_and_process) {
     char who[64];
     (void)snprintf(who, sizeof who, "user %u (process %d)", (unsigned)getuid(), (int)getpid());
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
@@ -156,7 +156,7 @@ static void test_reset_that_an_estop_keeps_away_names_user_and_process(void) {
 
 // Quotas -------------------------------------------------------------------------------------------------------------------
 
-static void test_watchers_take_no_slot_of_a_driver(void) {
+TEST(test_watchers_take_no_slot_of_a_driver) {
     daemon_rig.daemon->clients.most[SOCK_DRIVE] = 2;
     connect_crowd(CROWD - 1U);
     TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->clients.count[SOCK_WATCH]);
@@ -171,7 +171,7 @@ static void test_watchers_take_no_slot_of_a_driver(void) {
     (void)close(third);
 }
 
-static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again(void) {
+TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again) {
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(2);
     char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
@@ -188,7 +188,7 @@ static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_ag
     TEST_ASSERT_EQUAL_UINT(3, sock_clients_count(&daemon_rig.daemon->clients));
 }
 
-static void test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing(void) {
+TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing) {
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
         say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"force\",\"frame\"],\"rate_hz\":100}\n");
@@ -241,7 +241,7 @@ static unsigned moments_with_frames(int client, unsigned *out_frames) {
     return moments;
 }
 
-static void test_frames_come_one_by_one_to_few_and_together_to_many(void) {
+TEST(test_frames_come_one_by_one_to_few_and_together_to_many) {
     unsigned to_few;
     unsigned to_many;
     connect_crowd(GW_FRAMES_ONE_BY_ONE + 1U);
@@ -256,7 +256,7 @@ static void test_frames_come_one_by_one_to_few_and_together_to_many(void) {
     TEST_ASSERT_UINT_WITHIN_MESSAGE(4, to_few, to_many, "each of them, once");
 }
 
-static void test_states_for_many_are_written_once(void) {
+TEST(test_states_for_many_are_written_once) {
     char first[SOCK_REPLY_MAX];
     char second[SOCK_REPLY_MAX];
     connect_crowd(2);
@@ -274,7 +274,7 @@ static void test_states_for_many_are_written_once(void) {
     TEST_ASSERT_EQUAL_MEMORY(first, second, (size_t)length);
 }
 
-static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace(void) {
+TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace) {
     for (unsigned i = 0; i < 100U; i++) {
         say(watcher, "{\"cmd\":\"hello\"}\n");
     }
@@ -293,7 +293,7 @@ static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
 }
 
-static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void) {
+TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     connect_crowd(CROWD - 1U);
@@ -318,7 +318,7 @@ static iw_time_us_t estop_seen_us(void) {
     return gw_wheels_look(&daemon_rig.daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
 }
 
-static void test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step(void) {
+TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step) {
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
     const iw_time_us_t first_us = estop_seen_us();
     daemon_rig_run(50);
@@ -329,7 +329,7 @@ static void test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs
     TEST_ASSERT_GREATER_THAN_UINT64(first_us, estop_seen_us());
 }
 
-static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
+TEST(test_estop_of_a_watcher_that_goes_at_once_counts) {
     say(watcher, "{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"estop\"}\n");
     (void)close(watcher);
     watcher = -1;
@@ -340,7 +340,7 @@ static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 
-static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
+TEST(test_flood_of_newcomers_that_watch_is_let_in_at_its_pace) {
     daemon_rig_keep_log();
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
@@ -361,7 +361,7 @@ static void test_flood_of_newcomers_that_watch_is_let_in_at_its_pace(void) {
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
 }
 
-static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in(void) {
+TEST(test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in) {
     daemon_rig_keep_log();
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(3);
@@ -375,7 +375,7 @@ static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_h
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
 }
 
-static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one(void) {
+TEST(test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one) {
     sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_DRIVE];
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
@@ -407,7 +407,7 @@ static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_i
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
-static void test_requests_in_one_breath_are_answered_in_their_order(void) {
+TEST(test_requests_in_one_breath_are_answered_in_their_order) {
     char text[4096];
     say(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
     daemon_rig_run(1);
@@ -419,7 +419,7 @@ static void test_requests_in_one_breath_are_answered_in_their_order(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":72"), text);
 }
 
-static void test_round_of_sending_ends_when_its_time_is_up(void) {
+TEST(test_round_of_sending_ends_when_its_time_is_up) {
     static char text[65536];
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
@@ -447,29 +447,4 @@ static void test_round_of_sending_ends_when_its_time_is_up(void) {
     sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;
     TEST_ASSERT_FALSE(clients->lines_wait);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_right_of_each_request_on_each_socket_is_as_listed);
-    RUN_TEST(test_denial_names_the_socket_and_the_group_that_cure_it);
-    RUN_TEST(test_hello_tells_the_right);
-    RUN_TEST(test_watcher_who_asks_to_drive_changes_nothing);
-    RUN_TEST(test_stop_of_a_watcher_stops_whoever_drives);
-    RUN_TEST(test_reset_that_an_estop_keeps_away_names_user_and_process);
-    RUN_TEST(test_watchers_take_no_slot_of_a_driver);
-    RUN_TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again);
-    RUN_TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing);
-    RUN_TEST(test_frames_come_one_by_one_to_few_and_together_to_many);
-    RUN_TEST(test_states_for_many_are_written_once);
-    RUN_TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace);
-    RUN_TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone);
-    RUN_TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step);
-    RUN_TEST(test_estop_of_a_watcher_that_goes_at_once_counts);
-    RUN_TEST(test_flood_of_newcomers_that_watch_is_let_in_at_its_pace);
-    RUN_TEST(test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in);
-    RUN_TEST(test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one);
-    RUN_TEST(test_requests_in_one_breath_are_answered_in_their_order);
-    RUN_TEST(test_round_of_sending_ends_when_its_time_is_up);
-    return UNITY_END();
 }

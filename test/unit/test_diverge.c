@@ -2,7 +2,7 @@
 // Do both wheels together go where they are commanded? What counts, what is ordinary, when it is too much, and which wheel it is.
 #include "fixture.h"
 #include "iwheel/diverge.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -27,8 +27,6 @@ void setUp(void) {
     fixture_config(&config);
     begin();
 }
-
-void tearDown(void) {}
 
 typedef struct {
     int32_t left_mm_s;
@@ -61,7 +59,7 @@ static void settle(speeds_t speeds) {
     TEST_ASSERT_EQUAL_INT32(speeds.right_mm_s * 1000, pair.expected_um_s[IW_RIGHT]);
 }
 
-static void test_diverge_pair_that_follows_does_not(void) {
+TEST(test_diverge_pair_that_follows_does_not) {
     settle((speeds_t){800, -300});
     (void)go_on((speeds_t){800, -300}, (speeds_t){800, -300}, 10000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -69,7 +67,7 @@ static void test_diverge_pair_that_follows_does_not(void) {
     TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
 }
 
-static void test_diverge_expected_follows_what_is_applied_with_the_lag(void) {
+TEST(test_diverge_expected_follows_what_is_applied_with_the_lag) {
     pair.applied_mm_s[IW_LEFT] = 1000;
     pair.applied_mm_s[IW_RIGHT] = -1000;
     for (uint32_t i = 0; i < 30U; i++) {
@@ -80,7 +78,7 @@ static void test_diverge_expected_follows_what_is_applied_with_the_lag(void) {
     TEST_ASSERT_INT32_WITHIN(4000, -632100, pair.expected_um_s[IW_RIGHT]);
 }
 
-static void test_diverge_expected_is_the_same_by_long_steps_and_short_ones(void) {
+TEST(test_diverge_expected_is_the_same_by_long_steps_and_short_ones) {
     pair.applied_mm_s[IW_LEFT] = 1000;
     (void)iw_diverge_step(&pair, now_us + MS(20));
     (void)iw_diverge_step(&pair, now_us + MS(40));
@@ -88,7 +86,7 @@ static void test_diverge_expected_is_the_same_by_long_steps_and_short_ones(void)
     TEST_ASSERT_INT32_WITHIN(8000, 632100, pair.expected_um_s[IW_LEFT]);
 }
 
-static void test_diverge_lag_is_the_configured_one(void) {
+TEST(test_diverge_lag_is_the_configured_one) {
     config.wheel_lag_ms = 120;
     pair.applied_mm_s[IW_LEFT] = 1000;
     for (uint32_t i = 0; i < 60U; i++) {
@@ -99,7 +97,7 @@ static void test_diverge_lag_is_the_configured_one(void) {
 }
 
 /// A wheel that is gone counts double: 60 mm at 2000 mm/s are 30 ms, a little more for what leaks.
-static void test_diverge_blocked_wheel_is_slow_within_its_millimetres(void) {
+TEST(test_diverge_blocked_wheel_is_slow_within_its_millimetres) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         begin();
         settle((speeds_t){1000, 1000});
@@ -111,27 +109,27 @@ static void test_diverge_blocked_wheel_is_slow_within_its_millimetres(void) {
     }
 }
 
-static void test_diverge_blocked_wheel_backwards_is_slow_too(void) {
+TEST(test_diverge_blocked_wheel_backwards_is_slow_too) {
     settle((speeds_t){-1000, -1000});
     TEST_ASSERT_UINT32_WITHIN(3, 32, go_on((speeds_t){-1000, -1000}, (speeds_t){0, -1000}, 1000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
 }
 
-static void test_diverge_wheel_that_turns_backwards_is_slow(void) {
+TEST(test_diverge_wheel_that_turns_backwards_is_slow) {
     settle((speeds_t){400, 400});
     (void)go_on((speeds_t){400, 400}, (speeds_t){400, -400}, 1000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-static void test_diverge_no_speed_is_too_low_to_be_compared(void) {
+TEST(test_diverge_no_speed_is_too_low_to_be_compared) {
     settle((speeds_t){99, 99});
     TEST_ASSERT_UINT32_WITHIN(10, 362, go_on((speeds_t){99, 99}, (speeds_t){0, 99}, 3000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
-static void test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow(void) {
+TEST(test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){800, 1000}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
@@ -142,7 +140,7 @@ static void test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow(vo
 }
 
 /// Below a quarter of what is expected the whole difference counts, and double.
-static void test_diverge_wheel_below_a_quarter_counts_double(void) {
+TEST(test_diverge_wheel_below_a_quarter_counts_double) {
     settle((speeds_t){400, 400});
     const uint32_t quarter_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 100}, 1000U);
     begin();
@@ -153,7 +151,7 @@ static void test_diverge_wheel_below_a_quarter_counts_double(void) {
 }
 
 /// Below 50 mm/s one rpm is too coarse to tell that a wheel is gone.
-static void test_diverge_slow_command_counts_once(void) {
+TEST(test_diverge_slow_command_counts_once) {
     settle((speeds_t){49, 49});
     (void)go_on((speeds_t){49, 49}, (speeds_t){49, 0}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -163,14 +161,14 @@ static void test_diverge_slow_command_counts_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
-static void test_diverge_wheel_that_runs_on_ramps(void) {
+TEST(test_diverge_wheel_that_runs_on_ramps) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){500, 500}, (speeds_t){500, 1000}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-static void test_diverge_wheel_that_turns_uncommanded_ramps_either_way(void) {
+TEST(test_diverge_wheel_that_turns_uncommanded_ramps_either_way) {
     (void)go_on((speeds_t){0, 0}, (speeds_t){0, -300}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
@@ -180,7 +178,7 @@ static void test_diverge_wheel_that_turns_uncommanded_ramps_either_way(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
 }
 
-static void test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary(void) {
+TEST(test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){943, 1000}, 10000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -190,7 +188,7 @@ static void test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary(void
     TEST_ASSERT_INT32_WITHIN(500, 7004, pair.path_um);
 }
 
-static void test_diverge_both_wheels_slow_alike_do_not(void) {
+TEST(test_diverge_both_wheels_slow_alike_do_not) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 0}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -198,7 +196,7 @@ static void test_diverge_both_wheels_slow_alike_do_not(void) {
 }
 
 /// What leaks as fast as it comes stays below the limit: 60 mm in 1000 ms.
-static void test_diverge_steady_difference_below_its_limit_is_never_too_much(void) {
+TEST(test_diverge_steady_difference_below_its_limit_is_never_too_much) {
     settle((speeds_t){500, 500});
     (void)go_on((speeds_t){500, 500}, (speeds_t){500, 595}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -207,7 +205,7 @@ static void test_diverge_steady_difference_below_its_limit_is_never_too_much(voi
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
 }
 
-static void test_diverge_leak_and_limit_are_the_configured_ones(void) {
+TEST(test_diverge_leak_and_limit_are_the_configured_ones) {
     config.pair_mm = 100;
     config.pair_leak_ms = 3000;
     settle((speeds_t){500, 500});
@@ -217,7 +215,7 @@ static void test_diverge_leak_and_limit_are_the_configured_ones(void) {
     TEST_ASSERT_INT32_WITHIN(200, 100000, pair.path_um);
 }
 
-static void test_diverge_restart_forgets_the_deviation_but_not_the_largest(void) {
+TEST(test_diverge_restart_forgets_the_deviation_but_not_the_largest) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
     TEST_ASSERT_GREATER_THAN_INT32(30000, pair.path_um);
@@ -229,7 +227,7 @@ static void test_diverge_restart_forgets_the_deviation_but_not_the_largest(void)
     TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_RIGHT]);
 }
 
-static void test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on(void) {
+TEST(test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on) {
     iw_diverge_begin(&pair, 5000U);
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
@@ -242,7 +240,7 @@ static void test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on(void)
     TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
 }
 
-static void test_diverge_steps_within_a_millisecond_count_together(void) {
+TEST(test_diverge_steps_within_a_millisecond_count_together) {
     settle((speeds_t){1000, 1000});
     iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US - 1U);
@@ -251,7 +249,7 @@ static void test_diverge_steps_within_a_millisecond_count_together(void) {
     TEST_ASSERT_INT32_WITHIN(20, 2014, pair.path_um);
 }
 
-static void test_diverge_long_pause_counts_as_50_ms(void) {
+TEST(test_diverge_long_pause_counts_as_50_ms) {
     settle((speeds_t){1000, 1000});
     iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + MS(5000));
@@ -259,7 +257,7 @@ static void test_diverge_long_pause_counts_as_50_ms(void) {
 }
 
 /// Exact figures: each constant of the arithmetic has its share in them.
-static void test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand(void) {
+TEST(test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand) {
     TEST_ASSERT_EQUAL_INT32(20106, pair.um_s_per_rpm);
     pair.applied_mm_s[IW_LEFT] = 1000;
     (void)iw_diverge_step(&pair, now_us + MS(40)); // Half of the way: 40 / (60 + 20).
@@ -276,7 +274,7 @@ static void test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand(void)
     TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_LEFT]);
 }
 
-static void test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm(void) {
+TEST(test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm) {
     settle((speeds_t){1000, 1000});
     iw_diverge_receive(&pair, IW_LEFT, 942); // 58000 um/s less than it should: 408 more than 57592.
     (void)iw_diverge_step(&pair, now_us + MS(50));
@@ -288,7 +286,7 @@ static void test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rp
     TEST_ASSERT_EQUAL_INT32(100006, pair.path_um); // Double.
 }
 
-static void test_diverge_limit_is_exact(void) {
+TEST(test_diverge_limit_is_exact) {
     pair.path_um = 59999;
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, iw_diverge_step(&pair, now_us));
     pair.path_um = 60000;
@@ -299,7 +297,7 @@ static void test_diverge_limit_is_exact(void) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
-static void test_diverge_four_fifths_of_the_expected_speed_are_exact(void) {
+TEST(test_diverge_four_fifths_of_the_expected_speed_are_exact) {
     settle((speeds_t){10000, 10000});
     pair.path_um = 60000;
     iw_diverge_receive(&pair, IW_LEFT, 7993);
@@ -308,7 +306,7 @@ static void test_diverge_four_fifths_of_the_expected_speed_are_exact(void) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
-static void test_diverge_largest_stays_when_the_deviation_leaks_away(void) {
+TEST(test_diverge_largest_stays_when_the_deviation_leaks_away) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
     const int32_t largest_um = pair.largest_um;
@@ -318,7 +316,7 @@ static void test_diverge_largest_stays_when_the_deviation_leaks_away(void) {
     TEST_ASSERT_EQUAL_INT32(largest_um, pair.largest_um);
 }
 
-static void test_diverge_names_the_wheel_that_differs_more(void) {
+TEST(test_diverge_names_the_wheel_that_differs_more) {
     settle((speeds_t){500, 500});
     (void)go_on((speeds_t){500, 500}, (speeds_t){420, 900}, 1000U);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
@@ -332,7 +330,7 @@ static void test_diverge_names_the_wheel_that_differs_more(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-static void test_diverge_no_measured_speed_counts_beyond_40_metres_a_second(void) {
+TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second) {
     iw_diverge_receive(&pair, IW_LEFT, 40001);
     iw_diverge_receive(&pair, IW_RIGHT, -40001);
     iw_diverge_restart(&pair, now_us);
@@ -343,7 +341,7 @@ static void test_diverge_no_measured_speed_counts_beyond_40_metres_a_second(void
     TEST_ASSERT_EQUAL_INT32(39999000, pair.expected_um_s[IW_LEFT]);
 }
 
-static void test_diverge_absurd_values_stay_within_bounds(void) {
+TEST(test_diverge_absurd_values_stay_within_bounds) {
     for (uint32_t i = 0; i < 2000U; i++) {
         now_us += MS(50);
         pair.applied_mm_s[IW_LEFT] = INT16_MIN;
@@ -358,7 +356,7 @@ static void test_diverge_absurd_values_stay_within_bounds(void) {
     TEST_ASSERT_EQUAL_INT32(1000000, pair.largest_um);
 }
 
-static void test_diverge_step_of_telemetry_is_that_of_the_rotor(void) {
+TEST(test_diverge_step_of_telemetry_is_that_of_the_rotor) {
     config.gear_turns = 5;
     config.gear_per = 4;
     iw_diverge_init(&pair, &config);
@@ -366,39 +364,4 @@ static void test_diverge_step_of_telemetry_is_that_of_the_rotor(void) {
     config.rpm_of_rotor = true;
     iw_diverge_init(&pair, &config);
     TEST_ASSERT_EQUAL_INT32(16084, pair.um_s_per_rpm); // 20106 x 4 / 5.
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_diverge_pair_that_follows_does_not);
-    RUN_TEST(test_diverge_expected_follows_what_is_applied_with_the_lag);
-    RUN_TEST(test_diverge_expected_is_the_same_by_long_steps_and_short_ones);
-    RUN_TEST(test_diverge_lag_is_the_configured_one);
-    RUN_TEST(test_diverge_blocked_wheel_is_slow_within_its_millimetres);
-    RUN_TEST(test_diverge_blocked_wheel_backwards_is_slow_too);
-    RUN_TEST(test_diverge_wheel_that_turns_backwards_is_slow);
-    RUN_TEST(test_diverge_no_speed_is_too_low_to_be_compared);
-    RUN_TEST(test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow);
-    RUN_TEST(test_diverge_wheel_below_a_quarter_counts_double);
-    RUN_TEST(test_diverge_slow_command_counts_once);
-    RUN_TEST(test_diverge_wheel_that_runs_on_ramps);
-    RUN_TEST(test_diverge_wheel_that_turns_uncommanded_ramps_either_way);
-    RUN_TEST(test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary);
-    RUN_TEST(test_diverge_both_wheels_slow_alike_do_not);
-    RUN_TEST(test_diverge_steady_difference_below_its_limit_is_never_too_much);
-    RUN_TEST(test_diverge_leak_and_limit_are_the_configured_ones);
-    RUN_TEST(test_diverge_restart_forgets_the_deviation_but_not_the_largest);
-    RUN_TEST(test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on);
-    RUN_TEST(test_diverge_steps_within_a_millisecond_count_together);
-    RUN_TEST(test_diverge_long_pause_counts_as_50_ms);
-    RUN_TEST(test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand);
-    RUN_TEST(test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm);
-    RUN_TEST(test_diverge_limit_is_exact);
-    RUN_TEST(test_diverge_four_fifths_of_the_expected_speed_are_exact);
-    RUN_TEST(test_diverge_largest_stays_when_the_deviation_leaks_away);
-    RUN_TEST(test_diverge_names_the_wheel_that_differs_more);
-    RUN_TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second);
-    RUN_TEST(test_diverge_absurd_values_stay_within_bounds);
-    RUN_TEST(test_diverge_step_of_telemetry_is_that_of_the_rotor);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "iwheel/private/transmit.h"
-#include "unity.h"
+#include "unit.h"
 
 #define START_US 5000000123ULL
 #define AGES_US  3600000000ULL
@@ -32,8 +32,6 @@ void setUp(void) {
     restart();
 }
 
-void tearDown(void) {}
-
 /// Bytes written by hand, so that an error of the encoder does not hide one of the envelope.
 static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     iw_can_frame_t frame;
@@ -61,7 +59,7 @@ static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, config.max_current_mA));
 }
 
-static void test_init_forgets_everything(void) {
+TEST(test_init_forgets_everything) {
     TEST_ASSERT_EQUAL_UINT32(0, envelope.stopped);
     TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_RIGHT]);
@@ -92,7 +90,7 @@ static uint32_t sweep_number(uint32_t number) {
     return passed;
 }
 
-static void test_check_every_id_length_and_format_passes_the_two_setpoints_only(void) {
+TEST(test_check_every_id_length_and_format_passes_the_two_setpoints_only) {
     for (uint16_t dlc = 5; dlc <= 8; dlc++) {
         uint32_t passed = 0;
         config.setpoint_dlc = dlc;
@@ -105,7 +103,7 @@ static void test_check_every_id_length_and_format_passes_the_two_setpoints_only(
     }
 }
 
-static void test_check_wider_number_with_our_low_bits_is_stopped(void) {
+TEST(test_check_wider_number_with_our_low_bits_is_stopped) {
     for (unsigned bit = 11; bit < 32; bit++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.id |= (uint32_t)1 << bit;
@@ -113,7 +111,7 @@ static void test_check_wider_number_with_our_low_bits_is_stopped(void) {
     }
 }
 
-static void test_check_absurd_length_is_stopped(void) {
+TEST(test_check_absurd_length_is_stopped) {
     for (unsigned dlc = 0; dlc < 256; dlc++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.dlc = (uint8_t)dlc;
@@ -122,7 +120,7 @@ static void test_check_absurd_length_is_stopped(void) {
     }
 }
 
-static void test_check_every_type_passes_the_configured_one_only(void) {
+TEST(test_check_every_type_passes_the_configured_one_only) {
     for (unsigned configured = 0; configured < 256; configured++) {
         config.setpoint_type = (uint8_t)configured;
         restart();
@@ -135,7 +133,7 @@ static void test_check_every_type_passes_the_configured_one_only(void) {
     }
 }
 
-static void test_check_type_not_configured_stops_every_type_even_at_zero(void) {
+TEST(test_check_type_not_configured_stops_every_type_even_at_zero) {
     config.setpoint_type_set = false;
     restart();
     for (unsigned type = 0; type < 256; type++) {
@@ -146,7 +144,7 @@ static void test_check_type_not_configured_stops_every_type_even_at_zero(void) {
     TEST_ASSERT_EQUAL_UINT32(256, envelope.stopped);
 }
 
-static void test_check_role_not_configured_stops_everything(void) {
+TEST(test_check_role_not_configured_stops_everything) {
     config.current_role = IW_ROLE_UNSET;
     restart();
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, check(START_US, IW_LEFT, 0, 0));
@@ -167,7 +165,7 @@ static void sweep_currents(int32_t speed_mm_s) {
     }
 }
 
-static void test_check_every_current_passes_within_the_configured_maximum_only(void) {
+TEST(test_check_every_current_passes_within_the_configured_maximum_only) {
     static const uint16_t maxima[] = {300, 301, 700, 1234, 1999, 2000};
     static const uint16_t minima[] = {300, 300, 500, 1233, 1999, 300};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
@@ -183,7 +181,7 @@ static void test_check_every_current_passes_within_the_configured_maximum_only(v
     }
 }
 
-static void test_check_every_speed_passes_within_the_configured_maximum_only(void) {
+TEST(test_check_every_speed_passes_within_the_configured_maximum_only) {
     static const uint16_t maxima[] = {10, 11, 1000, 4999, 5000};
     for (size_t i = 0; i < sizeof maxima / sizeof maxima[0]; i++) {
         config.max_speed_mm_s = maxima[i];
@@ -202,7 +200,7 @@ static void test_check_every_speed_passes_within_the_configured_maximum_only(voi
     }
 }
 
-static void test_check_many_things_wrong_names_the_first_in_the_documented_order(void) {
+TEST(test_check_many_things_wrong_names_the_first_in_the_documented_order) {
     iw_can_frame_t frame = setpoint(IW_LEFT, 30000, 30000);
     frame.data[0] = 2;
     frame.id = 267;
@@ -212,19 +210,4 @@ static void test_check_many_things_wrong_names_the_first_in_the_documented_order
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_CURRENT, check(START_US, IW_LEFT, 30000, 30000));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SPEED, check(START_US, IW_LEFT, 30000, 0));
     TEST_ASSERT_EQUAL_UINT32(4, envelope.stopped);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_init_forgets_everything);
-    RUN_TEST(test_check_every_id_length_and_format_passes_the_two_setpoints_only);
-    RUN_TEST(test_check_wider_number_with_our_low_bits_is_stopped);
-    RUN_TEST(test_check_absurd_length_is_stopped);
-    RUN_TEST(test_check_every_type_passes_the_configured_one_only);
-    RUN_TEST(test_check_type_not_configured_stops_every_type_even_at_zero);
-    RUN_TEST(test_check_role_not_configured_stops_everything);
-    RUN_TEST(test_check_every_current_passes_within_the_configured_maximum_only);
-    RUN_TEST(test_check_every_speed_passes_within_the_configured_maximum_only);
-    RUN_TEST(test_check_many_things_wrong_names_the_first_in_the_documented_order);
-    return UNITY_END();
 }

@@ -5,10 +5,7 @@
 #include "iwheel/codec.h"
 #include "iwheel/private/setpoint.h"
 #include "iwheel/private/transmit.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
+#include "unit.h"
 
 static uint32_t seed;
 
@@ -86,16 +83,10 @@ static void run_once(void) {
     }
 }
 
-static void test_gate_whatever_the_scheduler_takes_passes(void) {
+TEST(test_gate_whatever_the_scheduler_takes_passes) {
     for (seed = 1; seed < 3000U; seed++) {
         const uint32_t run = seed;
         run_once();
         seed = run;
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gate_whatever_the_scheduler_takes_passes);
-    return UNITY_END();
 }

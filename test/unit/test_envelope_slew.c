@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "iwheel/private/transmit.h"
-#include "unity.h"
+#include "unit.h"
 
 #define START_US 5000000123ULL
 #define AGES_US  3600000000ULL
@@ -29,8 +29,6 @@ void setUp(void) {
     config.track_mm = 540;
     restart();
 }
-
-void tearDown(void) {}
 
 static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const uint32_t speed = (uint32_t)speed_mm_s;
@@ -77,7 +75,7 @@ static void check_boundary(int32_t from_mm_s, int32_t direction, uint32_t slope_
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-from_mm_s, -outside, elapsed_us));
 }
 
-static void test_check_away_from_zero_allows_the_acceleration_and_no_more(void) {
+TEST(test_check_away_from_zero_allows_the_acceleration_and_no_more) {
     static const uint16_t slopes[] = {50, 800, 799, 2500};
     config.decel_mm_s2 = 20000;
     config.max_speed_mm_s = 2000;
@@ -87,7 +85,7 @@ static void test_check_away_from_zero_allows_the_acceleration_and_no_more(void) 
     }
 }
 
-static void test_check_towards_zero_allows_the_deceleration_and_no_more(void) {
+TEST(test_check_towards_zero_allows_the_deceleration_and_no_more) {
     static const uint16_t slopes[] = {100, 1500, 1501, 3333};
     static const uint16_t speeds[] = {70, 1100, 1101, 2500};
     config.accel_mm_s2 = 20000;
@@ -98,7 +96,7 @@ static void test_check_towards_zero_allows_the_deceleration_and_no_more(void) {
     }
 }
 
-static void test_check_from_zero_allows_the_acceleration_and_no_more(void) {
+TEST(test_check_from_zero_allows_the_acceleration_and_no_more) {
     for (size_t i = 0; i < ELAPSED; i++) {
         check_boundary(0, 1, 800, elapsed_list[i]);
     }
@@ -121,7 +119,7 @@ static void run_ramp(int32_t direction, iw_time_us_t step_us) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, 0, 0));
 }
 
-static void test_check_ramp_cut_to_whole_numbers_passes(void) {
+TEST(test_check_ramp_cut_to_whole_numbers_passes) {
     static const iw_time_us_t steps[] = {5000, 5001, 7777, 19999, 20000, 20013, 33333, 50000};
     config.accel_mm_s2 = 799;
     config.decel_mm_s2 = 1499;
@@ -131,12 +129,12 @@ static void test_check_ramp_cut_to_whole_numbers_passes(void) {
     }
 }
 
-static void test_check_same_speed_at_once_passes(void) {
+TEST(test_check_same_speed_at_once_passes) {
     settle(START_US, IW_LEFT, 321);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 321, 0));
 }
 
-static void test_check_sign_change_is_stopped_until_zero_was_sent(void) {
+TEST(test_check_sign_change_is_stopped_until_zero_was_sent) {
     static const int32_t speeds[] = {1, 2, 3, 10, 500, 1000};
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
         const int32_t speed = speeds[i];
@@ -149,13 +147,13 @@ static void test_check_sign_change_is_stopped_until_zero_was_sent(void) {
     }
 }
 
-static void test_check_zero_passes_at_once_from_every_speed(void) {
+TEST(test_check_zero_passes_at_once_from_every_speed) {
     for (int32_t speed = -1000; speed <= 1000; speed++) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(speed, 0, 0));
     }
 }
 
-static void test_check_after_a_zero_the_ramp_begins_at_zero(void) {
+TEST(test_check_after_a_zero_the_ramp_begins_at_zero) {
     settle(START_US, IW_LEFT, 1000);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 0, 2000));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 1000, 0));
@@ -163,7 +161,7 @@ static void test_check_after_a_zero_the_ramp_begins_at_zero(void) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 16, 0));
 }
 
-static void test_check_zero_speed_is_a_zero_whatever_the_limit_current(void) {
+TEST(test_check_zero_speed_is_a_zero_whatever_the_limit_current) {
     static const int32_t currents[] = {0, 1, 1999, 2000};
     for (size_t i = 0; i < sizeof currents / sizeof currents[0]; i++) {
         restart();
@@ -172,7 +170,7 @@ static void test_check_zero_speed_is_a_zero_whatever_the_limit_current(void) {
     }
 }
 
-static void test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint(void) {
+TEST(test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint) {
     config.current_role = IW_ROLE_SETPOINT;
     restart();
     settle(START_US, IW_LEFT, 1000);
@@ -181,7 +179,7 @@ static void test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoi
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 0, 0));
 }
 
-static void test_check_refused_frame_is_not_remembered(void) {
+TEST(test_check_refused_frame_is_not_remembered) {
     static const struct {
         int32_t speed_mm_s;
         int32_t current_mA;
@@ -202,14 +200,14 @@ static void test_check_refused_frame_is_not_remembered(void) {
     }
 }
 
-static void test_check_passed_frame_is_remembered_with_its_time(void) {
+TEST(test_check_passed_frame_is_remembered_with_its_time) {
     settle(START_US, IW_LEFT, 100);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 10000, IW_LEFT, 108, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
 }
 
-static void test_check_wheels_do_not_share_their_memory(void) {
+TEST(test_check_wheels_do_not_share_their_memory) {
     settle(START_US, IW_LEFT, 1000);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_RIGHT, 0, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_RIGHT, 1000, 0));
@@ -217,7 +215,7 @@ static void test_check_wheels_do_not_share_their_memory(void) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 1000, 0));
 }
 
-static void test_check_silence_is_no_permission_to_jump(void) {
+TEST(test_check_silence_is_no_permission_to_jump) {
     static const iw_time_us_t silences[] = {300001, 1000000, AGES_US, (iw_time_us_t)1 << 50, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof silences / sizeof silences[0]; i++) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 240 + ROUNDING_MM_S + 1, silences[i]));
@@ -227,7 +225,7 @@ static void test_check_silence_is_no_permission_to_jump(void) {
     }
 }
 
-static void test_check_steepest_slope_over_the_longest_time_does_not_overflow(void) {
+TEST(test_check_steepest_slope_over_the_longest_time_does_not_overflow) {
     config.accel_mm_s2 = 20000;
     config.decel_mm_s2 = 20000;
     config.max_speed_mm_s = 5000;
@@ -237,7 +235,7 @@ static void test_check_steepest_slope_over_the_longest_time_does_not_overflow(vo
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 5000, 249000));
 }
 
-static void test_check_first_frame_must_start_near_zero(void) {
+TEST(test_check_first_frame_must_start_near_zero) {
     static const iw_time_us_t starts[] = {0, 1000, START_US, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
         restart();
@@ -245,25 +243,4 @@ static void test_check_first_frame_must_start_near_zero(void) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(starts[i], IW_RIGHT, -1000, 0));
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(starts[i], IW_RIGHT, 0, 0));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_check_away_from_zero_allows_the_acceleration_and_no_more);
-    RUN_TEST(test_check_towards_zero_allows_the_deceleration_and_no_more);
-    RUN_TEST(test_check_from_zero_allows_the_acceleration_and_no_more);
-    RUN_TEST(test_check_ramp_cut_to_whole_numbers_passes);
-    RUN_TEST(test_check_same_speed_at_once_passes);
-    RUN_TEST(test_check_sign_change_is_stopped_until_zero_was_sent);
-    RUN_TEST(test_check_zero_passes_at_once_from_every_speed);
-    RUN_TEST(test_check_after_a_zero_the_ramp_begins_at_zero);
-    RUN_TEST(test_check_zero_speed_is_a_zero_whatever_the_limit_current);
-    RUN_TEST(test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint);
-    RUN_TEST(test_check_refused_frame_is_not_remembered);
-    RUN_TEST(test_check_passed_frame_is_remembered_with_its_time);
-    RUN_TEST(test_check_wheels_do_not_share_their_memory);
-    RUN_TEST(test_check_silence_is_no_permission_to_jump);
-    RUN_TEST(test_check_steepest_slope_over_the_longest_time_does_not_overflow);
-    RUN_TEST(test_check_first_frame_must_start_near_zero);
-    return UNITY_END();
 }

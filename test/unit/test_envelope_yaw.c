@@ -2,7 +2,7 @@
 // The envelope of a pair: how fast it turns the machine, and how fast that grows; a stop is never held up.
 #include "fixture.h"
 #include "iwheel/private/transmit.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -27,8 +27,6 @@ void setUp(void) {
     fixture_config(&config);
     begin();
 }
-
-void tearDown(void) {}
 
 /// Bytes written by hand. Speeds as on the bus.
 static iw_envelope_verdict_t check(iw_time_us_t after_us, int32_t left_mm_s, int32_t right_mm_s) {
@@ -61,7 +59,7 @@ static void settle(int32_t left_mm_s, int32_t right_mm_s) {
     envelope.stopped = 0;
 }
 
-static void test_envelope_turn_passes_up_to_the_limit_of_the_real_machine(void) {
+TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine) {
     static const struct {
         uint16_t max_mrad_s, track_mm, radius_mm;
         int32_t most_mm_s;
@@ -84,7 +82,7 @@ static void test_envelope_turn_passes_up_to_the_limit_of_the_real_machine(void) 
     }
 }
 
-static void test_envelope_without_a_track_no_turn_passes_and_every_zero_does(void) {
+TEST(test_envelope_without_a_track_no_turn_passes_and_every_zero_does) {
     config.track_mm = 0;
     begin();
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
@@ -93,7 +91,7 @@ static void test_envelope_without_a_track_no_turn_passes_and_every_zero_does(voi
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
 }
 
-static void test_envelope_turn_grows_no_faster_than_configured(void) {
+TEST(test_envelope_turn_grows_no_faster_than_configured) {
     static const struct {
         uint16_t accel_mrad_s2, track_mm, radius_mm;
         uint32_t after_us;
@@ -124,7 +122,7 @@ static void test_envelope_turn_grows_no_faster_than_configured(void) {
     }
 }
 
-static void test_envelope_turn_that_does_not_pass_counts_for_nothing(void) {
+TEST(test_envelope_turn_that_does_not_pass_counts_for_nothing) {
     settle(0, 100);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(20000, 0, 500));
     TEST_ASSERT_EQUAL_INT32(100, turn());
@@ -133,7 +131,7 @@ static void test_envelope_turn_that_does_not_pass_counts_for_nothing(void) {
 }
 
 /// A zero may leave for one wheel alone: it does not make the time longer in which the turning may have grown.
-static void test_envelope_turn_grows_from_the_later_frame_of_both_wheels(void) {
+TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin();
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(0, 0, 0));
@@ -143,7 +141,7 @@ static void test_envelope_turn_grows_from_the_later_frame_of_both_wheels(void) {
     }
 }
 
-static void test_envelope_turn_that_falls_passes_at_any_pace(void) {
+TEST(test_envelope_turn_that_falls_passes_at_any_pace) {
     static const int32_t lefts[] = {0, -270, 270, 300, 1000};
     for (size_t i = 0; i < sizeof lefts / sizeof lefts[0]; i++) {
         for (int32_t way = -1; way <= 1; way += 2) {
@@ -157,7 +155,7 @@ static void test_envelope_turn_that_falls_passes_at_any_pace(void) {
     }
 }
 
-static void test_envelope_turn_is_judged_in_the_frame_of_the_machine(void) {
+TEST(test_envelope_turn_is_judged_in_the_frame_of_the_machine) {
     for (int left = 0; left < 2; left++) {
         for (int right = 0; right < 2; right++) {
             const int32_t l = (left != 0) ? -1 : 1;
@@ -171,16 +169,4 @@ static void test_envelope_turn_is_judged_in_the_frame_of_the_machine(void) {
             TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(0, l * -11, r * 12));
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine);
-    RUN_TEST(test_envelope_without_a_track_no_turn_passes_and_every_zero_does);
-    RUN_TEST(test_envelope_turn_grows_no_faster_than_configured);
-    RUN_TEST(test_envelope_turn_that_does_not_pass_counts_for_nothing);
-    RUN_TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels);
-    RUN_TEST(test_envelope_turn_that_falls_passes_at_any_pace);
-    RUN_TEST(test_envelope_turn_is_judged_in_the_frame_of_the_machine);
-    return UNITY_END();
 }

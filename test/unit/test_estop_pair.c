@@ -2,7 +2,7 @@
 // Two contacts of one button: pressed by either, released by both, and what ends a disagreement.
 #include "iwheel/hal.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #define MS(value) ((iw_time_us_t)(value)*1000U)
 #define LIMIT_MS  200U
@@ -15,8 +15,6 @@ void setUp(void) {
     pair = (iw_estop_pair_t){.disagrees = true, .proven = true}; // Nothing of before is left.
     iw_estop_pair_init(&pair, (uint32_t)MS(LIMIT_MS));
 }
-
-void tearDown(void) {}
 
 static int see(int first, int second) {
     return iw_estop_pair_see(&pair, now_us, first, second);
@@ -32,7 +30,7 @@ static int hold(int first, int second, unsigned for_ms) {
     return answer;
 }
 
-static void test_pair_is_pressed_at_once_by_either_and_released_only_by_both(void) {
+TEST(test_pair_is_pressed_at_once_by_either_and_released_only_by_both) {
     TEST_ASSERT_EQUAL_INT(0, see(0, 0));
     TEST_ASSERT_EQUAL_INT(1, see(1, 0));
     TEST_ASSERT_EQUAL_INT(1, see(1, 1));
@@ -41,7 +39,7 @@ static void test_pair_is_pressed_at_once_by_either_and_released_only_by_both(voi
     TEST_ASSERT_EQUAL_INT(1, see(0, 7));
 }
 
-static void test_pair_may_differ_for_the_limit_and_no_longer(void) {
+TEST(test_pair_may_differ_for_the_limit_and_no_longer) {
     for (int side = 0; side < 2; side++) {
         setUp();
         TEST_ASSERT_EQUAL_INT(1, hold(side, 1 - side, LIMIT_MS));
@@ -50,7 +48,7 @@ static void test_pair_may_differ_for_the_limit_and_no_longer(void) {
     }
 }
 
-static void test_pair_that_agrees_in_between_begins_anew(void) {
+TEST(test_pair_that_agrees_in_between_begins_anew) {
     (void)hold(1, 0, LIMIT_MS);
     TEST_ASSERT_EQUAL_INT(1, hold(1, 1, 10));
     TEST_ASSERT_EQUAL_INT(1, hold(0, 1, LIMIT_MS));
@@ -58,7 +56,7 @@ static void test_pair_that_agrees_in_between_begins_anew(void) {
     TEST_ASSERT_EQUAL_INT(1, hold(0, 1, LIMIT_MS));
 }
 
-static void test_pair_that_disagreed_agrees_after_both_were_pressed_then_released(void) {
+TEST(test_pair_that_disagreed_agrees_after_both_were_pressed_then_released) {
     (void)hold(1, 0, 300);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(0, 0, 5000)); // A contact that is shorted reads the same.
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(1, 0, 300));
@@ -74,7 +72,7 @@ static void test_pair_that_disagreed_agrees_after_both_were_pressed_then_release
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(0, 0, 10));
 }
 
-static void test_pair_whose_release_is_late_disagrees_again(void) {
+TEST(test_pair_whose_release_is_late_disagrees_again) {
     (void)hold(1, 0, 300);
     (void)hold(1, 1, 300);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(1, 0, 1000));
@@ -83,13 +81,13 @@ static void test_pair_whose_release_is_late_disagrees_again(void) {
     TEST_ASSERT_EQUAL_INT(0, hold(0, 0, 1));
 }
 
-static void test_pair_pressed_before_it_disagreed_proves_nothing(void) {
+TEST(test_pair_pressed_before_it_disagreed_proves_nothing) {
     TEST_ASSERT_EQUAL_INT(1, hold(1, 1, 1000));
     (void)hold(1, 0, 300);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(0, 0, 1000));
 }
 
-static void test_pair_that_cannot_be_read_is_unreadable_and_nothing_else(void) {
+TEST(test_pair_that_cannot_be_read_is_unreadable_and_nothing_else) {
     TEST_ASSERT_EQUAL_INT(-1, hold(-1, 0, 1000));
     TEST_ASSERT_EQUAL_INT(-1, hold(1, -1, 1000));
     TEST_ASSERT_EQUAL_INT(-1, hold(-2, -1, 10));
@@ -105,13 +103,13 @@ static void test_pair_that_cannot_be_read_is_unreadable_and_nothing_else(void) {
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hold(0, 0, 10)); // Nor is it part of a proof.
 }
 
-static void test_pair_looked_at_rarely_still_disagrees(void) {
+TEST(test_pair_looked_at_rarely_still_disagrees) {
     TEST_ASSERT_EQUAL_INT(1, see(0, 1));
     now_us += MS(5000);
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, see(0, 1));
 }
 
-static void test_pair_tells_when_it_will_disagree(void) {
+TEST(test_pair_tells_when_it_will_disagree) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_estop_pair_next_us(&pair));
     (void)see(1, 0);
     const iw_time_us_t due_us = iw_estop_pair_next_us(&pair);
@@ -119,18 +117,4 @@ static void test_pair_tells_when_it_will_disagree(void) {
     now_us = due_us;
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, see(1, 0));
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_estop_pair_next_us(&pair));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pair_is_pressed_at_once_by_either_and_released_only_by_both);
-    RUN_TEST(test_pair_may_differ_for_the_limit_and_no_longer);
-    RUN_TEST(test_pair_that_agrees_in_between_begins_anew);
-    RUN_TEST(test_pair_that_disagreed_agrees_after_both_were_pressed_then_released);
-    RUN_TEST(test_pair_whose_release_is_late_disagrees_again);
-    RUN_TEST(test_pair_pressed_before_it_disagreed_proves_nothing);
-    RUN_TEST(test_pair_that_cannot_be_read_is_unreadable_and_nothing_else);
-    RUN_TEST(test_pair_looked_at_rarely_still_disagrees);
-    RUN_TEST(test_pair_tells_when_it_will_disagree);
-    return UNITY_END();
 }

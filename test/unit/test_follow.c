@@ -2,7 +2,7 @@
 // Does a wheel do what it is told? Each verdict with its threshold, its time and what starts the time anew.
 #include "fixture.h"
 #include "iwheel/private/follow.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static iw_config_t config;
@@ -17,8 +17,6 @@ void setUp(void) {
     fixture_config(&config);
     begin();
 }
-
-void tearDown(void) {}
 
 typedef struct {
     int32_t applied_mm_s;
@@ -46,14 +44,14 @@ static void assert_never(speeds_t speeds) {
     }
 }
 
-static void test_follow_opposite_sign_is_told_after_300_ms(void) {
+TEST(test_follow_opposite_sign_is_told_after_300_ms) {
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){101, -101});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){-101, 101});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){1000, -150});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){-5000, 32767});
 }
 
-static void test_follow_sign_needs_both_above_100(void) {
+TEST(test_follow_sign_needs_both_above_100) {
     static const speeds_t below[] = {{100, -101}, {101, -100}, {-100, 101}, {-101, 100}, {100, -100}, {0, -150}};
     for (size_t i = 0; i < sizeof below / sizeof below[0]; i++) {
         begin();
@@ -62,7 +60,7 @@ static void test_follow_sign_needs_both_above_100(void) {
     }
 }
 
-static void test_follow_overspeed_is_told_after_follow_ms(void) {
+TEST(test_follow_overspeed_is_told_after_follow_ms) {
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, 301});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, -301});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){500, 801});
@@ -70,14 +68,14 @@ static void test_follow_overspeed_is_told_after_follow_ms(void) {
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){50, -351});
 }
 
-static void test_follow_overspeed_uses_the_configuration(void) {
+TEST(test_follow_overspeed_uses_the_configuration) {
     config.follow_mm_s = 50;
     config.follow_ms = 100;
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(100), (speeds_t){200, 251});
     assert_never((speeds_t){200, 249});
 }
 
-static void test_follow_slower_than_the_margin_is_no_overspeed(void) {
+TEST(test_follow_slower_than_the_margin_is_no_overspeed) {
     assert_never((speeds_t){0, 300});
     assert_never((speeds_t){0, 299});
     assert_never((speeds_t){0, -299});
@@ -85,7 +83,7 @@ static void test_follow_slower_than_the_margin_is_no_overspeed(void) {
     assert_never((speeds_t){-500, -799});
 }
 
-static void test_follow_blocked_is_told_after_blocked_ms(void) {
+TEST(test_follow_blocked_is_told_after_blocked_ms) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){100, 19});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){-100, -19});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){1000, 199});
@@ -93,24 +91,24 @@ static void test_follow_blocked_is_told_after_blocked_ms(void) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){5000, 999});
 }
 
-static void test_follow_creeping_backwards_is_blocked(void) {
+TEST(test_follow_creeping_backwards_is_blocked) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){400, -90});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){-400, 90});
 }
 
-static void test_follow_blocked_uses_the_configuration(void) {
+TEST(test_follow_blocked_uses_the_configuration) {
     config.blocked_ms = 200;
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(200), (speeds_t){500, 0});
 }
 
-static void test_follow_twenty_percent_or_a_small_command_is_not_blocked(void) {
+TEST(test_follow_twenty_percent_or_a_small_command_is_not_blocked) {
     static const speeds_t fine[] = {{100, 20}, {-100, -20}, {1000, 200}, {-1000, -200}, {99, 0}, {-99, 0}, {0, 0}};
     for (size_t i = 0; i < sizeof fine / sizeof fine[0]; i++) {
         assert_never(fine[i]);
     }
 }
 
-static void test_follow_a_break_starts_the_time_anew(void) {
+TEST(test_follow_a_break_starts_the_time_anew) {
     static const struct {
         speeds_t bad;
         iw_follow_verdict_t verdict;
@@ -132,7 +130,7 @@ static void test_follow_a_break_starts_the_time_anew(void) {
     }
 }
 
-static void test_follow_restart_starts_every_time_anew(void) {
+TEST(test_follow_restart_starts_every_time_anew) {
     static const speeds_t bad[] = {{200, -200}, {200, 600}, {200, 0}};
     static const uint32_t for_ms[] = {300, 500, 1000};
     for (size_t i = 0; i < 3; i++) {
@@ -145,7 +143,7 @@ static void test_follow_restart_starts_every_time_anew(void) {
     }
 }
 
-static void test_follow_the_gravest_verdict_comes_first(void) {
+TEST(test_follow_the_gravest_verdict_comes_first) {
     config.follow_ms = 300;
     config.blocked_ms = 300;
     (void)step(0, (speeds_t){200, -600});
@@ -158,7 +156,7 @@ static void test_follow_the_gravest_verdict_comes_first(void) {
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OVERSPEED, step(MS(300), (speeds_t){100, -160}));
 }
 
-static void test_follow_times_run_side_by_side(void) {
+TEST(test_follow_times_run_side_by_side) {
     (void)step(0, (speeds_t){200, -90});
     (void)step(MS(800), (speeds_t){200, -600});
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OK, step(MS(1000) - 1U, (speeds_t){200, -600}));
@@ -166,14 +164,14 @@ static void test_follow_times_run_side_by_side(void) {
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_SIGN, step(MS(1100), (speeds_t){200, -600}));
 }
 
-static void test_follow_survives_extremes(void) {
+TEST(test_follow_survives_extremes) {
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, INT32_MAX});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, -INT32_MAX});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){5000, -INT32_MAX});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){-5000, INT32_MAX});
 }
 
-static void test_follow_sign_is_confirmed_after_300_ms_of_agreement(void) {
+TEST(test_follow_sign_is_confirmed_after_300_ms_of_agreement) {
     static const speeds_t agreeing[] = {{101, 101}, {-101, -101}, {1000, 150}};
     for (size_t i = 0; i < 3; i++) {
         begin();
@@ -186,7 +184,7 @@ static void test_follow_sign_is_confirmed_after_300_ms_of_agreement(void) {
     }
 }
 
-static void test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement(void) {
+TEST(test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement) {
     static const speeds_t weak[] = {{100, 101}, {101, 100}, {-100, -101}, {-101, -100}, {0, 0}, {200, -200}};
     for (size_t i = 0; i < sizeof weak / sizeof weak[0]; i++) {
         begin();
@@ -204,30 +202,8 @@ static void test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement(void) 
     TEST_ASSERT_FALSE(iw_follow_sign_confirmed(&watch, FIXTURE_START_US + MS(501)));
 }
 
-static void test_follow_time_standing_still_tells_nothing(void) {
+TEST(test_follow_time_standing_still_tells_nothing) {
     for (uint32_t n = 0; n < 1000; n++) {
         TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OK, step(0, (speeds_t){1000, -1000}));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_follow_opposite_sign_is_told_after_300_ms);
-    RUN_TEST(test_follow_sign_needs_both_above_100);
-    RUN_TEST(test_follow_overspeed_is_told_after_follow_ms);
-    RUN_TEST(test_follow_overspeed_uses_the_configuration);
-    RUN_TEST(test_follow_slower_than_the_margin_is_no_overspeed);
-    RUN_TEST(test_follow_blocked_is_told_after_blocked_ms);
-    RUN_TEST(test_follow_creeping_backwards_is_blocked);
-    RUN_TEST(test_follow_blocked_uses_the_configuration);
-    RUN_TEST(test_follow_twenty_percent_or_a_small_command_is_not_blocked);
-    RUN_TEST(test_follow_a_break_starts_the_time_anew);
-    RUN_TEST(test_follow_restart_starts_every_time_anew);
-    RUN_TEST(test_follow_the_gravest_verdict_comes_first);
-    RUN_TEST(test_follow_times_run_side_by_side);
-    RUN_TEST(test_follow_survives_extremes);
-    RUN_TEST(test_follow_sign_is_confirmed_after_300_ms_of_agreement);
-    RUN_TEST(test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement);
-    RUN_TEST(test_follow_time_standing_still_tells_nothing);
-    return UNITY_END();
 }

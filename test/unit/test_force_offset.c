@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Which offset is in force, where it comes from, and whether the net force means anything.
 #include "force_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static force_rig_t rig;
 
 void setUp(void) {
     force_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 static void begin(iw_side_t side, bool boot_seen) {
     force_rig_begin(&rig, side, boot_seen);
@@ -20,7 +18,7 @@ static void assert_offset(iw_offset_provenance_t provenance, int32_t offset_mN) 
     TEST_ASSERT_EQUAL_INT32(offset_mN, rig.force.offset_mN);
 }
 
-static void test_force_late_join_takes_the_wheels_offset_at_once(void) {
+TEST(test_force_late_join_takes_the_wheels_offset_at_once) {
     force_rig_hear(&rig, 1000, true);
     force_rig_offset(&rig, 100);
     assert_offset(IW_OFFSET_WHEEL, 10000);
@@ -28,13 +26,13 @@ static void test_force_late_join_takes_the_wheels_offset_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-static void test_force_late_join_without_offset_frames_lives_on_its_estimate(void) {
+TEST(test_force_late_join_without_offset_frames_lives_on_its_estimate) {
     force_rig_quiet(&rig, 400, 500);
     assert_offset(IW_OFFSET_ESTIMATED, 5000);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-static void test_force_wheels_offset_replaces_the_estimate(void) {
+TEST(test_force_wheels_offset_replaces_the_estimate) {
     force_rig_quiet(&rig, 40, 1010);
     assert_offset(IW_OFFSET_ESTIMATED, 10100);
     force_rig_offset(&rig, 100);
@@ -43,14 +41,14 @@ static void test_force_wheels_offset_replaces_the_estimate(void) {
     assert_offset(IW_OFFSET_WHEEL, 10100);
 }
 
-static void test_force_estimate_does_not_replace_the_wheels_offset(void) {
+TEST(test_force_estimate_does_not_replace_the_wheels_offset) {
     force_rig_offset(&rig, 100);
     force_rig_quiet(&rig, 40, 1010);
     assert_offset(IW_OFFSET_WHEEL, 10000);
     TEST_ASSERT_EQUAL_INT32(10100, rig.force.quality.mean_mN);
 }
 
-static void test_force_wheels_offset_of_a_loaded_start_is_never_taken(void) {
+TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken) {
     begin(IW_LEFT, true);
     force_rig_quiet(&rig, 20, 100);
     force_rig_offset(&rig, 100);
@@ -65,7 +63,7 @@ static void test_force_wheels_offset_of_a_loaded_start_is_never_taken(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
 }
 
-static void test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known(void) {
+TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known) {
     begin(IW_LEFT, true);
     force_rig_quiet(&rig, 39, 1000);
     force_rig_offset(&rig, 100);
@@ -74,7 +72,7 @@ static void test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known
     assert_offset(IW_OFFSET_WHEEL, 10000);
 }
 
-static void test_force_restore_fills_nothing_but_a_void(void) {
+TEST(test_force_restore_fills_nothing_but_a_void) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, -1234);
     assert_offset(IW_OFFSET_STORED, -1234);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
@@ -94,7 +92,7 @@ static void test_force_restore_fills_nothing_but_a_void(void) {
     assert_offset(IW_OFFSET_OPERATOR, 100);
 }
 
-static void test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next(void) {
+TEST(test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next) {
     iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
     assert_offset(IW_OFFSET_OPERATOR, 5000);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
@@ -109,13 +107,13 @@ static void test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next(voi
     assert_offset(IW_OFFSET_OPERATOR, 6000);
 }
 
-static void test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found(void) {
+TEST(test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found) {
     force_rig_offset(&rig, 60);
     iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
     assert_offset(IW_OFFSET_OPERATOR, 5000);
 }
 
-static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(void) {
+TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators) {
     force_rig_quiet(&rig, 40, 10);
     iw_force_reopen(&rig.force, true);
     assert_offset(IW_OFFSET_STORED, 100);
@@ -134,7 +132,7 @@ static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(v
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.force.quality.window);
 }
 
-static void test_force_reboot_under_load_is_seen_against_the_operators_offset(void) {
+TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset) {
     force_rig_quiet(&rig, 40, 10);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
     iw_force_reopen(&rig.force, true);
@@ -144,7 +142,7 @@ static void test_force_reboot_under_load_is_seen_against_the_operators_offset(vo
     assert_offset(IW_OFFSET_OPERATOR, 100);
 }
 
-static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
+TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.observation);
@@ -157,7 +155,7 @@ static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
     assert_offset(IW_OFFSET_ESTIMATED, 9000);
 }
 
-static void test_force_tare_takes_the_mean_of_the_last_two_seconds(void) {
+TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_quiet(&rig, 39, 200);
     force_rig_quiet(&rig, 1, 240);
@@ -166,14 +164,14 @@ static void test_force_tare_takes_the_mean_of_the_last_two_seconds(void) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
 }
 
-static void test_force_tare_after_long_rest_is_accepted(void) {
+TEST(test_force_tare_after_long_rest_is_accepted) {
     for (uint32_t n = 0; n < 300; n++) {
         force_rig_quiet(&rig, 1, 100);
         TEST_ASSERT_EQUAL_INT((n < 39) ? IW_TARE_NO_FORCE : IW_TARE_OK, force_rig_tare(&rig));
     }
 }
 
-static void test_force_tare_outlives_what_the_wheel_says(void) {
+TEST(test_force_tare_outlives_what_the_wheel_says) {
     force_rig_quiet(&rig, 40, 200);
     (void)force_rig_tare(&rig);
     force_rig_offset(&rig, 99);
@@ -186,7 +184,7 @@ static void assert_tare_refused(iw_tare_t expected) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.force, sizeof before);
 }
 
-static void test_force_tare_without_two_fresh_seconds_is_refused(void) {
+TEST(test_force_tare_without_two_fresh_seconds_is_refused) {
     assert_tare_refused(IW_TARE_NO_FORCE);
     force_rig_quiet(&rig, 39, 100);
     assert_tare_refused(IW_TARE_NO_FORCE);
@@ -200,7 +198,7 @@ static void test_force_tare_without_two_fresh_seconds_is_refused(void) {
     assert_tare_refused(IW_TARE_NO_FORCE);
 }
 
-static void test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused(void) {
+TEST(test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_hear(&rig, 100, false);
     force_rig_quiet(&rig, 39, 100);
@@ -217,7 +215,7 @@ static void test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused(
     assert_tare_refused(IW_TARE_SATURATED);
 }
 
-static void test_force_tare_under_load_is_refused(void) {
+TEST(test_force_tare_under_load_is_refused) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_quiet(&rig, 40, 2101);
     assert_tare_refused(IW_TARE_LOADED);
@@ -227,7 +225,7 @@ static void test_force_tare_under_load_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
 }
 
-static void test_force_tare_without_any_offset_cannot_know_of_a_load(void) {
+TEST(test_force_tare_without_any_offset_cannot_know_of_a_load) {
     force_rig_alternate(&rig, 0, 3000);
     force_rig_quiet(&rig, 40, 9000);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.force.provenance);
@@ -235,7 +233,7 @@ static void test_force_tare_without_any_offset_cannot_know_of_a_load(void) {
     assert_offset(IW_OFFSET_OPERATOR, 90000);
 }
 
-static void test_force_tare_settles_a_doubted_offset(void) {
+TEST(test_force_tare_settles_a_doubted_offset) {
     force_rig_quiet(&rig, 40, 9000);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
@@ -244,7 +242,7 @@ static void test_force_tare_settles_a_doubted_offset(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-static void test_force_tare_against_a_doubted_offset_does_not_judge_the_load(void) {
+TEST(test_force_tare_against_a_doubted_offset_does_not_judge_the_load) {
     force_rig_quiet(&rig, 40, 9000);
     force_rig_offset(&rig, 100);
     force_rig_quiet(&rig, 40, 4000);
@@ -253,7 +251,7 @@ static void test_force_tare_against_a_doubted_offset_does_not_judge_the_load(voi
     assert_offset(IW_OFFSET_OPERATOR, 40000);
 }
 
-static void test_force_tare_a_millinewton_beyond_20_N_is_a_load(void) {
+TEST(test_force_tare_a_millinewton_beyond_20_N_is_a_load) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, -1);
     force_rig_quiet(&rig, 40, 2000);
     TEST_ASSERT_EQUAL_INT(IW_TARE_LOADED, force_rig_tare(&rig));
@@ -261,7 +259,7 @@ static void test_force_tare_a_millinewton_beyond_20_N_is_a_load(void) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
 }
 
-static void test_force_contradicted_unit_is_invalid_and_never_rescaled(void) {
+TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled) {
     for (int side = 0; side < IW_SIDES; side++) {
         const int16_t wrong = (side == IW_LEFT) ? 100 : 1000;
         const int16_t right = (side == IW_LEFT) ? 1000 : 100;
@@ -278,13 +276,13 @@ static void test_force_contradicted_unit_is_invalid_and_never_rescaled(void) {
     }
 }
 
-static void test_force_removed_offset_is_invalid(void) {
+TEST(test_force_removed_offset_is_invalid) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_REMOVED, force_rig_validity(&rig));
 }
 
-static void test_force_removed_offset_is_cured_by_a_tare(void) {
+TEST(test_force_removed_offset_is_cured_by_a_tare) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_offset(&rig, 500);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_force_tare(&rig.force, rig.now_us));
@@ -292,7 +290,7 @@ static void test_force_removed_offset_is_cured_by_a_tare(void) {
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
 }
 
-static void test_force_is_stale_after_five_periods(void) {
+TEST(test_force_is_stale_after_five_periods) {
     force_rig_quiet(&rig, 40, 0);
     rig.now_us += MS(250) - 1U;
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
@@ -300,7 +298,7 @@ static void test_force_is_stale_after_five_periods(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
 }
 
-static void test_force_saturated_sample_is_invalid_only_while_it_lasts(void) {
+TEST(test_force_saturated_sample_is_invalid_only_while_it_lasts) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_hear(&rig, 32767, true);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));
@@ -310,7 +308,7 @@ static void test_force_saturated_sample_is_invalid_only_while_it_lasts(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-static void test_force_extremes_do_not_overflow(void) {
+TEST(test_force_extremes_do_not_overflow) {
     begin(IW_RIGHT, false);
     force_rig_offset(&rig, -32768);
     force_rig_hear(&rig, 32767, true);
@@ -328,37 +326,4 @@ static void test_force_extremes_do_not_overflow(void) {
     force_rig_quiet(&rig, 40, 32766);
     force_rig_offset(&rig, -32768);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_force_late_join_takes_the_wheels_offset_at_once);
-    RUN_TEST(test_force_late_join_without_offset_frames_lives_on_its_estimate);
-    RUN_TEST(test_force_wheels_offset_replaces_the_estimate);
-    RUN_TEST(test_force_estimate_does_not_replace_the_wheels_offset);
-    RUN_TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken);
-    RUN_TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known);
-    RUN_TEST(test_force_restore_fills_nothing_but_a_void);
-    RUN_TEST(test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next);
-    RUN_TEST(test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found);
-    RUN_TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators);
-    RUN_TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset);
-    RUN_TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset);
-    RUN_TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds);
-    RUN_TEST(test_force_tare_after_long_rest_is_accepted);
-    RUN_TEST(test_force_tare_outlives_what_the_wheel_says);
-    RUN_TEST(test_force_tare_without_two_fresh_seconds_is_refused);
-    RUN_TEST(test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused);
-    RUN_TEST(test_force_tare_under_load_is_refused);
-    RUN_TEST(test_force_tare_without_any_offset_cannot_know_of_a_load);
-    RUN_TEST(test_force_tare_settles_a_doubted_offset);
-    RUN_TEST(test_force_tare_against_a_doubted_offset_does_not_judge_the_load);
-    RUN_TEST(test_force_tare_a_millinewton_beyond_20_N_is_a_load);
-    RUN_TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled);
-    RUN_TEST(test_force_removed_offset_is_invalid);
-    RUN_TEST(test_force_removed_offset_is_cured_by_a_tare);
-    RUN_TEST(test_force_is_stale_after_five_periods);
-    RUN_TEST(test_force_saturated_sample_is_invalid_only_while_it_lasts);
-    RUN_TEST(test_force_extremes_do_not_overflow);
-    return UNITY_END();
 }

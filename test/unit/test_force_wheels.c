@@ -2,7 +2,7 @@
 // Where the zero of a force comes from, with simulated wheels: late join, loaded start, reboot, restart of the gateway, tare.
 #include "world_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #define SECOND 1000U
 /// The simulated sensors' zeros, as the wheels tell them.
@@ -14,8 +14,6 @@ static world_rig_t rig;
 void setUp(void) {
     fixture_config(&rig.config);
 }
-
-void tearDown(void) {}
 
 static const iw_force_t *force(iw_side_t side) {
     return &rig.gateway.force[side];
@@ -56,7 +54,7 @@ static void assert_tare(iw_tare_t expected, iw_side_t side) {
     }
 }
 
-static void test_wheels_that_start_unloaded_give_their_own_zero(void) {
+TEST(test_wheels_that_start_unloaded_give_their_own_zero) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 4U * SECOND);
     assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
@@ -68,7 +66,7 @@ static void test_wheels_that_start_unloaded_give_their_own_zero(void) {
     TEST_ASSERT_INT32_WITHIN(3500, 50000, iw_force_net_mN(force(IW_RIGHT)));
 }
 
-static void test_joining_late_without_offset_frames_takes_two_quiet_seconds(void) {
+TEST(test_joining_late_without_offset_frames_takes_two_quiet_seconds) {
     world_rig_begin(&rig, 100000000U);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, validity(IW_LEFT));
     world_rig_run(&rig, 2U * SECOND);
@@ -78,7 +76,7 @@ static void test_joining_late_without_offset_frames_takes_two_quiet_seconds(void
     assert_zero(IW_LEFT, IW_OFFSET_ESTIMATED, LEFT_ZERO_mN);
 }
 
-static void test_joining_late_under_load_gives_no_zero_until_a_tare(void) {
+TEST(test_joining_late_under_load_gives_no_zero_until_a_tare) {
     world_rig_begin(&rig, 100000000U);
     load_both(80000);
     world_rig_restart(&rig);
@@ -108,7 +106,7 @@ static void start_loaded_in_sight(void) {
     world_rig_run(&rig, 4U * SECOND);
 }
 
-static void test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours(void) {
+TEST(test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours) {
     start_loaded_in_sight();
     TEST_ASSERT_TRUE(force(IW_LEFT)->boot_seen && force(IW_LEFT)->wheel_offset_heard);
     TEST_ASSERT_INT32_WITHIN(120, 1123, force(IW_LEFT)->wheel_offset_dN); // It has taken the person for its zero.
@@ -120,7 +118,7 @@ static void test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours(vo
     assert_zero(IW_LEFT, IW_OFFSET_OPERATOR, LEFT_ZERO_mN);
 }
 
-static void test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone(void) {
+TEST(test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone) {
     world_rig_begin(&rig, 0);
     load_both(50000);
     sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
@@ -134,7 +132,7 @@ static void test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone(void
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
 }
 
-static void test_reboot_makes_the_zero_stored_and_then_the_wheels_again(void) {
+TEST(test_reboot_makes_the_zero_stored_and_then_the_wheels_again) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 90U * SECOND);
     sim_world_power(&rig.world, rig.now_us, false);
@@ -147,7 +145,7 @@ static void test_reboot_makes_the_zero_stored_and_then_the_wheels_again(void) {
     assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
 }
 
-static void test_reboot_under_load_keeps_the_zero_of_before(void) {
+TEST(test_reboot_under_load_keeps_the_zero_of_before) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 90U * SECOND);
     sim_world_power(&rig.world, rig.now_us, false);
@@ -160,7 +158,7 @@ static void test_reboot_under_load_keeps_the_zero_of_before(void) {
     TEST_ASSERT_INT32_WITHIN(1000, 10000, iw_force_net_mN(force(IW_LEFT)));
 }
 
-static void test_tare_survives_reboot_and_restart(void) {
+TEST(test_tare_survives_reboot_and_restart) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 4U * SECOND);
     assert_tare(IW_TARE_OK, IW_LEFT);
@@ -176,7 +174,7 @@ static void test_tare_survives_reboot_and_restart(void) {
     TEST_ASSERT_EQUAL_INT32(tared_mN, force(IW_LEFT)->offset_mN);
 }
 
-static void test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent(void) {
+TEST(test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent) {
     world_rig_begin(&rig, 0);
     assert_tare(IW_TARE_NO_FORCE, IW_LEFT);
     world_rig_run(&rig, 4U * SECOND);
@@ -204,7 +202,7 @@ static void test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent(v
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, validity(IW_LEFT));
 }
 
-static void test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it(void) {
+TEST(test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it) {
     world_rig_begin(&rig, 0);
     sensor(IW_LEFT)->zero_removed = true;
     world_rig_restart(&rig);
@@ -213,19 +211,4 @@ static void test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_
     assert_tare(IW_TARE_OK, IW_LEFT);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
     TEST_ASSERT_INT32_WITHIN(1000, 0, iw_force_net_mN(force(IW_LEFT)));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_wheels_that_start_unloaded_give_their_own_zero);
-    RUN_TEST(test_joining_late_without_offset_frames_takes_two_quiet_seconds);
-    RUN_TEST(test_joining_late_under_load_gives_no_zero_until_a_tare);
-    RUN_TEST(test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours);
-    RUN_TEST(test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone);
-    RUN_TEST(test_reboot_makes_the_zero_stored_and_then_the_wheels_again);
-    RUN_TEST(test_reboot_under_load_keeps_the_zero_of_before);
-    RUN_TEST(test_tare_survives_reboot_and_restart);
-    RUN_TEST(test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent);
-    RUN_TEST(test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it);
-    return UNITY_END();
 }

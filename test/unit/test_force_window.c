@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The two seconds in which the offset is estimated: what contaminates them, and what they say about the unit.
 #include "force_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static force_rig_t rig;
 
 void setUp(void) {
     force_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 static void begin(iw_side_t side, bool boot_seen) {
     force_rig_begin(&rig, side, boot_seen);
@@ -20,7 +18,7 @@ static void assert_window(iw_window_t expected) {
     TEST_ASSERT_EQUAL_INT((expected == IW_WINDOW_GOOD) ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
 }
 
-static void test_force_begins_open_and_knows_nothing(void) {
+TEST(test_force_begins_open_and_knows_nothing) {
     assert_window(IW_WINDOW_OPEN);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
     TEST_ASSERT_EQUAL_INT32(0, rig.force.offset_mN);
@@ -28,7 +26,7 @@ static void test_force_begins_open_and_knows_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
 }
 
-static void test_force_quiet_window_estimates_the_offset_with_its_last_sample(void) {
+TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample) {
     force_rig_quiet(&rig, 39, 1234);
     assert_window(IW_WINDOW_OPEN);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
@@ -44,7 +42,7 @@ static void test_force_quiet_window_estimates_the_offset_with_its_last_sample(vo
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
 }
 
-static void test_force_is_measured_of_the_wheel_that_is_asked_for(void) {
+TEST(test_force_is_measured_of_the_wheel_that_is_asked_for) {
     force_rig_t other;
     force_rig_init(&other);
     force_rig_quiet(&other, 40, -77);
@@ -59,7 +57,7 @@ static void test_force_is_measured_of_the_wheel_that_is_asked_for(void) {
     }
 }
 
-static void test_force_units_are_per_side_as_documented_or_configured(void) {
+TEST(test_force_units_are_per_side_as_documented_or_configured) {
     begin(IW_RIGHT, false);
     force_rig_quiet(&rig, 40, -77);
     TEST_ASSERT_EQUAL_INT32(-7700, rig.force.offset_mN);
@@ -76,7 +74,7 @@ static void test_force_units_are_per_side_as_documented_or_configured(void) {
     TEST_ASSERT_EQUAL_INT32(10000, iw_force_raw_mN(&rig.force));
 }
 
-static void test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy(void) {
+TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy) {
     force_rig_alternate(&rig, 500, 700);
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_UINT32(1000, rig.force.quality.deviation_mN);
@@ -94,13 +92,13 @@ static void test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy(void) {
     assert_window(IW_WINDOW_NOISY);
 }
 
-static void test_force_never_heard_is_not_heard_when_time_has_just_begun(void) {
+TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 0));
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 1000));
 }
 
 /// 30 of 40 samples are 2 cN off the mean: the root of 3 cN2 is 17.3 mN.
-static void test_force_deviation_is_told_to_a_millinewton(void) {
+TEST(test_force_deviation_is_told_to_a_millinewton) {
     for (uint32_t n = 0; n < 40; n++) {
         force_rig_hear(&rig, (int16_t)((n % 4U == 3U) ? 100 : ((n % 8U < 4U) == (n % 2U == 0U)) ? 102 : 98), true);
     }
@@ -116,13 +114,13 @@ static void hear_pairs(uint32_t pairs, int16_t by) {
     }
 }
 
-static void test_force_wide_deviation_is_told_exactly(void) {
+TEST(test_force_wide_deviation_is_told_exactly) {
     begin(IW_RIGHT, false);
     force_rig_alternate(&rig, 0, 800);
     TEST_ASSERT_EQUAL_UINT32(40000, rig.force.quality.deviation_mN);
 }
 
-static void test_force_deviation_is_told_finer_up_to_a_variance_of_400000(void) {
+TEST(test_force_deviation_is_told_finer_up_to_a_variance_of_400000) {
     hear_pairs(2, 2000);
     hear_pairs(18, 0);
     TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN); // The root of 400 000 is 632.4.
@@ -133,20 +131,20 @@ static void test_force_deviation_is_told_finer_up_to_a_variance_of_400000(void) 
     TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN); // Of 400 001.
 }
 
-static void test_force_deviation_is_rounded_down(void) {
+TEST(test_force_deviation_is_rounded_down) {
     force_rig_quiet(&rig, 39, 1);
     force_rig_quiet(&rig, 1, 0);
     TEST_ASSERT_EQUAL_UINT32(0, rig.force.quality.deviation_mN);
 }
 
-static void test_force_noise_a_millinewton_beyond_1_N_is_noisy(void) {
+TEST(test_force_noise_a_millinewton_beyond_1_N_is_noisy) {
     hear_pairs(2, 102);
     hear_pairs(18, 100);
     TEST_ASSERT_EQUAL_UINT32(1001, rig.force.quality.deviation_mN);
     assert_window(IW_WINDOW_NOISY);
 }
 
-static void test_force_wildest_noise_does_not_overflow(void) {
+TEST(test_force_wildest_noise_does_not_overflow) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 32766, -32767);
@@ -165,7 +163,7 @@ static void step_at_half(int16_t first, int16_t second) {
     force_rig_quiet(&rig, 20, second);
 }
 
-static void test_force_drift_up_to_1_N_is_quiet_and_more_is_drift(void) {
+TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift) {
     step_at_half(1000, 1100);
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.drift_mN);
@@ -182,7 +180,7 @@ static void test_force_drift_up_to_1_N_is_quiet_and_more_is_drift(void) {
     TEST_ASSERT_EQUAL_INT32(-1010, rig.force.quality.drift_mN);
 }
 
-static void test_force_drift_a_millinewton_beyond_1_N_is_drift(void) {
+TEST(test_force_drift_a_millinewton_beyond_1_N_is_drift) {
     force_rig_quiet(&rig, 20, 0);
     force_rig_quiet(&rig, 18, 100);
     force_rig_quiet(&rig, 2, 101);
@@ -190,7 +188,7 @@ static void test_force_drift_a_millinewton_beyond_1_N_is_drift(void) {
     assert_window(IW_WINDOW_DRIFT);
 }
 
-static void test_force_moving_at_any_sample_contaminates(void) {
+TEST(test_force_moving_at_any_sample_contaminates) {
     static const uint32_t moments[] = {0, 1, 20, 38, 39};
     for (size_t i = 0; i < 5; i++) {
         begin(IW_LEFT, false);
@@ -202,7 +200,7 @@ static void test_force_moving_at_any_sample_contaminates(void) {
     }
 }
 
-static void test_force_saturated_sample_contaminates(void) {
+TEST(test_force_saturated_sample_contaminates) {
     static const int16_t limits[] = {32767, -32768};
     for (size_t i = 0; i < 2; i++) {
         begin(IW_LEFT, false);
@@ -218,7 +216,7 @@ static void test_force_saturated_sample_contaminates(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
 }
 
-static void test_force_far_from_an_offset_trusted_before_is_a_load(void) {
+TEST(test_force_far_from_an_offset_trusted_before_is_a_load) {
     static const int32_t stored_mN[] = {-5000, 5000, -5001, 5001};
     for (size_t i = 0; i < 4; i++) {
         begin(IW_LEFT, false);
@@ -231,19 +229,19 @@ static void test_force_far_from_an_offset_trusted_before_is_a_load(void) {
     }
 }
 
-static void test_force_noise_far_from_a_trusted_offset_is_told_as_noise(void) {
+TEST(test_force_noise_far_from_a_trusted_offset_is_told_as_noise) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, 90000);
     force_rig_alternate(&rig, 0, 2000);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_NOISY, rig.force.quality.window);
 }
 
-static void test_force_ring_counts_no_more_than_it_holds(void) {
+TEST(test_force_ring_counts_no_more_than_it_holds) {
     force_rig_quiet(&rig, 3U * IW_FORCE_WINDOW_SAMPLES, 100);
     TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.count);
     TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.still);
 }
 
-static void test_force_gap_starts_the_window_anew(void) {
+TEST(test_force_gap_starts_the_window_anew) {
     force_rig_quiet(&rig, 39, 100);
     rig.now_us += MS(200) - 1U;
     force_rig_hear(&rig, 100, true);
@@ -260,7 +258,7 @@ static void test_force_gap_starts_the_window_anew(void) {
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.offset_mN);
 }
 
-static void test_force_contaminated_window_stays_so_until_a_reboot(void) {
+TEST(test_force_contaminated_window_stays_so_until_a_reboot) {
     force_rig_alternate(&rig, 0, 30000);
     force_rig_quiet(&rig, 200, 100);
     assert_window(IW_WINDOW_NOISY);
@@ -270,7 +268,7 @@ static void test_force_contaminated_window_stays_so_until_a_reboot(void) {
     assert_window(IW_WINDOW_GOOD);
 }
 
-static void test_force_estimate_is_made_once(void) {
+TEST(test_force_estimate_is_made_once) {
     force_rig_quiet(&rig, 40, 100);
     const iw_time_us_t offset_us = rig.force.offset_us;
     force_rig_quiet(&rig, 100, 5000);
@@ -286,7 +284,7 @@ static iw_unit_observation_t evidence_of(iw_side_t side, int16_t raw, int16_t of
     return rig.force.observation;
 }
 
-static void test_force_unit_is_told_from_raw_over_offset(void) {
+TEST(test_force_unit_is_told_from_raw_over_offset) {
     static const int16_t offsets_dN[] = {20, 100, 1000, -20, -100, -1000};
     for (int side = 0; side < IW_SIDES; side++) {
         for (size_t i = 0; i < 6; i++) {
@@ -307,7 +305,7 @@ static void test_force_unit_is_told_from_raw_over_offset(void) {
     }
 }
 
-static void test_force_unit_evidence_has_fifteen_percent(void) {
+TEST(test_force_unit_evidence_has_fifteen_percent) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 8500, 1000));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 8499, 1000));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 11500, 1000));
@@ -322,7 +320,7 @@ static void test_force_unit_evidence_has_fifteen_percent(void) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -301, 1000));
 }
 
-static void test_force_small_offset_is_no_evidence_unless_it_is_far_off(void) {
+TEST(test_force_small_offset_is_no_evidence_unless_it_is_far_off) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 190, 19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 0, -19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2000, 0));
@@ -333,7 +331,7 @@ static void test_force_small_offset_is_no_evidence_unless_it_is_far_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
 }
 
-static void test_force_small_offset_is_far_off_beyond_20_N(void) {
+TEST(test_force_small_offset_is_far_off_beyond_20_N) {
     force_rig_quiet(&rig, 36, 2000);
     force_rig_quiet(&rig, 4, 2001);
     TEST_ASSERT_EQUAL_INT32(20001, rig.force.quality.mean_mN);
@@ -341,7 +339,7 @@ static void test_force_small_offset_is_far_off_beyond_20_N(void) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);
 }
 
-static void test_force_unit_evidence_waits_for_both_and_survives_either_order(void) {
+TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order) {
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
     force_rig_quiet(&rig, 39, 1000);
@@ -350,41 +348,8 @@ static void test_force_unit_evidence_waits_for_both_and_survives_either_order(vo
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.observation);
 }
 
-static void test_force_contaminated_window_is_no_evidence(void) {
+TEST(test_force_contaminated_window_is_no_evidence) {
     force_rig_alternate(&rig, 0, 2000);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_force_begins_open_and_knows_nothing);
-    RUN_TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample);
-    RUN_TEST(test_force_is_measured_of_the_wheel_that_is_asked_for);
-    RUN_TEST(test_force_units_are_per_side_as_documented_or_configured);
-    RUN_TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy);
-    RUN_TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun);
-    RUN_TEST(test_force_deviation_is_told_to_a_millinewton);
-    RUN_TEST(test_force_wide_deviation_is_told_exactly);
-    RUN_TEST(test_force_deviation_is_told_finer_up_to_a_variance_of_400000);
-    RUN_TEST(test_force_deviation_is_rounded_down);
-    RUN_TEST(test_force_noise_a_millinewton_beyond_1_N_is_noisy);
-    RUN_TEST(test_force_wildest_noise_does_not_overflow);
-    RUN_TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift);
-    RUN_TEST(test_force_drift_a_millinewton_beyond_1_N_is_drift);
-    RUN_TEST(test_force_moving_at_any_sample_contaminates);
-    RUN_TEST(test_force_saturated_sample_contaminates);
-    RUN_TEST(test_force_far_from_an_offset_trusted_before_is_a_load);
-    RUN_TEST(test_force_noise_far_from_a_trusted_offset_is_told_as_noise);
-    RUN_TEST(test_force_ring_counts_no_more_than_it_holds);
-    RUN_TEST(test_force_gap_starts_the_window_anew);
-    RUN_TEST(test_force_contaminated_window_stays_so_until_a_reboot);
-    RUN_TEST(test_force_estimate_is_made_once);
-    RUN_TEST(test_force_unit_is_told_from_raw_over_offset);
-    RUN_TEST(test_force_unit_evidence_has_fifteen_percent);
-    RUN_TEST(test_force_small_offset_is_no_evidence_unless_it_is_far_off);
-    RUN_TEST(test_force_small_offset_is_far_off_beyond_20_N);
-    RUN_TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order);
-    RUN_TEST(test_force_contaminated_window_is_no_evidence);
-    return UNITY_END();
 }

@@ -6,6 +6,7 @@
 
 #include "iwheel_linux/clock.h"
 
+#include "unit.h"
 #include <dirent.h>
 #include <errno.h>
 #include <poll.h>
@@ -18,7 +19,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <unity.h>
 
 #define CONFIG "[record]\nblackbox_s = 2\n"
 
@@ -151,7 +151,7 @@ static void read_file(const char *name, char *out, size_t size) {
     (void)fclose(file);
 }
 
-static void test_stop_is_written_as_frames_events_and_configuration(void) {
+TEST(test_stop_is_written_as_frames_events_and_configuration) {
     char text[8192];
     start();
     record("estop_line", 0);
@@ -171,7 +171,7 @@ static void test_stop_is_written_as_frames_events_and_configuration(void) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
-static void test_what_happens_after_the_stop_is_written_too(void) {
+TEST(test_what_happens_after_the_stop_is_written_too) {
     char text[8192];
     start();
     const gw_box_order_t order = stopped("estop_line");
@@ -197,7 +197,7 @@ static void test_what_happens_after_the_stop_is_written_too(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_right_mm_s\":-34"), told);
 }
 
-static void test_what_is_older_than_blackbox_s_is_left_out(void) {
+TEST(test_what_is_older_than_blackbox_s_is_left_out) {
     start();
     const blackbox_entry_t old = {.at_us = 1, .kind = BLACKBOX_FRAME, .number = 0x7FF};
     blackbox_ring_put(box.ring, &old);
@@ -205,7 +205,7 @@ static void test_what_is_older_than_blackbox_s_is_left_out(void) {
     TEST_ASSERT_EQUAL(10, box.last.frames);
 }
 
-static void test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start(void) {
+TEST(test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start) {
     static char text[8192];
     start();
     record("estop_line", 0);
@@ -221,7 +221,7 @@ static void test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_fro
 }
 
 /// Standard streams and its end of the socket.
-static void test_writer_keeps_no_file_open(void) {
+TEST(test_writer_keeps_no_file_open) {
     char path[64];
     unsigned count = 0;
     start();
@@ -236,7 +236,7 @@ static void test_writer_keeps_no_file_open(void) {
     TEST_ASSERT_EQUAL_UINT(4U, count);
 }
 
-static void test_next_recording_has_the_next_number_also_after_a_restart(void) {
+TEST(test_next_recording_has_the_next_number_also_after_a_restart) {
     start();
     record("wheel_lost", 0);
     gw_box_close(&box);
@@ -245,7 +245,7 @@ static void test_next_recording_has_the_next_number_also_after_a_restart(void) {
     TEST_ASSERT_NOT_NULL(strstr(box.last.path, "stop-000002-bus_down.log"));
 }
 
-static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
+TEST(test_many_stops_keep_the_newest_and_touch_nothing_else) {
     char path[192];
     start();
     record("estop_line", 0);
@@ -262,7 +262,7 @@ static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
     TEST_ASSERT_TRUE(is_there("stop-000004-estop_line.log"));
 }
 
-static void test_harmless_stops_keep_recordings_of_motion(void) {
+TEST(test_harmless_stops_keep_recordings_of_motion) {
     start();
     record_in_motion("wheel_lost", 0);
     for (unsigned i = 0; i < 40U; i++) {
@@ -281,7 +281,7 @@ static void test_harmless_stops_keep_recordings_of_motion(void) {
     TEST_ASSERT_EQUAL(3U * (config.record.keep_stops + 1U), count_files());
 }
 
-static void test_wheel_that_turns_without_command_is_motion(void) {
+TEST(test_wheel_that_turns_without_command_is_motion) {
     char text[8192];
     start();
     gw_box_order_t order = stopped("estop_line");
@@ -298,7 +298,7 @@ static void test_wheel_that_turns_without_command_is_motion(void) {
     TEST_ASSERT_FALSE(gw_box_line_is_harmless(text));
 }
 
-static void test_recordings_of_earlier_versions_are_judged_by_command(void) {
+TEST(test_recordings_of_earlier_versions_are_judged_by_command) {
     const char *head = "{\"type\":\"blackbox\"}\n{\"type\":\"why\",";
     char lines[256];
     const struct {
@@ -331,7 +331,7 @@ static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
 }
 
 /// The second number of recordings needs more than one pass over the directory.
-static void test_rotation_of_ten_thousand_recordings_keeps_motion(void) {
+TEST(test_rotation_of_ten_thousand_recordings_keeps_motion) {
     const int directory = gw_box_files_open(config.record.directory);
     make_recordings(1, 3, 500);
     make_recordings(4, 10000, 0);
@@ -344,7 +344,7 @@ static void test_rotation_of_ten_thousand_recordings_keeps_motion(void) {
     (void)close(directory);
 }
 
-static void test_recording_of_a_single_file_can_be_dropped(void) {
+TEST(test_recording_of_a_single_file_can_be_dropped) {
     const int directory = gw_box_files_open(config.record.directory);
     make_recordings(1, 1, 0);
     TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2, false));
@@ -352,7 +352,7 @@ static void test_recording_of_a_single_file_can_be_dropped(void) {
     (void)close(directory);
 }
 
-static void test_reserve_that_cannot_be_allocated_leaves_no_file(void) {
+TEST(test_reserve_that_cannot_be_allocated_leaves_no_file) {
     struct rlimit before;
     const int directory = gw_box_files_open(config.record.directory);
     TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &before));
@@ -385,7 +385,7 @@ static void fill_disk(const char *name) {
     (void)fclose(file);
 }
 
-static void test_full_disk_costs_harmless_recordings_first(void) {
+TEST(test_full_disk_costs_harmless_recordings_first) {
     if (!mount_small_disk()) {
         TEST_IGNORE_MESSAGE("mounting a tmpfs is not permitted");
     }
@@ -414,7 +414,7 @@ static void test_full_disk_costs_harmless_recordings_first(void) {
     TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.log"));
 }
 
-static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(void) {
+TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop) {
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
     TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
@@ -439,7 +439,7 @@ static void told(const char *cause, char *text, size_t size) {
     (void)fclose(file);
 }
 
-static void test_what_became_of_a_recording_is_told_in_words(void) {
+TEST(test_what_became_of_a_recording_is_told_in_words) {
     char text[1024];
     start();
     told("estop_line", text, sizeof text);
@@ -454,7 +454,7 @@ static void test_what_became_of_a_recording_is_told_in_words(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is not recorded in "), text);
 }
 
-static void test_directory_that_appears_later_is_used(void) {
+TEST(test_directory_that_appears_later_is_used) {
     char command[160];
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
     start();
@@ -464,7 +464,7 @@ static void test_directory_that_appears_later_is_used(void) {
     record("estop_line", 0);
 }
 
-static void test_oldest_is_dropped_only_below_the_number(void) {
+TEST(test_oldest_is_dropped_only_below_the_number) {
     start();
     record("a", 0);
     record("b", 0);
@@ -478,7 +478,7 @@ static void test_oldest_is_dropped_only_below_the_number(void) {
     (void)close(directory);
 }
 
-static void test_frozen_writer_never_blocks_the_gateway(void) {
+TEST(test_frozen_writer_never_blocks_the_gateway) {
     start();
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGSTOP));
     const gw_box_order_t order = stopped("estop_line");
@@ -493,7 +493,7 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
 }
 
-static void test_writer_outlives_what_a_terminal_or_a_service_sends_to_all(void) {
+TEST(test_writer_outlives_what_a_terminal_or_a_service_sends_to_all) {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     start();
     record("estop_line", 0); // It has begun.
@@ -503,7 +503,7 @@ static void test_writer_outlives_what_a_terminal_or_a_service_sends_to_all(void)
     }
 }
 
-static void test_killed_writer_is_noticed_and_started_again_later(void) {
+TEST(test_killed_writer_is_noticed_and_started_again_later) {
     start();
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
     TEST_ASSERT_EQUAL(GW_CHILD_ENDED, wait_news());
@@ -515,7 +515,7 @@ static void test_killed_writer_is_noticed_and_started_again_later(void) {
     record("estop_line", 0);
 }
 
-static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not(void) {
+TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not) {
     char text[8192];
     for (int sending = 0; sending < 2; sending++) {
         start();
@@ -543,7 +543,7 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
 }
 
 /// Of a machine that rolls away: no stop, so that the recording of the last stop stays the last stop's.
-static void test_rolling_is_recorded_and_is_no_stop(void) {
+TEST(test_rolling_is_recorded_and_is_no_stop) {
     static char text[16384];
     static const iw_codec_wheel_t told;
     iw_snapshot_t seen = {.state = IW_STATE_LISTENING, .at_us = iwl_clock_now_us() - GW_BOX_AFTER_US};
@@ -565,7 +565,7 @@ static void test_rolling_is_recorded_and_is_no_stop(void) {
     sock_log_close(&log);
 }
 
-static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
+TEST(test_without_seconds_there_is_no_writer_but_a_small_ring) {
     config.record.blackbox_s = 0;
     start();
     TEST_ASSERT_EQUAL(-1, box.writer.fd);
@@ -573,33 +573,4 @@ static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
     const gw_box_order_t order = stopped("estop_line");
     TEST_ASSERT_EQUAL(-1, access(config.record.directory, F_OK));
     (void)order;
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rolling_is_recorded_and_is_no_stop);
-    RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
-    RUN_TEST(test_what_happens_after_the_stop_is_written_too);
-    RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);
-    RUN_TEST(test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start);
-    RUN_TEST(test_writer_keeps_no_file_open);
-    RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
-    RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
-    RUN_TEST(test_harmless_stops_keep_recordings_of_motion);
-    RUN_TEST(test_wheel_that_turns_without_command_is_motion);
-    RUN_TEST(test_recordings_of_earlier_versions_are_judged_by_command);
-    RUN_TEST(test_rotation_of_ten_thousand_recordings_keeps_motion);
-    RUN_TEST(test_recording_of_a_single_file_can_be_dropped);
-    RUN_TEST(test_reserve_that_cannot_be_allocated_leaves_no_file);
-    RUN_TEST(test_full_disk_costs_harmless_recordings_first);
-    RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
-    RUN_TEST(test_what_became_of_a_recording_is_told_in_words);
-    RUN_TEST(test_directory_that_appears_later_is_used);
-    RUN_TEST(test_oldest_is_dropped_only_below_the_number);
-    RUN_TEST(test_frozen_writer_never_blocks_the_gateway);
-    RUN_TEST(test_writer_outlives_what_a_terminal_or_a_service_sends_to_all);
-    RUN_TEST(test_killed_writer_is_noticed_and_started_again_later);
-    RUN_TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not);
-    RUN_TEST(test_without_seconds_there_is_no_writer_but_a_small_ring);
-    return UNITY_END();
 }

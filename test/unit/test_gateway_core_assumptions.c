@@ -3,7 +3,7 @@
 #include "gateway_rig.h"
 #include "message.h"
 
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -11,8 +11,6 @@ void setUp(void) {
     gateway_rig_init(&rig);
     gateway_rig_run(&rig, MS(500));
 }
-
-void tearDown(void) {}
 
 static iw_assumption_store_t *assumptions(void) {
     return &rig.gateway.assumptions;
@@ -23,7 +21,7 @@ static iw_force_validity_t force_validity(iw_side_t side) {
     return iw_snapshot_force_validity(&seen, side);
 }
 
-static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused(void) {
+TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused) {
     static const iw_assumption_item_t guards[] = {IW_ASSUMPTION_SETPOINT_TYPE,      IW_ASSUMPTION_CURRENT_ROLE,
                                                   IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
                                                   IW_ASSUMPTION_MOUNT_SIGN_LEFT,    IW_ASSUMPTION_MOUNT_SIGN_RIGHT};
@@ -39,7 +37,7 @@ static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_r
     gateway_rig_arm(&rig);
 }
 
-static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
+TEST(test_arm_with_any_other_assumption_contradicted_is_granted) {
     unsigned others = 0;
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         if (!iw_assumption_guards_motion((iw_assumption_item_t)item)) {
@@ -53,13 +51,13 @@ static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-static void test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption(void) {
+TEST(test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption) {
     iw_assumption_contradict(assumptions(), IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_OPERATOR, 0);
     iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_takeover_while_an_assumption_is_contradicted_is_refused(void) {
+TEST(test_takeover_while_an_assumption_is_contradicted_is_refused) {
     gateway_rig_arm(&rig);
     iw_assumption_contradict(assumptions(), IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER + 1U, true));
@@ -78,7 +76,7 @@ static void assert_known(iw_assumption_state_t state, iw_source_t source, int32_
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
 }
 
-static void test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown(void) {
+TEST(test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown) {
     know(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
     assert_known(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -105,7 +103,7 @@ typedef struct {
 #define SETTLED                                                                                                        \
     { IW_CONFIRMED, IW_SOURCE_OPERATOR, 0 }
 
-static void test_force_validity_follows_sensor_and_ledger(void) {
+TEST(test_force_validity_follows_sensor_and_ledger) {
     static const force_case_t cases[] = {
         {IW_OFFSET_WHEEL, IW_UNIT_CN, ASSUMED, ASSUMED, IW_FORCE_VALID},
         {IW_OFFSET_WHEEL, IW_UNIT_DN, ASSUMED, ASSUMED, IW_FORCE_UNIT_CONTRADICTED},
@@ -137,7 +135,7 @@ static void test_force_validity_follows_sensor_and_ledger(void) {
     }
 }
 
-static void test_force_validity_of_the_right_wheel_asks_for_its_own_unit(void) {
+TEST(test_force_validity_of_the_right_wheel_asks_for_its_own_unit) {
     iw_force_t *const force = &rig.gateway.force[IW_RIGHT];
     force->raw_us = rig.now_us;
     force->provenance = IW_OFFSET_WHEEL;
@@ -152,7 +150,7 @@ static void hear_empty(uint32_t id, uint8_t length) {
     gateway_rig_step(&rig);
 }
 
-static void test_length_of_any_message_that_the_table_has_otherwise_contradicts_it(void) {
+TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it) {
     for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         if (row->kind == IW_CODEC_SETPOINT) {
@@ -170,7 +168,7 @@ static void test_length_of_any_message_that_the_table_has_otherwise_contradicts_
     }
 }
 
-static void test_length_once_contradicted_is_told_once(void) {
+TEST(test_length_once_contradicted_is_told_once) {
     hear_empty(IW_ID_LEFT_FORCE, 5);
     const uint32_t changes = assumptions()->changes;
     hear_empty(IW_ID_LEFT_FORCE, 6);
@@ -180,7 +178,7 @@ static void test_length_once_contradicted_is_told_once(void) {
     TEST_ASSERT_EQUAL_INT32(5, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
 }
 
-static void test_length_of_frames_that_are_no_telemetry_says_nothing(void) {
+TEST(test_length_of_frames_that_are_no_telemetry_says_nothing) {
     hear_empty(IW_ID_LEFT_SPEED | IW_CAN_REMOTE, 0);
     hear_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
     hear_empty(300, 1);
@@ -188,7 +186,7 @@ static void test_length_of_frames_that_are_no_telemetry_says_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
-static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void) {
+TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing) {
     gateway_rig_init(&rig);
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -200,7 +198,7 @@ static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void)
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
-static void test_what_is_only_assumed_elsewhere_says_nothing(void) {
+TEST(test_what_is_only_assumed_elsewhere_says_nothing) {
     static const iw_assumption_entry_t assumed = {IW_ASSUMED, IW_SOURCE_OPERATOR, 0};
     const uint32_t changes = assumptions()->changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &assumed);
@@ -208,7 +206,7 @@ static void test_what_is_only_assumed_elsewhere_says_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_CURRENT_ROLE)->state);
 }
 
-static void test_is_sending_from_arm_until_the_zeros_have_been_held(void) {
+TEST(test_is_sending_from_arm_until_the_zeros_have_been_held) {
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
     TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
@@ -220,22 +218,4 @@ static void test_is_sending_from_arm_until_the_zeros_have_been_held(void) {
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
     iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused);
-    RUN_TEST(test_arm_with_any_other_assumption_contradicted_is_granted);
-    RUN_TEST(test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption);
-    RUN_TEST(test_takeover_while_an_assumption_is_contradicted_is_refused);
-    RUN_TEST(test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown);
-    RUN_TEST(test_force_validity_follows_sensor_and_ledger);
-    RUN_TEST(test_force_validity_of_the_right_wheel_asks_for_its_own_unit);
-    RUN_TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it);
-    RUN_TEST(test_length_once_contradicted_is_told_once);
-    RUN_TEST(test_length_of_frames_that_are_no_telemetry_says_nothing);
-    RUN_TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing);
-    RUN_TEST(test_what_is_only_assumed_elsewhere_says_nothing);
-    RUN_TEST(test_is_sending_from_arm_until_the_zeros_have_been_held);
-    return UNITY_END();
 }

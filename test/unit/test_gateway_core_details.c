@@ -2,7 +2,7 @@
 // Rules that only a mutant of the core pointed out: each test here has killed one that lived.
 #include "gateway_rig.h"
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -14,7 +14,7 @@ void tearDown(void) {
     TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
 }
 
-static void test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused(void) {
+TEST(test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     rig.bus.send_result[IW_LEFT] = 0;
@@ -26,7 +26,7 @@ static void test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused(v
     TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
 }
 
-static void test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side(void) {
+TEST(test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side) {
     for (int side = 0; side < IW_SIDES; side++) {
         gateway_rig_init(&rig);
         gateway_rig_run(&rig, MS(1000));
@@ -39,7 +39,7 @@ static void test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_eithe
     }
 }
 
-static void test_gateway_setpoints_are_no_telemetry(void) {
+TEST(test_gateway_setpoints_are_no_telemetry) {
     gateway_rig_run(&rig, MS(1000));
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -59,7 +59,7 @@ static void test_gateway_setpoints_are_no_telemetry(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.wheel[IW_RIGHT].reboots);
 }
 
-static void test_gateway_echo_is_no_telemetry(void) {
+TEST(test_gateway_echo_is_no_telemetry) {
     gateway_rig_arm(&rig);
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -70,7 +70,7 @@ static void test_gateway_echo_is_no_telemetry(void) {
     TEST_ASSERT_EQUAL_UINT32(received, rig.gateway.counters.received);
 }
 
-static void test_gateway_each_odd_frame_is_counted_once_under_one_name(void) {
+TEST(test_gateway_each_odd_frame_is_counted_once_under_one_name) {
     gateway_rig_run(&rig, MS(1000));
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -93,7 +93,7 @@ static void test_gateway_each_odd_frame_is_counted_once_under_one_name(void) {
     TEST_ASSERT_EQUAL_UINT32(before.unknown + 4U, rig.gateway.counters.unknown);
 }
 
-static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
+TEST(test_gateway_sign_fault_is_evidence_from_the_bus) {
     gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
@@ -108,7 +108,7 @@ static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
     TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry->source);
 }
 
-static void test_gateway_software_estop_names_no_wheel(void) {
+TEST(test_gateway_software_estop_names_no_wheel) {
     gateway_rig_arm(&rig);
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_SOFTWARE, rig.gateway.permit.stop.cause);
@@ -117,7 +117,7 @@ static void test_gateway_software_estop_names_no_wheel(void) {
     gateway_rig_step(&rig);
 }
 
-static void test_gateway_arm_repeated_by_the_holder_moves_no_pair(void) {
+TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair) {
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(7));
     const iw_time_us_t next_us = iw_setpoint_next_us(&rig.gateway.setpoint);
@@ -125,7 +125,7 @@ static void test_gateway_arm_repeated_by_the_holder_moves_no_pair(void) {
     TEST_ASSERT_EQUAL_UINT64(next_us, iw_setpoint_next_us(&rig.gateway.setpoint));
 }
 
-static void test_gateway_currents_that_were_not_given_are_no_wish_to_move(void) {
+TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move) {
     const iw_drive_t drive = {{0, 0}, {500, 500}, false};
     iw_applied_t applied;
     rig.config.current_role = IW_ROLE_SETPOINT;
@@ -135,7 +135,7 @@ static void test_gateway_currents_that_were_not_given_are_no_wish_to_move(void) 
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_lowest_current_is_the_documented_one(void) {
+TEST(test_gateway_lowest_current_is_the_documented_one) {
     static const int32_t currents[] = {-2000, -2001};
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
@@ -147,7 +147,7 @@ static void test_gateway_lowest_current_is_the_documented_one(void) {
     }
 }
 
-static void test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right(void) {
+TEST(test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     gateway_rig_run(&rig, MS(5));
@@ -177,7 +177,7 @@ static void hear_force(int16_t raw, int16_t rpm) {
     gateway_rig_run(&rig, MS(10));
 }
 
-static void test_gateway_force_is_measured_at_rest_up_to_rest_rpm(void) {
+TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm) {
     const int16_t rest_rpm = (int16_t)rig.config.rest_rpm;
     hear_force(100, rest_rpm);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
@@ -186,7 +186,7 @@ static void test_gateway_force_is_measured_at_rest_up_to_rest_rpm(void) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_MOVING, rig.gateway.force[IW_LEFT].quality.window);
 }
 
-static void test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator(void) {
+TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator) {
     const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
     const iw_assumption_entry_t *const entry =
         iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT);
@@ -201,7 +201,7 @@ static void test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_op
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry->state);
 }
 
-static void test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting(void) {
+TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting) {
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(2000));
     rig.wheel[IW_LEFT].mute = false;
@@ -210,7 +210,7 @@ static void test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen
     TEST_ASSERT_FALSE(rig.gateway.force[IW_RIGHT].boot_seen);
 }
 
-static void test_gateway_silent_wheel_is_not_judged_by_its_old_speed(void) {
+TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed) {
     gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
@@ -237,32 +237,11 @@ static void step_around(iw_time_us_t at_us, const bool *flag) {
     TEST_ASSERT_TRUE(*flag);
 }
 
-static void test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond(void) {
+TEST(test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond) {
     gateway_rig_run(&rig, MS(100));
     const iw_time_us_t left_us = rig.gateway.wheel[IW_LEFT].rest_since_us;
     const iw_time_us_t right_us = rig.gateway.wheel[IW_RIGHT].rest_since_us;
     const iw_time_us_t since_us = (left_us > right_us) ? left_us : right_us;
     step_around(since_us + MS(rig.config.rest_ms), &rig.gateway.permit.view.at_rest);
     step_around(since_us + IW_PERMIT_SETTLED_US, &rig.gateway.permit.view.settled);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused);
-    RUN_TEST(test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side);
-    RUN_TEST(test_gateway_setpoints_are_no_telemetry);
-    RUN_TEST(test_gateway_echo_is_no_telemetry);
-    RUN_TEST(test_gateway_each_odd_frame_is_counted_once_under_one_name);
-    RUN_TEST(test_gateway_sign_fault_is_evidence_from_the_bus);
-    RUN_TEST(test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right);
-    RUN_TEST(test_gateway_lowest_current_is_the_documented_one);
-    RUN_TEST(test_gateway_software_estop_names_no_wheel);
-    RUN_TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair);
-    RUN_TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move);
-    RUN_TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm);
-    RUN_TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator);
-    RUN_TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting);
-    RUN_TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed);
-    RUN_TEST(test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What goes wrong while wheels move: button, second master, silent or strange wheels, our own lateness.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -57,7 +57,7 @@ static void assert_no_motion_until_armed_anew(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase(void) {
+TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase) {
     for (uint32_t phase_us = 0; phase_us <= 20000; phase_us += 500) {
         setUp();
         drive_on();
@@ -73,7 +73,7 @@ static void test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_pha
     }
 }
 
-static void test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing(void) {
+TEST(test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing) {
     drive_on();
     rig.bus.echo_delay_us = MS(15);
     gateway_rig_run(&rig, MS(20));
@@ -88,7 +88,7 @@ static void test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing(void) {
     TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_RIGHT]);
 }
 
-static void test_gateway_estop_edge_alone_latches(void) {
+TEST(test_gateway_estop_edge_alone_latches) {
     drive_on();
     rig.bus.estop_edge = true;
     gateway_rig_step(&rig);
@@ -96,7 +96,7 @@ static void test_gateway_estop_edge_alone_latches(void) {
     assert_no_motion_until_armed_anew();
 }
 
-static void test_gateway_estop_contacts_that_disagree_latch_until_they_agree(void) {
+TEST(test_gateway_estop_contacts_that_disagree_latch_until_they_agree) {
     drive_on();
     rig.bus.estop_level = IW_ESTOP_DISAGREES;
     gateway_rig_step(&rig);
@@ -110,7 +110,7 @@ static void test_gateway_estop_contacts_that_disagree_latch_until_they_agree(voi
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
 }
 
-static void test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it(void) {
+TEST(test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it) {
     drive_on();
     gateway_rig_press(&rig, true);
     gateway_rig_step(&rig);
@@ -121,7 +121,7 @@ static void test_gateway_estop_contacts_that_disagree_after_a_press_are_told_bes
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_ESTOP_DISAGREES, iw_permit_present(&rig.gateway.permit, rig.now_us));
 }
 
-static void test_gateway_estop_unreadable_latches_in_every_state(void) {
+TEST(test_gateway_estop_unreadable_latches_in_every_state) {
     rig.bus.estop_level = -1;
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
@@ -135,7 +135,7 @@ static void test_gateway_estop_unreadable_latches_in_every_state(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
 }
 
-static void test_gateway_estop_held_stays_latched_whoever_asks(void) {
+TEST(test_gateway_estop_held_stays_latched_whoever_asks) {
     drive_on();
     gateway_rig_press(&rig, true);
     gateway_rig_run(&rig, MS(3000));
@@ -148,7 +148,7 @@ static void test_gateway_estop_held_stays_latched_whoever_asks(void) {
     TEST_ASSERT_EQUAL_UINT32(1, stop()->number);
 }
 
-static void test_gateway_software_estop_latches_from_anybody(void) {
+TEST(test_gateway_software_estop_latches_from_anybody) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_step(&rig);
@@ -158,14 +158,14 @@ static void test_gateway_software_estop_latches_from_anybody(void) {
     assert_no_motion_until_armed_anew();
 }
 
-static void test_gateway_reset_while_a_client_still_drives_is_stale(void) {
+TEST(test_gateway_reset_while_a_client_still_drives_is_stale) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, gateway_rig_reset(&rig));
 }
 
-static void test_gateway_second_master_latches_armed_and_stopping(void) {
+TEST(test_gateway_second_master_latches_armed_and_stopping) {
     static const uint32_t ids[] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOINT};
     for (uint32_t i = 0; i < 4; i++) {
         setUp();
@@ -182,7 +182,7 @@ static void test_gateway_second_master_latches_armed_and_stopping(void) {
     }
 }
 
-static void test_gateway_second_master_while_listening_is_counted_and_refuses_arm(void) {
+TEST(test_gateway_second_master_while_listening_is_counted_and_refuses_arm) {
     gateway_rig_run(&rig, MS(1000));
     gateway_rig_foreign(&rig, 266);
     fake_bus_put_empty(&rig.bus, 298, 0);
@@ -197,7 +197,7 @@ static void test_gateway_second_master_while_listening_is_counted_and_refuses_ar
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_second_master_while_arming_ends_it(void) {
+TEST(test_gateway_second_master_while_arming_ends_it) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.echo_delay_us = MS(10);
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
@@ -207,7 +207,7 @@ static void test_gateway_second_master_while_arming_ends_it(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SECOND_MASTER, iw_gateway_arm_refusal(&rig.gateway));
 }
 
-static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void) {
+TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -226,7 +226,7 @@ static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void
     }
 }
 
-static void test_gateway_both_wheels_silent_are_both_named(void) {
+TEST(test_gateway_both_wheels_silent_are_both_named) {
     drive_on();
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -236,7 +236,7 @@ static void test_gateway_both_wheels_silent_are_both_named(void) {
 }
 
 /// Its last frames showed standstill. Zeros that ended after `zero_hold_ms` would rely on frames that no longer come.
-static void test_gateway_wheel_offline_at_standstill_is_not_at_rest(void) {
+TEST(test_gateway_wheel_offline_at_standstill_is_not_at_rest) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         gateway_rig_arm(&rig);
@@ -254,7 +254,7 @@ static void test_gateway_wheel_offline_at_standstill_is_not_at_rest(void) {
     }
 }
 
-static void test_gateway_never_heard_wheels_refuse_arm(void) {
+TEST(test_gateway_never_heard_wheels_refuse_arm) {
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -262,7 +262,7 @@ static void test_gateway_never_heard_wheels_refuse_arm(void) {
     TEST_ASSERT_EQUAL_UINT32(0, stop()->number);
 }
 
-static void test_gateway_rebooted_wheel_latches(void) {
+TEST(test_gateway_rebooted_wheel_latches) {
     drive_on();
     rig.wheel[IW_LEFT].ticks = -40000;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
@@ -271,7 +271,7 @@ static void test_gateway_rebooted_wheel_latches(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
 }
 
-static void test_gateway_wheel_against_its_command_latches(void) {
+TEST(test_gateway_wheel_against_its_command_latches) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
@@ -287,7 +287,7 @@ static void test_gateway_wheel_against_its_command_latches(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, rig.gateway.assumptions.entry[IW_ASSUMPTION_FEEDBACK_SIGN_LEFT].state);
 }
 
-static void test_gateway_overspeeding_wheel_latches(void) {
+TEST(test_gateway_overspeeding_wheel_latches) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     rig.wheel[IW_LEFT].rpm_fixed = true;
@@ -299,7 +299,7 @@ static void test_gateway_overspeeding_wheel_latches(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
 }
 
-static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
+TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
@@ -316,7 +316,7 @@ static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_pushed_wheel_is_no_fault_while_listening(void) {
+TEST(test_gateway_pushed_wheel_is_no_fault_while_listening) {
     rig.wheel[IW_LEFT].rpm_fixed = true;
     rig.wheel[IW_LEFT].rpm = 60;
     gateway_rig_run(&rig, MS(3000));
@@ -332,7 +332,7 @@ static void stall_in_motion(iw_time_us_t late_us) {
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
 }
 
-static void test_gateway_late_step_is_counted_above_20_ms(void) {
+TEST(test_gateway_late_step_is_counted_above_20_ms) {
     stall_in_motion(MS(20));
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
     stall_in_motion(MS(20) + 1U);
@@ -340,7 +340,7 @@ static void test_gateway_late_step_is_counted_above_20_ms(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_late_by_100_ms_stops_without_ramp_or_tail(void) {
+TEST(test_gateway_late_by_100_ms_stops_without_ramp_or_tail) {
     stall_in_motion(MS(100) - 1U);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     stall_in_motion(MS(100));
@@ -351,7 +351,7 @@ static void test_gateway_late_by_100_ms_stops_without_ramp_or_tail(void) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
 }
 
-static void test_gateway_late_by_more_than_500_ms_latches(void) {
+TEST(test_gateway_late_by_more_than_500_ms_latches) {
     stall_in_motion(MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
@@ -363,7 +363,7 @@ static void test_gateway_late_by_more_than_500_ms_latches(void) {
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX / 1000U, stop()->detail);
 }
 
-static void test_gateway_late_step_in_mid_ramp_leaves_no_tail(void) {
+TEST(test_gateway_late_step_in_mid_ramp_leaves_no_tail) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60));
@@ -372,7 +372,7 @@ static void test_gateway_late_step_in_mid_ramp_leaves_no_tail(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_late_step_neither_fails_nor_refreshes_a_wheel(void) {
+TEST(test_gateway_late_step_neither_fails_nor_refreshes_a_wheel) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.wheel[IW_LEFT].mute = true;
@@ -384,7 +384,7 @@ static void test_gateway_late_step_neither_fails_nor_refreshes_a_wheel(void) {
     assert_latched_with_a_ramp();
 }
 
-static void test_gateway_backlog_after_a_late_step_is_still_of_unknown_age(void) {
+TEST(test_gateway_backlog_after_a_late_step_is_still_of_unknown_age) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.bus.flood = 900;
@@ -400,7 +400,7 @@ static void test_gateway_backlog_after_a_late_step_is_still_of_unknown_age(void)
     TEST_ASSERT_TRUE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
 }
 
-static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {
+TEST(test_gateway_what_the_gate_stops_is_an_internal_fault) {
     drive_on();
     rig.gateway.config.max_speed_mm_s = 100;
     gateway_rig_run(&rig, MS(20));
@@ -408,37 +408,4 @@ static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
     TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_SPEED, stop()->detail);
     TEST_ASSERT_TRUE(rig.gateway.sender.envelope.stopped > 0);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase);
-    RUN_TEST(test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing);
-    RUN_TEST(test_gateway_estop_edge_alone_latches);
-    RUN_TEST(test_gateway_estop_contacts_that_disagree_latch_until_they_agree);
-    RUN_TEST(test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it);
-    RUN_TEST(test_gateway_estop_unreadable_latches_in_every_state);
-    RUN_TEST(test_gateway_estop_held_stays_latched_whoever_asks);
-    RUN_TEST(test_gateway_software_estop_latches_from_anybody);
-    RUN_TEST(test_gateway_reset_while_a_client_still_drives_is_stale);
-    RUN_TEST(test_gateway_second_master_latches_armed_and_stopping);
-    RUN_TEST(test_gateway_second_master_while_listening_is_counted_and_refuses_arm);
-    RUN_TEST(test_gateway_second_master_while_arming_ends_it);
-    RUN_TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period);
-    RUN_TEST(test_gateway_both_wheels_silent_are_both_named);
-    RUN_TEST(test_gateway_wheel_offline_at_standstill_is_not_at_rest);
-    RUN_TEST(test_gateway_never_heard_wheels_refuse_arm);
-    RUN_TEST(test_gateway_rebooted_wheel_latches);
-    RUN_TEST(test_gateway_wheel_against_its_command_latches);
-    RUN_TEST(test_gateway_overspeeding_wheel_latches);
-    RUN_TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch);
-    RUN_TEST(test_gateway_pushed_wheel_is_no_fault_while_listening);
-    RUN_TEST(test_gateway_late_step_is_counted_above_20_ms);
-    RUN_TEST(test_gateway_late_by_100_ms_stops_without_ramp_or_tail);
-    RUN_TEST(test_gateway_late_by_more_than_500_ms_latches);
-    RUN_TEST(test_gateway_late_step_in_mid_ramp_leaves_no_tail);
-    RUN_TEST(test_gateway_late_step_neither_fails_nor_refreshes_a_wheel);
-    RUN_TEST(test_gateway_backlog_after_a_late_step_is_still_of_unknown_age);
-    RUN_TEST(test_gateway_what_the_gate_stops_is_an_internal_fault);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What the gateway finds out about the wheels without moving them: units, offsets, lengths, pose, reboots.
 #include "gateway_rig.h"
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -52,7 +52,7 @@ static void start_with(iw_side_t side, int16_t raw) {
     gateway_rig_step(&rig);
 }
 
-static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
+TEST(test_gateway_ledger_begins_with_where_assumptions_come_from) {
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_TRACK, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
@@ -71,7 +71,7 @@ static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
 }
 
-static void test_gateway_quiet_start_confirms_the_unit_of_each_side(void) {
+TEST(test_gateway_quiet_start_confirms_the_unit_of_each_side) {
     start_with(IW_LEFT, 1000);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONFIRMED, IW_SOURCE_BUS);
     assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_CONFIRMED, IW_SOURCE_BUS);
@@ -87,7 +87,7 @@ static void test_gateway_quiet_start_confirms_the_unit_of_each_side(void) {
     TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.assumptions.changes);
 }
 
-static void test_gateway_wrong_unit_is_contradicted_and_force_invalid(void) {
+TEST(test_gateway_wrong_unit_is_contradicted_and_force_invalid) {
     start_with(IW_LEFT, 100);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONTRADICTED, IW_SOURCE_BUS);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, iw_force_validity(&rig.gateway.force[IW_LEFT], rig.now_us));
@@ -96,20 +96,20 @@ static void test_gateway_wrong_unit_is_contradicted_and_force_invalid(void) {
     assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
-static void test_gateway_removed_offset_is_contradicted(void) {
+TEST(test_gateway_removed_offset_is_contradicted) {
     start_with(IW_RIGHT, 0);
     assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_CONTRADICTED, IW_SOURCE_BUS);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
-static void test_gateway_unclear_evidence_changes_no_entry(void) {
+TEST(test_gateway_unclear_evidence_changes_no_entry) {
     start_with(IW_LEFT, 500);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.gateway.force[IW_LEFT].observation);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
     assert_entry(IW_ASSUMPTION_OFFSET_INCLUDED, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
-static void test_gateway_turning_wheel_contaminates_its_own_window_only(void) {
+TEST(test_gateway_turning_wheel_contaminates_its_own_window_only) {
     rig.wheel[IW_LEFT].rpm_fixed = true;
     rig.wheel[IW_LEFT].rpm = 3;
     gateway_rig_run(&rig, MS(20));
@@ -119,13 +119,13 @@ static void test_gateway_turning_wheel_contaminates_its_own_window_only(void) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_RIGHT].quality.window);
 }
 
-static void test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still(void) {
+TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still) {
     rig.wheel[IW_LEFT].mute = true;
     press_for(IW_LEFT, 1000, MS(2100));
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
 }
 
-static void test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels(void) {
+TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels) {
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 1000, MS(1000));
     gateway_rig_stall(&rig, MS(90));
@@ -141,7 +141,7 @@ static iw_tare_t tare(iw_side_t side) {
     return result;
 }
 
-static void test_gateway_tare_of_both_is_made_whole_or_not_at_all(void) {
+TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all) {
     iw_side_t refused = IW_LEFT;
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 700, MS(2100));
@@ -153,7 +153,7 @@ static void test_gateway_tare_of_both_is_made_whole_or_not_at_all(void) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_LEFT], sizeof before);
 }
 
-static void test_gateway_tare_makes_the_present_force_zero(void) {
+TEST(test_gateway_tare_makes_the_present_force_zero) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, tare(IW_RIGHT));
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
@@ -164,7 +164,7 @@ static void test_gateway_tare_makes_the_present_force_zero(void) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
 }
 
-static void test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why(void) {
+TEST(test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why) {
     iw_side_t refused = IW_RIGHT;
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
@@ -177,7 +177,7 @@ static void test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why(
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_RIGHT], sizeof before);
 }
 
-static void test_gateway_tare_of_the_left_wheel_makes_its_force_zero(void) {
+TEST(test_gateway_tare_of_the_left_wheel_makes_its_force_zero) {
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 700, MS(2100));
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, tare(IW_LEFT));
@@ -185,14 +185,14 @@ static void test_gateway_tare_of_the_left_wheel_makes_its_force_zero(void) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_LEFT].provenance);
 }
 
-static void test_gateway_restored_offset_is_in_force_for_its_wheel(void) {
+TEST(test_gateway_restored_offset_is_in_force_for_its_wheel) {
     iw_gateway_restore_offset(&rig.gateway, IW_RIGHT, IW_OFFSET_STORED, -1234);
     TEST_ASSERT_EQUAL_INT32(-1234, rig.gateway.force[IW_RIGHT].offset_mN);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, rig.gateway.force[IW_RIGHT].provenance);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
 }
 
-static void test_gateway_rebooted_wheel_opens_its_window_anew(void) {
+TEST(test_gateway_rebooted_wheel_opens_its_window_anew) {
     start_with(IW_LEFT, 1000);
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(1500));
@@ -207,7 +207,7 @@ static void test_gateway_rebooted_wheel_opens_its_window_anew(void) {
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, iw_permit_present(&rig.gateway.permit, rig.now_us));
 }
 
-static void test_gateway_status_length_is_noted(void) {
+TEST(test_gateway_status_length_is_noted) {
     assert_entry(IW_ASSUMPTION_DLC, IW_ASSUMED, IW_SOURCE_NONE);
     gateway_rig_run(&rig, MS(50));
     assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_BUS);
@@ -218,7 +218,7 @@ static void test_gateway_status_length_is_noted(void) {
     TEST_ASSERT_EQUAL_INT32(8, entry(IW_ASSUMPTION_DLC)->figure);
 }
 
-static void test_gateway_pose_is_kept_with_its_time(void) {
+TEST(test_gateway_pose_is_kept_with_its_time) {
     const message_t message = {IW_CODEC_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
     gateway_rig_run(&rig, MS(100)); // Speeds and states are no poses.
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.pose_us);
@@ -230,7 +230,7 @@ static void test_gateway_pose_is_kept_with_its_time(void) {
     TEST_ASSERT_EQUAL_INT(31415, rig.gateway.told[IW_RIGHT].pose.psi_mrad);
 }
 
-static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
+TEST(test_gateway_driving_confirms_the_feedback_sign_once) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 200, -200, MS(300));
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMED, entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT)->source);
@@ -246,7 +246,7 @@ static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
     TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.assumptions.changes);
 }
 
-static void test_gateway_current_that_must_be_clamped_is_counted(void) {
+TEST(test_gateway_current_that_must_be_clamped_is_counted) {
     gateway_rig_arm(&rig);
     rig.gateway.config.max_current_mA = 3000;
     const uint32_t sent = rig.bus.sent;
@@ -257,7 +257,7 @@ static void test_gateway_current_that_must_be_clamped_is_counted(void) {
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
 }
 
-static void test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back(void) {
+TEST(test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 100, 400, MS(1000));
     rig.gateway.config.max_speed_mm_s = 200;
@@ -265,28 +265,4 @@ static void test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back(voi
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_ledger_begins_with_where_assumptions_come_from);
-    RUN_TEST(test_gateway_quiet_start_confirms_the_unit_of_each_side);
-    RUN_TEST(test_gateway_wrong_unit_is_contradicted_and_force_invalid);
-    RUN_TEST(test_gateway_removed_offset_is_contradicted);
-    RUN_TEST(test_gateway_unclear_evidence_changes_no_entry);
-    RUN_TEST(test_gateway_turning_wheel_contaminates_its_own_window_only);
-    RUN_TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still);
-    RUN_TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels);
-    RUN_TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all);
-    RUN_TEST(test_gateway_tare_makes_the_present_force_zero);
-    RUN_TEST(test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why);
-    RUN_TEST(test_gateway_tare_of_the_left_wheel_makes_its_force_zero);
-    RUN_TEST(test_gateway_restored_offset_is_in_force_for_its_wheel);
-    RUN_TEST(test_gateway_rebooted_wheel_opens_its_window_anew);
-    RUN_TEST(test_gateway_status_length_is_noted);
-    RUN_TEST(test_gateway_pose_is_kept_with_its_time);
-    RUN_TEST(test_gateway_driving_confirms_the_feedback_sign_once);
-    RUN_TEST(test_gateway_current_that_must_be_clamped_is_counted);
-    RUN_TEST(test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back);
-    return UNITY_END();
 }

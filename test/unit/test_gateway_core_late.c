@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a late step leaves as it was, and arming while the last zero is still on its way.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -21,7 +21,7 @@ static void stall_by(iw_time_us_t late_us) {
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
 }
 
-static void test_gateway_late_step_leaves_a_lost_wheel_lost(void) {
+TEST(test_gateway_late_step_leaves_a_lost_wheel_lost) {
     gateway_rig_run(&rig, MS(500));
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(200));
@@ -34,7 +34,7 @@ static void test_gateway_late_step_leaves_a_lost_wheel_lost(void) {
     }
 }
 
-static void test_gateway_late_step_leaves_a_wheel_that_is_there_alone(void) {
+TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone) {
     gateway_rig_run(&rig, MS(500));
     for (uint32_t i = 0; i < 5U; i++) {
         stall_by(MS(60));
@@ -51,7 +51,7 @@ static void run_until_a_pair_is_on_its_way(void) {
     TEST_ASSERT_TRUE(rig.gateway.sender.confirmation.pending[IW_LEFT] > 0U);
 }
 
-static void test_gateway_arm_behind_a_zero_on_its_way_is_not_refused(void) {
+TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     run_until_a_pair_is_on_its_way();
@@ -76,7 +76,7 @@ static void crawl_for(iw_time_us_t for_us) {
     }
 }
 
-static void test_gateway_late_step_after_step_stops_like_one_long_stall(void) {
+TEST(test_gateway_late_step_after_step_stops_like_one_long_stall) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     crawl_for(MS(60));
@@ -87,7 +87,7 @@ static void test_gateway_late_step_after_step_stops_like_one_long_stall(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_suspended_in_motion_latches_and_begins_with_zero(void) {
+TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(5000));
@@ -100,7 +100,7 @@ static void test_gateway_suspended_in_motion_latches_and_begins_with_zero(void) 
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
 }
 
-static void test_gateway_suspended_for_200_ms_stops(void) {
+TEST(test_gateway_suspended_for_200_ms_stops) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(200));
@@ -111,7 +111,7 @@ static void test_gateway_suspended_for_200_ms_stops(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_suspended_for_less_than_100_ms_drives_on(void) {
+TEST(test_gateway_suspended_for_less_than_100_ms_drives_on) {
     static const struct {
         uint32_t for_us;
         uint32_t late_steps;
@@ -130,7 +130,7 @@ static void test_gateway_suspended_for_less_than_100_ms_drives_on(void) {
     }
 }
 
-static void test_gateway_suspended_again_right_after_a_late_step_stops(void) {
+TEST(test_gateway_suspended_again_right_after_a_late_step_stops) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(30));
@@ -142,7 +142,7 @@ static void test_gateway_suspended_again_right_after_a_late_step_stops(void) {
     TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
 }
 
-static void test_gateway_full_step_that_was_on_time_knows_when_its_frames_came(void) {
+TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came) {
     gateway_rig_run(&rig, MS(500));
     rig.bus.flood = IW_GATEWAY_DRAIN_MAX + 10U;
     gateway_rig_step(&rig);
@@ -152,7 +152,7 @@ static void test_gateway_full_step_that_was_on_time_knows_when_its_frames_came(v
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
 }
 
-static void test_gateway_backlog_of_a_late_step_is_no_second_late_step(void) {
+TEST(test_gateway_backlog_of_a_late_step_is_no_second_late_step) {
     gateway_rig_run(&rig, MS(500));
     rig.bus.flood = 2U * IW_GATEWAY_DRAIN_MAX;
     stall_by(MS(60));
@@ -166,7 +166,7 @@ static void expect_no_side(iw_cause_t cause) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
 }
 
-static void test_gateway_causes_that_are_not_a_wheels_name_none(void) {
+TEST(test_gateway_causes_that_are_not_a_wheels_name_none) {
     gateway_rig_arm(&rig);
     gateway_rig_press(&rig, true);
     gateway_rig_step(&rig);
@@ -194,7 +194,7 @@ static iw_refusal_t drive_sent(iw_time_us_t sent_us) {
     return iw_gateway_drive(&rig.gateway, sent_us, HOLDER, &drive, &applied);
 }
 
-static void test_gateway_drive_from_before_arm_is_stale(void) {
+TEST(test_gateway_drive_from_before_arm_is_stale) {
     gateway_rig_arm(&rig);
     const iw_time_us_t armed_us = rig.gateway.permit.armed_us;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, drive_sent(armed_us - 1U));
@@ -202,7 +202,7 @@ static void test_gateway_drive_from_before_arm_is_stale(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(armed_us));
 }
 
-static void test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent(void) {
+TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     const iw_time_us_t sent_us = rig.now_us - MS(150);
@@ -235,13 +235,13 @@ static void assert_armed_and_still(void) {
     }
 }
 
-static void test_gateway_takeover_does_not_inherit_a_command(void) {
+TEST(test_gateway_takeover_does_not_inherit_a_command) {
     drive_that_waited_too_long();
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, OTHER, true));
     assert_armed_and_still();
 }
 
-static void test_gateway_stop_and_arm_in_one_moment_forget_the_command_before(void) {
+TEST(test_gateway_stop_and_arm_in_one_moment_forget_the_command_before) {
     drive_that_waited_too_long();
     iw_gateway_stop(&rig.gateway, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
@@ -249,31 +249,10 @@ static void test_gateway_stop_and_arm_in_one_moment_forget_the_command_before(vo
     assert_armed_and_still();
 }
 
-static void test_gateway_drive_that_waited_does_not_hide_a_later_one(void) {
+TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     const iw_time_us_t last_us = rig.gateway.permit.stale_us;
     (void)drive_sent(last_us - MS(100));
     TEST_ASSERT_EQUAL_UINT64(last_us, rig.gateway.permit.stale_us);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_late_step_leaves_a_lost_wheel_lost);
-    RUN_TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone);
-    RUN_TEST(test_gateway_late_step_after_step_stops_like_one_long_stall);
-    RUN_TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused);
-    RUN_TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero);
-    RUN_TEST(test_gateway_suspended_for_200_ms_stops);
-    RUN_TEST(test_gateway_suspended_for_less_than_100_ms_drives_on);
-    RUN_TEST(test_gateway_suspended_again_right_after_a_late_step_stops);
-    RUN_TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came);
-    RUN_TEST(test_gateway_backlog_of_a_late_step_is_no_second_late_step);
-    RUN_TEST(test_gateway_causes_that_are_not_a_wheels_name_none);
-    RUN_TEST(test_gateway_drive_from_before_arm_is_stale);
-    RUN_TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent);
-    RUN_TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one);
-    RUN_TEST(test_gateway_takeover_does_not_inherit_a_command);
-    RUN_TEST(test_gateway_stop_and_arm_in_one_moment_forget_the_command_before);
-    return UNITY_END();
 }

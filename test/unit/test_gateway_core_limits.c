@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Limits to the microsecond and accounts to the frame.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -38,7 +38,7 @@ static void turn(int16_t rpm) {
     }
 }
 
-static void test_gateway_counts_what_it_sent_and_what_it_could_not(void) {
+TEST(test_gateway_counts_what_it_sent_and_what_it_could_not) {
     gateway_rig_arm(&rig);
     const iw_sender_t *const sender = &rig.gateway.sender;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
@@ -54,14 +54,14 @@ static void test_gateway_counts_what_it_sent_and_what_it_could_not(void) {
     TEST_ASSERT_TRUE(sender->sent.later > 0);
 }
 
-static void test_gateway_counts_telemetry(void) {
+TEST(test_gateway_counts_telemetry) {
     gateway_rig_run(&rig, MS(3000));
     TEST_ASSERT_UINT32_WITHIN(6, 1650, rig.gateway.counters.received);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.unknown);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
 }
 
-static void test_gateway_gap_is_measured_anew_after_silence(void) {
+TEST(test_gateway_gap_is_measured_anew_after_silence) {
     gateway_rig_run(&rig, MS(1000));
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.sent.gap_us);
@@ -75,7 +75,7 @@ static void test_gateway_gap_is_measured_anew_after_silence(void) {
     TEST_ASSERT_TRUE(rig.gateway.sender.sent.gap_us > 0);
 }
 
-static void test_gateway_echo_is_overdue_at_its_limit_exactly(void) {
+TEST(test_gateway_echo_is_overdue_at_its_limit_exactly) {
     drive_on();
     run_to_next_pair();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
@@ -90,7 +90,7 @@ static void test_gateway_echo_is_overdue_at_its_limit_exactly(void) {
     TEST_ASSERT_EQUAL_UINT32(50, rig.gateway.permit.stop.detail);
 }
 
-static void test_gateway_zero_held_back_leaves_with_the_first_echo(void) {
+TEST(test_gateway_zero_held_back_leaves_with_the_first_echo) {
     drive_on();
     rig.bus.echo_delay_us = MS(45);
     run_to_next_pair();
@@ -103,7 +103,7 @@ static void test_gateway_zero_held_back_leaves_with_the_first_echo(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_zero_to_one_wheel_keeps_the_period(void) {
+TEST(test_gateway_zero_to_one_wheel_keeps_the_period) {
     drive_on();
     gateway_rig_run(&rig, MS(1));
     rig.bus.acknowledged = false;
@@ -117,7 +117,7 @@ static void test_gateway_zero_to_one_wheel_keeps_the_period(void) {
     TEST_ASSERT_EQUAL_UINT32(pairs, rig.gateway.sender.sent.pairs);
 }
 
-static void test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once(void) {
+TEST(test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(1200));
@@ -130,7 +130,7 @@ static void test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_rest_counts_after_its_time_only(void) {
+TEST(test_gateway_rest_counts_after_its_time_only) {
     turn(30);
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -141,7 +141,7 @@ static void test_gateway_rest_counts_after_its_time_only(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_one_moving_wheel_is_enough_to_refuse(void) {
+TEST(test_gateway_one_moving_wheel_is_enough_to_refuse) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         setUp();
         rig.wheel[side].rpm_fixed = true;
@@ -152,7 +152,7 @@ static void test_gateway_one_moving_wheel_is_enough_to_refuse(void) {
     }
 }
 
-static void test_gateway_hold_lasts_until_half_a_second_of_rest(void) {
+TEST(test_gateway_hold_lasts_until_half_a_second_of_rest) {
     drive_on();
     gateway_rig_stop(&rig);
     turn(5);
@@ -166,7 +166,7 @@ static void test_gateway_hold_lasts_until_half_a_second_of_rest(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.permit.still_moving);
 }
 
-static void test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel(void) {
+TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel) {
     drive_on();
     gateway_rig_stop(&rig);
     turn(5);
@@ -181,7 +181,7 @@ static void test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
 }
 
-static void test_gateway_late_step_starts_the_comparison_of_speeds_anew(void) {
+TEST(test_gateway_late_step_starts_the_comparison_of_speeds_anew) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
@@ -195,7 +195,7 @@ static void test_gateway_late_step_starts_the_comparison_of_speeds_anew(void) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
 }
 
-static void test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet(void) {
+TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet) {
     gateway_rig_run(&rig, MS(1000));
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
     rig.wheel[IW_RIGHT].mute = true;
@@ -205,7 +205,7 @@ static void test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_takes_no_more_than_its_share_in_one_step(void) {
+TEST(test_gateway_takes_no_more_than_its_share_in_one_step) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         rig.wheel[side].mute = true;
     }
@@ -223,7 +223,7 @@ static void test_gateway_takes_no_more_than_its_share_in_one_step(void) {
     TEST_ASSERT_EQUAL_UINT32(2U * IW_GATEWAY_DRAIN_MAX + 2U, rig.gateway.counters.unknown);
 }
 
-static void test_gateway_time_standing_still_sends_nothing_twice(void) {
+TEST(test_gateway_time_standing_still_sends_nothing_twice) {
     drive_on();
     run_to_next_pair();
     const uint32_t sent = rig.bus.sent;
@@ -232,24 +232,4 @@ static void test_gateway_time_standing_still_sends_nothing_twice(void) {
     }
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_counts_what_it_sent_and_what_it_could_not);
-    RUN_TEST(test_gateway_counts_telemetry);
-    RUN_TEST(test_gateway_gap_is_measured_anew_after_silence);
-    RUN_TEST(test_gateway_echo_is_overdue_at_its_limit_exactly);
-    RUN_TEST(test_gateway_zero_held_back_leaves_with_the_first_echo);
-    RUN_TEST(test_gateway_zero_to_one_wheel_keeps_the_period);
-    RUN_TEST(test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once);
-    RUN_TEST(test_gateway_rest_counts_after_its_time_only);
-    RUN_TEST(test_gateway_one_moving_wheel_is_enough_to_refuse);
-    RUN_TEST(test_gateway_hold_lasts_until_half_a_second_of_rest);
-    RUN_TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel);
-    RUN_TEST(test_gateway_late_step_starts_the_comparison_of_speeds_anew);
-    RUN_TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet);
-    RUN_TEST(test_gateway_takes_no_more_than_its_share_in_one_step);
-    RUN_TEST(test_gateway_time_standing_still_sends_nothing_twice);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The pair in the whole gateway: what is compared and when, which wheel is named, ramp or zero at once, who is refused.
 #include "gateway_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -43,7 +43,7 @@ static void assert_diverged(iw_side_t side, bool at_once) {
     TEST_ASSERT_EQUAL_INT(at_once, gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_one_wheel_blocked_stops_both_at_once(void) {
+TEST(test_gateway_one_wheel_blocked_stops_both_at_once) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -57,7 +57,7 @@ static void test_gateway_one_wheel_blocked_stops_both_at_once(void) {
     }
 }
 
-static void test_gateway_one_wheel_too_fast_ramps_both(void) {
+TEST(test_gateway_one_wheel_too_fast_ramps_both) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -69,7 +69,7 @@ static void test_gateway_one_wheel_too_fast_ramps_both(void) {
     }
 }
 
-static void test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge(void) {
+TEST(test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge) {
     gateway_rig_arm(&rig);
     for (unsigned i = 0; i < 10U; i++) {
         (void)gateway_rig_cruise(&rig, 400, 100, MS(1000));
@@ -78,7 +78,7 @@ static void test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp(void) {
+TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     gateway_rig_stop(&rig);
@@ -91,7 +91,7 @@ static void test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it(void) {
+TEST(test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     turn(IW_LEFT, 49);
@@ -101,7 +101,7 @@ static void test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it(void) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] != IW_NEVER);
 }
 
-static void test_gateway_pair_pushed_by_hand_while_listening_is_not_compared(void) {
+TEST(test_gateway_pair_pushed_by_hand_while_listening_is_not_compared) {
     gateway_rig_run(&rig, MS(500));
     turn(IW_LEFT, 40);
     gateway_rig_run(&rig, MS(2000));
@@ -110,7 +110,7 @@ static void test_gateway_pair_pushed_by_hand_while_listening_is_not_compared(voi
     TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
 }
 
-static void test_gateway_pair_pushed_by_hand_while_armed_stops(void) {
+TEST(test_gateway_pair_pushed_by_hand_while_armed_stops) {
     gateway_rig_arm(&rig);
     turn(IW_RIGHT, -10);
     (void)gateway_rig_cruise(&rig, 0, 0, MS(500));
@@ -120,7 +120,7 @@ static void test_gateway_pair_pushed_by_hand_while_armed_stops(void) {
 }
 
 /// While zero at once is sent both wheels brake as they can: that is no deviation.
-static void test_gateway_pair_sent_zero_at_once_is_not_compared(void) {
+TEST(test_gateway_pair_sent_zero_at_once_is_not_compared) {
     drive_on();
     turn(IW_LEFT, 10);
     gateway_rig_press(&rig, true);
@@ -129,7 +129,7 @@ static void test_gateway_pair_sent_zero_at_once_is_not_compared(void) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
 
-static void test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard(void) {
+TEST(test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard) {
     rig.config.wheel_silent_ms = 200;
     gateway_rig_begin(&rig, false);
     drive_on();
@@ -141,7 +141,7 @@ static void test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard(void)
     TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
 }
 
-static void test_gateway_wheel_offline_is_not_compared_by_its_old_speed(void) {
+TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed) {
     drive_on();
     turn(IW_LEFT, 10);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(40));
@@ -155,7 +155,7 @@ static void test_gateway_wheel_offline_is_not_compared_by_its_old_speed(void) {
 }
 
 /// In STOPPING too: a late loop stops without a ramp, and wheels then brake as they can.
-static void test_gateway_pair_after_a_late_loop_is_not_compared(void) {
+TEST(test_gateway_pair_after_a_late_loop_is_not_compared) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(110));
@@ -167,7 +167,7 @@ static void test_gateway_pair_after_a_late_loop_is_not_compared(void) {
 }
 
 /// Somebody pushes the machine while zeros are held: nothing is left to stop, and the next arm begins from zero.
-static void test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared(void) {
+TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(600));
@@ -180,7 +180,7 @@ static void test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared(void) {
 }
 
 /// A pair that could not leave whole is followed by zero at once, though the client goes on.
-static void test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave(void) {
+TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave) {
     drive_on();
     turn(IW_LEFT, 10);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(40));
@@ -192,7 +192,7 @@ static void test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave(void
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine(void) {
+TEST(test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     turn(IW_LEFT, 50);
@@ -202,7 +202,7 @@ static void test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine(
     TEST_ASSERT_EQUAL_INT32(-1005, rig.gateway.diverge.measured_mm_s[IW_RIGHT]);
 }
 
-static void test_gateway_compares_whole_millimetres_and_tells_them(void) {
+TEST(test_gateway_compares_whole_millimetres_and_tells_them) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_LEFT]);
@@ -220,7 +220,7 @@ static void test_gateway_compares_whole_millimetres_and_tells_them(void) {
     TEST_ASSERT_EQUAL_UINT32(61, stop()->detail);
 }
 
-static void test_gateway_deviation_begins_anew_with_each_drive(void) {
+TEST(test_gateway_deviation_begins_anew_with_each_drive) {
     drive_on();
     turn(IW_LEFT, 0);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
@@ -235,7 +235,7 @@ static void test_gateway_deviation_begins_anew_with_each_drive(void) {
     TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_mm);
 }
 
-static void test_gateway_third_divergence_within_a_minute_latches(void) {
+TEST(test_gateway_third_divergence_within_a_minute_latches) {
     for (unsigned i = 0; i < 3U; i++) {
         gateway_rig_arm(&rig);
         (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
@@ -249,7 +249,7 @@ static void test_gateway_third_divergence_within_a_minute_latches(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
 }
 
-static void test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first(void) {
+TEST(test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     rig.wheel[IW_LEFT].mute = true;
@@ -263,35 +263,11 @@ static void test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_fir
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_pair_is_compared_in_the_machines_frame(void) {
+TEST(test_gateway_pair_is_compared_in_the_machines_frame) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     drive_on();
     (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_LESS_THAN_INT32(5, gateway_rig_look(&rig).pair_largest_mm);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_one_wheel_blocked_stops_both_at_once);
-    RUN_TEST(test_gateway_one_wheel_too_fast_ramps_both);
-    RUN_TEST(test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge);
-    RUN_TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp);
-    RUN_TEST(test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it);
-    RUN_TEST(test_gateway_pair_pushed_by_hand_while_listening_is_not_compared);
-    RUN_TEST(test_gateway_pair_pushed_by_hand_while_armed_stops);
-    RUN_TEST(test_gateway_pair_sent_zero_at_once_is_not_compared);
-    RUN_TEST(test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard);
-    RUN_TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed);
-    RUN_TEST(test_gateway_pair_after_a_late_loop_is_not_compared);
-    RUN_TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared);
-    RUN_TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave);
-    RUN_TEST(test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine);
-    RUN_TEST(test_gateway_compares_whole_millimetres_and_tells_them);
-    RUN_TEST(test_gateway_deviation_begins_anew_with_each_drive);
-    RUN_TEST(test_gateway_third_divergence_within_a_minute_latches);
-    RUN_TEST(test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first);
-    RUN_TEST(test_gateway_pair_is_compared_in_the_machines_frame);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What clients ask for, and what odd frames on the bus do not do.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static gateway_rig_t rig;
@@ -41,7 +41,7 @@ static void assert_refused(const iw_drive_t *request, iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_MEMORY(&target, &rig.gateway.setpoint.target, sizeof target);
 }
 
-static void test_gateway_drive_out_of_range_is_refused_whole(void) {
+TEST(test_gateway_drive_out_of_range_is_refused_whole) {
     static const iw_drive_t requests[] = {{{32768, 0}, {0, 0}, false},        {{0, -32769}, {0, 0}, false},
                                           {{100, INT32_MAX}, {0, 0}, false},  {{INT32_MIN, 100}, {0, 0}, false},
                                           {{100, 100}, {2001, 0}, true},      {{100, 100}, {0, 2001}, true},
@@ -54,7 +54,7 @@ static void test_gateway_drive_out_of_range_is_refused_whole(void) {
     }
 }
 
-static void test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale(void) {
+TEST(test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale) {
     gateway_rig_run(&rig, MS(1000));
     (void)gateway_rig_drive(&rig, OTHER, 99999, 0);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -65,7 +65,7 @@ static void test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale(vo
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_drive_without_current_needs_the_role_limit(void) {
+TEST(test_gateway_drive_without_current_needs_the_role_limit) {
     const iw_drive_t request = {{100, -50}, {0, 0}, false};
     iw_applied_t applied;
     rig.config.max_current_mA = 1234;
@@ -85,7 +85,7 @@ static void test_gateway_drive_without_current_needs_the_role_limit(void) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.gateway.permit.stale_client);
 }
 
-static void test_gateway_drive_with_a_negative_current_needs_the_role_setpoint(void) {
+TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint) {
     const iw_drive_t request = {{100, 100}, {-2000, 2000}, true};
     iw_applied_t applied;
     rig.config.current_role = IW_ROLE_SETPOINT;
@@ -96,7 +96,7 @@ static void test_gateway_drive_with_a_negative_current_needs_the_role_setpoint(v
     TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
 }
 
-static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor(void) {
+TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor) {
     static const struct {
         iw_drive_t request;
         iw_command_t left;
@@ -127,7 +127,7 @@ static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_facto
 }
 
 /// 0 mA on the left and 2000 mA on the right were applied at speed: the right wheel turned the machine around the left one.
-static void test_gateway_unequal_limits_become_the_larger_one(void) {
+TEST(test_gateway_unequal_limits_become_the_larger_one) {
     const iw_drive_t request = {{600, 600}, {0, 2000}, true};
     const iw_drive_t low = {{600, 600}, {0, 299}, true};
     const iw_drive_t equal = {{600, 600}, {500, 500}, true};
@@ -152,7 +152,7 @@ static void test_gateway_unequal_limits_become_the_larger_one(void) {
 }
 
 /// Around a wheel that stands: still a command of motion, with the client's own limit.
-static void test_gateway_limit_holds_while_one_wheel_is_commanded_zero(void) {
+TEST(test_gateway_limit_holds_while_one_wheel_is_commanded_zero) {
     static const iw_drive_t requests[] = {{{300, 0}, {500, 500}, true}, {{0, 300}, {500, 500}, true}};
     iw_applied_t applied;
     gateway_rig_arm(&rig);
@@ -165,7 +165,7 @@ static void test_gateway_limit_holds_while_one_wheel_is_commanded_zero(void) {
 }
 
 /// A current that is a setpoint is the client's own: below any floor, unequal, of either sign.
-static void test_gateway_current_setpoints_have_no_floor(void) {
+TEST(test_gateway_current_setpoints_have_no_floor) {
     const iw_drive_t request = {{100, -100}, {5, -400}, true};
     iw_applied_t applied;
     rig.config.current_role = IW_ROLE_SETPOINT;
@@ -178,7 +178,7 @@ static void test_gateway_current_setpoints_have_no_floor(void) {
 }
 
 /// On the bus: never unequal, never below the floor, and the ramp to zero has the maximum.
-static void test_gateway_limit_of_the_client_ends_with_the_stop(void) {
+TEST(test_gateway_limit_of_the_client_ends_with_the_stop) {
     const iw_drive_t request = {{600, 600}, {500, 500}, true};
     iw_applied_t applied;
     gateway_rig_arm(&rig);
@@ -194,7 +194,7 @@ static void test_gateway_limit_of_the_client_ends_with_the_stop(void) {
     TEST_ASSERT_TRUE(fake_bus_command(&rig.bus.last[IW_RIGHT]).speed_mm_s > 0);
 }
 
-static void test_gateway_current_alone_is_a_command_with_the_role_setpoint_only(void) {
+TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only) {
     const iw_drive_t left = {{0, 0}, {5, 0}, true};
     const iw_drive_t right = {{0, 0}, {0, 5}, true};
     const iw_drive_t neither = {{0, 0}, {0, 0}, true};
@@ -212,7 +212,7 @@ static void test_gateway_current_alone_is_a_command_with_the_role_setpoint_only(
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.permit.stale_us);
 }
 
-static void test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once(void) {
+TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     gateway_rig_run(&rig, MS(160));
@@ -227,7 +227,7 @@ static void test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once(void) {
     TEST_ASSERT_TRUE(rig.bus.commanded_mm_s[IW_LEFT] < 400 && rig.bus.commanded_mm_s[IW_LEFT] > 250);
 }
 
-static void test_gateway_takeover_happens_at_rest_only(void) {
+TEST(test_gateway_takeover_happens_at_rest_only) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, gateway_rig_request_arm(&rig, OTHER, false));
@@ -239,7 +239,7 @@ static void test_gateway_takeover_happens_at_rest_only(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_contradicted_timing_refuses_arm(void) {
+TEST(test_gateway_contradicted_timing_refuses_arm) {
     const iw_bus_facts_t bad = {true, true};
     const iw_bus_facts_t good = {false, true};
     iw_gateway_bus_facts(&rig.gateway, &bad);
@@ -251,7 +251,7 @@ static void test_gateway_contradicted_timing_refuses_arm(void) {
     TEST_ASSERT_TRUE(rig.gateway.facts.echo_proven);
 }
 
-static void test_gateway_arm_in_the_zero_hold_goes_on_without_silence(void) {
+TEST(test_gateway_arm_in_the_zero_hold_goes_on_without_silence) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 200, 200, MS(500));
     gateway_rig_stop(&rig);
@@ -263,7 +263,7 @@ static void test_gateway_arm_in_the_zero_hold_goes_on_without_silence(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing(void) {
+TEST(test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing) {
     static const uint32_t flags[] = {IW_CAN_REMOTE, IW_CAN_EXTENDED, IW_CAN_ERROR, IW_CAN_FD};
     gateway_rig_arm(&rig);
     rig.wheel[IW_LEFT].mute = true;
@@ -277,7 +277,7 @@ static void test_gateway_remote_extended_error_and_fd_frames_are_counted_and_ref
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
 }
 
-static void test_gateway_short_frames_refresh_nothing_and_long_ones_do(void) {
+TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do) {
     gateway_rig_arm(&rig);
     rig.wheel[IW_LEFT].mute = true;
     for (uint32_t n = 0; n < 50; n++) {
@@ -294,7 +294,7 @@ static void test_gateway_short_frames_refresh_nothing_and_long_ones_do(void) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
 }
 
-static void test_gateway_unknown_ids_are_counted_and_do_nothing(void) {
+TEST(test_gateway_unknown_ids_are_counted_and_do_nothing) {
     gateway_rig_arm(&rig);
     const uint32_t received = rig.gateway.counters.received;
     fake_bus_put_empty(&rig.bus, 0x266, 5);
@@ -307,7 +307,7 @@ static void test_gateway_unknown_ids_are_counted_and_do_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_echo_that_nobody_waits_for_proves_nothing(void) {
+TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
@@ -322,7 +322,7 @@ static void test_gateway_echo_that_nobody_waits_for_proves_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
 }
 
-static void test_gateway_refused_arm_does_not_hasten_the_arming_of_another(void) {
+TEST(test_gateway_refused_arm_does_not_hasten_the_arming_of_another) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -334,7 +334,7 @@ static void test_gateway_refused_arm_does_not_hasten_the_arming_of_another(void)
     TEST_ASSERT_EQUAL_UINT64(due_us, iw_setpoint_next_us(&rig.gateway.setpoint));
 }
 
-static void test_gateway_shutdown_ramps(void) {
+TEST(test_gateway_shutdown_ramps) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     iw_gateway_stop(&rig.gateway, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
@@ -342,29 +342,4 @@ static void test_gateway_shutdown_ramps(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, rig.gateway.permit.stop.cause);
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_drive_out_of_range_is_refused_whole);
-    RUN_TEST(test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale);
-    RUN_TEST(test_gateway_drive_without_current_needs_the_role_limit);
-    RUN_TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint);
-    RUN_TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor);
-    RUN_TEST(test_gateway_unequal_limits_become_the_larger_one);
-    RUN_TEST(test_gateway_limit_holds_while_one_wheel_is_commanded_zero);
-    RUN_TEST(test_gateway_current_setpoints_have_no_floor);
-    RUN_TEST(test_gateway_limit_of_the_client_ends_with_the_stop);
-    RUN_TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only);
-    RUN_TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once);
-    RUN_TEST(test_gateway_takeover_happens_at_rest_only);
-    RUN_TEST(test_gateway_contradicted_timing_refuses_arm);
-    RUN_TEST(test_gateway_arm_in_the_zero_hold_goes_on_without_silence);
-    RUN_TEST(test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing);
-    RUN_TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do);
-    RUN_TEST(test_gateway_unknown_ids_are_counted_and_do_nothing);
-    RUN_TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing);
-    RUN_TEST(test_gateway_refused_arm_does_not_hasten_the_arming_of_another);
-    RUN_TEST(test_gateway_shutdown_ramps);
-    return UNITY_END();
 }

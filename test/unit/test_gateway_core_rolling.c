@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A machine that rolls although nothing is sent to it: seen, and nothing else follows from it.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -31,7 +31,7 @@ static bool is_fault(void) {
     return gateway_rig_look(&rig).rolling_fault;
 }
 
-static void test_gateway_machine_that_rolls_away_while_listening_is_seen(void) {
+TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen) {
     gateway_rig_run(&rig, MS(1000));
     const uint32_t frames = rig.judge.frames;
     turn(IW_LEFT, 75);
@@ -49,7 +49,7 @@ static void test_gateway_machine_that_rolls_away_while_listening_is_seen(void) {
     TEST_ASSERT_FALSE(rolls());
 }
 
-static void test_gateway_one_wheel_of_either_sign_is_enough(void) {
+TEST(test_gateway_one_wheel_of_either_sign_is_enough) {
     static const int16_t rpm[] = {FAST_RPM, -FAST_RPM, LEAST_RPM, SLOW_RPM, -SLOW_RPM};
     for (size_t i = 0; i < 10U; i++) {
         gateway_rig_init(&rig);
@@ -59,7 +59,7 @@ static void test_gateway_one_wheel_of_either_sign_is_enough(void) {
     }
 }
 
-static void test_gateway_wheel_faster_than_100_mm_s_turns(void) {
+TEST(test_gateway_wheel_faster_than_100_mm_s_turns) {
     rig.config.radius_mm = 193;
     gateway_rig_begin(&rig, false);
     turn(IW_RIGHT, LEAST_RPM);
@@ -68,7 +68,7 @@ static void test_gateway_wheel_faster_than_100_mm_s_turns(void) {
     TEST_ASSERT_TRUE(rolls());
 }
 
-static void test_gateway_rolling_of_a_board_just_powered_is_no_fault(void) {
+TEST(test_gateway_rolling_of_a_board_just_powered_is_no_fault) {
     gateway_rig_power_on(&rig);
     turn(IW_LEFT, FAST_RPM);
     gateway_rig_run(&rig, MS(400));
@@ -77,7 +77,7 @@ static void test_gateway_rolling_of_a_board_just_powered_is_no_fault(void) {
 }
 
 /// What is driven does not roll, nor what is told to stand.
-static void test_gateway_rolling_is_not_judged_while_setpoints_are_sent(void) {
+TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
     TEST_ASSERT_FALSE(rolls());
@@ -89,7 +89,7 @@ static void test_gateway_rolling_is_not_judged_while_setpoints_are_sent(void) {
     TEST_ASSERT_FALSE(rolls());
 }
 
-static void test_gateway_rolling_soon_after_the_zeros_is_a_fault(void) {
+TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(2000));
@@ -108,7 +108,7 @@ static void test_gateway_rolling_soon_after_the_zeros_is_a_fault(void) {
     TEST_ASSERT_FALSE(is_fault());
 }
 
-static void test_gateway_wheel_that_is_not_heard_does_not_roll(void) {
+TEST(test_gateway_wheel_that_is_not_heard_does_not_roll) {
     turn(IW_LEFT, FAST_RPM);
     gateway_rig_run(&rig, MS(400));
     TEST_ASSERT_TRUE(rolls());
@@ -118,23 +118,10 @@ static void test_gateway_wheel_that_is_not_heard_does_not_roll(void) {
 }
 
 /// What a late step hears has no known time: it neither begins nor ends anything.
-static void test_gateway_late_step_does_not_judge_rolling(void) {
+TEST(test_gateway_late_step_does_not_judge_rolling) {
     gateway_rig_run(&rig, MS(100));
     turn(IW_LEFT, FAST_RPM);
     gateway_rig_run(&rig, MS(10));
     gateway_rig_stall(&rig, MS(400));
     TEST_ASSERT_FALSE(rolls());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen);
-    RUN_TEST(test_gateway_one_wheel_of_either_sign_is_enough);
-    RUN_TEST(test_gateway_wheel_faster_than_100_mm_s_turns);
-    RUN_TEST(test_gateway_rolling_of_a_board_just_powered_is_no_fault);
-    RUN_TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent);
-    RUN_TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault);
-    RUN_TEST(test_gateway_wheel_that_is_not_heard_does_not_roll);
-    RUN_TEST(test_gateway_late_step_does_not_judge_rolling);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What leaves, when, and what happens if it cannot.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -26,7 +26,7 @@ static void drive_on(void) {
     TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_gateway_armed_sends_zero_pairs_until_the_first_drive(void) {
+TEST(test_gateway_armed_sends_zero_pairs_until_the_first_drive) {
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(900));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
@@ -34,7 +34,7 @@ static void test_gateway_armed_sends_zero_pairs_until_the_first_drive(void) {
     TEST_ASSERT_UINT32_WITHIN(4, 2 * 46, rig.bus.sent);
 }
 
-static void test_gateway_period_is_exact_and_both_frames_leave_together(void) {
+TEST(test_gateway_period_is_exact_and_both_frames_leave_together) {
     drive_on();
     iw_time_us_t last_us = rig.bus.last_us[IW_LEFT];
     for (uint32_t n = 0; n < 40; n++) {
@@ -50,7 +50,7 @@ static void test_gateway_period_is_exact_and_both_frames_leave_together(void) {
     TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.sent.gap_max_us);
 }
 
-static void test_gateway_changed_command_leaves_in_the_same_step(void) {
+TEST(test_gateway_changed_command_leaves_in_the_same_step) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     gateway_rig_run(&rig, rig.bus.last_us[IW_LEFT] + MS(27) - rig.now_us);
@@ -59,7 +59,7 @@ static void test_gateway_changed_command_leaves_in_the_same_step(void) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_RIGHT]);
 }
 
-static void test_gateway_pair_waits_for_the_echoes_of_both_wheels(void) {
+TEST(test_gateway_pair_waits_for_the_echoes_of_both_wheels) {
     drive_on();
     rig.bus.echo_delay_us = MS(8);
     gateway_rig_run(&rig, rig.bus.last_us[IW_LEFT] + MS(20) - rig.now_us);
@@ -74,7 +74,7 @@ static void test_gateway_pair_waits_for_the_echoes_of_both_wheels(void) {
     TEST_ASSERT_EQUAL_UINT64(sent_us + MS(8) + FAKE_BUS_FRAME_US, rig.bus.last_us[IW_RIGHT]);
 }
 
-static void test_gateway_zeros_leave_to_whichever_wheel_can_have_one(void) {
+TEST(test_gateway_zeros_leave_to_whichever_wheel_can_have_one) {
     drive_on();
     rig.bus.echo_delay_us = MS(30);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
@@ -92,7 +92,7 @@ static void test_gateway_zeros_leave_to_whichever_wheel_can_have_one(void) {
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one(void) {
+TEST(test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one) {
     drive_on();
     gateway_rig_run(&rig, MS(1));
     rig.bus.acknowledged = false;
@@ -108,7 +108,7 @@ static void test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_inverted_wheel_is_told_the_negated_speed(void) {
+TEST(test_gateway_inverted_wheel_is_told_the_negated_speed) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
@@ -119,7 +119,7 @@ static void test_gateway_inverted_wheel_is_told_the_negated_speed(void) {
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
 
-static void test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current(void) {
+TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current) {
     rig.config.invert[IW_LEFT] = true;
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
@@ -130,7 +130,7 @@ static void test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negate
     TEST_ASSERT_EQUAL_INT(150, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
 
-static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(void) {
+TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -151,7 +151,7 @@ static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(vo
     }
 }
 
-static void test_gateway_drives_again_after_a_port_that_took_nothing_until_silence(void) {
+TEST(test_gateway_drives_again_after_a_port_that_took_nothing_until_silence) {
     drive_on();
     rig.bus.send_result[IW_LEFT] = 0;
     rig.bus.send_result[IW_RIGHT] = 0;
@@ -166,7 +166,7 @@ static void test_gateway_drives_again_after_a_port_that_took_nothing_until_silen
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_pair_that_never_leaves_is_a_stalled_send(void) {
+TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send) {
     drive_on();
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
@@ -175,7 +175,7 @@ static void test_gateway_pair_that_never_leaves_is_a_stalled_send(void) {
     TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.last[IW_LEFT]).speed_mm_s);
 }
 
-static void test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop(void) {
+TEST(test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop) {
     rig.bus.echo_delay_us = MS(30);
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(60));
@@ -185,7 +185,7 @@ static void test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.envelope.stopped);
 }
 
-static void test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first(void) {
+TEST(test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first) {
     static const iw_bus_state_t states[] = {IW_BUS_DOWN, IW_BUS_OFF};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -209,13 +209,13 @@ static void test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first(
     }
 }
 
-static void test_gateway_error_passive_bus_still_carries_motion(void) {
+TEST(test_gateway_error_passive_bus_still_carries_motion) {
     rig.bus.state = IW_BUS_PASSIVE;
     drive_on();
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, rig.gateway.bus);
 }
 
-static void test_gateway_stop_ramps_holds_zeros_and_falls_silent(void) {
+TEST(test_gateway_stop_ramps_holds_zeros_and_falls_silent) {
     drive_on();
     gateway_rig_stop(&rig);
     const iw_time_us_t stop_us = rig.now_us;
@@ -233,24 +233,4 @@ static void test_gateway_stop_ramps_holds_zeros_and_falls_silent(void) {
     const uint32_t sent = rig.bus.sent;
     gateway_rig_run(&rig, MS(5000));
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_armed_sends_zero_pairs_until_the_first_drive);
-    RUN_TEST(test_gateway_period_is_exact_and_both_frames_leave_together);
-    RUN_TEST(test_gateway_changed_command_leaves_in_the_same_step);
-    RUN_TEST(test_gateway_pair_waits_for_the_echoes_of_both_wheels);
-    RUN_TEST(test_gateway_zeros_leave_to_whichever_wheel_can_have_one);
-    RUN_TEST(test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one);
-    RUN_TEST(test_gateway_inverted_wheel_is_told_the_negated_speed);
-    RUN_TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current);
-    RUN_TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros);
-    RUN_TEST(test_gateway_drives_again_after_a_port_that_took_nothing_until_silence);
-    RUN_TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send);
-    RUN_TEST(test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop);
-    RUN_TEST(test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first);
-    RUN_TEST(test_gateway_error_passive_bus_still_carries_motion);
-    RUN_TEST(test_gateway_stop_ramps_holds_zeros_and_falls_silent);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Silence is silent: what is still in a controller when the zeros end is taken back, or told.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -74,7 +74,7 @@ static void expect_silence_with_power(void) {
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
 }
 
-static void test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge(void) {
+TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge) {
     drive_on();
     const uint32_t sent = rig.bus.sent;
     rig.bus.acknowledged = false;
@@ -96,7 +96,7 @@ static void test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge(v
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_purged_frames_never_come_out(void) {
+TEST(test_gateway_purged_frames_never_come_out) {
     drive_on();
     rig.bus.acknowledged = false;
     rig.bus.purge_result = 1;
@@ -114,7 +114,7 @@ static void test_gateway_purged_frames_never_come_out(void) {
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_gateway_zeros_without_power_are_taken_back_when_they_end(void) {
+TEST(test_gateway_zeros_without_power_are_taken_back_when_they_end) {
     cut_power_in_motion(1);
     TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.flights);
@@ -127,7 +127,7 @@ static void test_gateway_zeros_without_power_are_taken_back_when_they_end(void) 
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once(void) {
+TEST(test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once) {
     arm_in_vain(1);
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.flights);
@@ -136,7 +136,7 @@ static void test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-static void test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end(void) {
+TEST(test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end) {
     gateway_rig_begin(&rig, true);
     rig.bus.purge_result = 1;
     set_power(false);
@@ -147,7 +147,7 @@ static void test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end(v
     expect_silence_with_power();
 }
 
-static void test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they_last(void) {
+TEST(test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they_last) {
     gateway_rig_begin(&rig, true);
     set_power(false);
     gateway_rig_run(&rig, MS(1400));
@@ -155,7 +155,7 @@ static void test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed(void) {
+TEST(test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_run(&rig, MS(1100));
@@ -171,7 +171,7 @@ static void test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed(void) 
     expect_silence_with_power();
 }
 
-static void test_gateway_ordinary_stop_asks_nothing_back(void) {
+TEST(test_gateway_ordinary_stop_asks_nothing_back) {
     for (unsigned n = 0; n < 20U; n++) {
         setUp();
         rig.bus.echo_delay_us = MS(n);
@@ -199,7 +199,7 @@ static iw_time_us_t leave_young_zeros(void) {
     return sent_us + MS(rig.config.echo_ms);
 }
 
-static void test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_microsecond(void) {
+TEST(test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_microsecond) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_run(&rig, overdue_us - 1U - rig.now_us);
     gateway_rig_step(&rig);
@@ -209,7 +209,7 @@ static void test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_micr
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back(void) {
+TEST(test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_run(&rig, overdue_us - 1U - rig.now_us);
     rig.now_us = overdue_us;
@@ -220,13 +220,13 @@ static void test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back(void
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_setpoint_is_asked_back_in_a_late_step_too(void) {
+TEST(test_gateway_setpoint_is_asked_back_in_a_late_step_too) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_stall(&rig, overdue_us + MS(50) - rig.now_us);
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_heard_or_not(void) {
+TEST(test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_heard_or_not) {
     for (unsigned n = 0; n < 4U; n++) {
         setUp();
         arm_in_vain(0);
@@ -249,7 +249,7 @@ static void test_gateway_what_the_port_has_not_done_is_asked_back_every_second_w
     }
 }
 
-static void test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once(void) {
+TEST(test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once) {
     arm_in_vain(-1);
     TEST_ASSERT_TRUE(rig.gateway.left_behind);
     gateway_rig_run(&rig, MS(10000));
@@ -258,7 +258,7 @@ static void test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once(void
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.purges);
 }
 
-static void test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_for_again(void) {
+TEST(test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_for_again) {
     arm_in_vain(0);
     const iw_time_us_t again_us = rig.gateway.purged_us + IW_GATEWAY_LOST_ECHO_US;
     gateway_rig_run(&rig, again_us - 1U - rig.now_us);
@@ -270,7 +270,7 @@ static void test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.left_behind);
 }
 
-static void test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left(void) {
+TEST(test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left) {
     arm_in_vain(0);
     rig.bus.purge_result = 1;
     gateway_rig_run(&rig, MS(3000));
@@ -278,7 +278,7 @@ static void test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_le
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.left_behind);
 }
 
-static void test_gateway_silence_after_a_stop_is_asked_once_too(void) {
+TEST(test_gateway_silence_after_a_stop_is_asked_once_too) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     run_to_silence();
@@ -287,7 +287,7 @@ static void test_gateway_silence_after_a_stop_is_asked_once_too(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_setpoint_is_asked_back_within_the_first_second_of_time(void) {
+TEST(test_gateway_setpoint_is_asked_back_within_the_first_second_of_time) {
     const iw_hal_t hal = fake_bus_hal(&rig.bus);
     rig.now_us = rig.wake_us = rig.wheel[IW_LEFT].speed_us = rig.wheel[IW_RIGHT].speed_us = 1;
     rig.wheel[IW_LEFT].status_us = rig.wheel[IW_RIGHT].status_us = 1;
@@ -302,7 +302,7 @@ static void test_gateway_setpoint_is_asked_back_within_the_first_second_of_time(
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-static void test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port(void) {
+TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port) {
     for (unsigned n = 0; n < 3U; n++) {
         setUp();
         arm_in_vain(-1);
@@ -334,7 +334,7 @@ static void test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus
 }
 
 /// Each silence begins anew: what was asked in the last one, or in the zeros, is no answer for this one.
-static void test_gateway_next_silence_is_given_its_own_second(void) {
+TEST(test_gateway_next_silence_is_given_its_own_second) {
     arm_in_vain(0);
     rig.bus.acknowledged = true;
     gateway_rig_run(&rig, MS(100));
@@ -346,36 +346,11 @@ static void test_gateway_next_silence_is_given_its_own_second(void) {
     TEST_ASSERT_FALSE(rig.gateway.left_behind);
 }
 
-static void test_gateway_what_was_only_refused_is_not_asked_back(void) {
+TEST(test_gateway_what_was_only_refused_is_not_asked_back) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.send_result[IW_LEFT] = rig.bus.send_result[IW_RIGHT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     gateway_rig_run(&rig, MS(5000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.purges);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge);
-    RUN_TEST(test_gateway_purged_frames_never_come_out);
-    RUN_TEST(test_gateway_zeros_without_power_are_taken_back_when_they_end);
-    RUN_TEST(test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once);
-    RUN_TEST(test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end);
-    RUN_TEST(test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they_last);
-    RUN_TEST(test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed);
-    RUN_TEST(test_gateway_ordinary_stop_asks_nothing_back);
-    RUN_TEST(test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_microsecond);
-    RUN_TEST(test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back);
-    RUN_TEST(test_gateway_setpoint_is_asked_back_in_a_late_step_too);
-    RUN_TEST(test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_heard_or_not);
-    RUN_TEST(test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once);
-    RUN_TEST(test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_for_again);
-    RUN_TEST(test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left);
-    RUN_TEST(test_gateway_silence_after_a_stop_is_asked_once_too);
-    RUN_TEST(test_gateway_setpoint_is_asked_back_within_the_first_second_of_time);
-    RUN_TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port);
-    RUN_TEST(test_gateway_next_silence_is_given_its_own_second);
-    RUN_TEST(test_gateway_what_was_only_refused_is_not_asked_back);
-    return UNITY_END();
 }

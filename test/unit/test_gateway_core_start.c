@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // From init to ARMED: silence, the arming pair and its echo, listen-only, the beginning after a crash.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static gateway_rig_t rig;
@@ -27,7 +27,7 @@ static void drive_on(void) {
     TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-static void test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched(void) {
+TEST(test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched) {
     static uint8_t poison[sizeof(iw_gateway_t)];
     const iw_hal_t hal = fake_bus_hal(&rig.bus);
     memset(&rig.gateway, FIXTURE_POISON, sizeof rig.gateway);
@@ -37,20 +37,20 @@ static void test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouch
     TEST_ASSERT_EQUAL_MEMORY(poison, &rig.gateway, sizeof poison);
 }
 
-static void test_gateway_listening_sends_nothing(void) {
+TEST(test_gateway_listening_sends_nothing) {
     gateway_rig_run(&rig, MS(3000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent + rig.bus.refused);
     TEST_ASSERT_TRUE(rig.gateway.counters.received > 1400);
 }
 
-static void test_gateway_copies_its_configuration(void) {
+TEST(test_gateway_copies_its_configuration) {
     rig.config.listen_only = true;
     rig.config.max_speed_mm_s = 10;
     drive_on();
 }
 
-static void test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo(void) {
+TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo) {
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
@@ -67,7 +67,7 @@ static void test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo(
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_arm_needs_both_echoes(void) {
+TEST(test_gateway_arm_needs_both_echoes) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.send_result[IW_RIGHT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -77,7 +77,7 @@ static void test_gateway_arm_needs_both_echoes(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
 }
 
-static void test_gateway_arm_without_echo_is_send_stalled_and_silent_again(void) {
+TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
@@ -94,7 +94,7 @@ static void test_gateway_arm_without_echo_is_send_stalled_and_silent_again(void)
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-static void test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused(void) {
+TEST(test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     rig.bus.send_result[IW_RIGHT] = 0;
@@ -107,7 +107,7 @@ static void test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused(void) {
     TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
 }
 
-static void test_gateway_listen_only_never_sends(void) {
+TEST(test_gateway_listen_only_never_sends) {
     rig.config.listen_only = true;
     for (int restarted = 0; restarted < 2; restarted++) {
         gateway_rig_begin(&rig, restarted != 0);
@@ -122,7 +122,7 @@ static void test_gateway_listen_only_never_sends(void) {
     }
 }
 
-static void test_gateway_restarted_sends_zeros_then_listens(void) {
+TEST(test_gateway_restarted_sends_zeros_then_listens) {
     gateway_rig_begin(&rig, true);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
@@ -135,7 +135,7 @@ static void test_gateway_restarted_sends_zeros_then_listens(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
 }
 
-static void test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms(void) {
+TEST(test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms) {
     rig.config.track_mm = 0;
     gateway_rig_begin(&rig, true);
     rig.wheel[IW_LEFT].rpm_fixed = true;
@@ -152,7 +152,7 @@ static void test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_
     TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
 }
 
-static void test_gateway_restarted_gives_way_to_another_master(void) {
+TEST(test_gateway_restarted_gives_way_to_another_master) {
     gateway_rig_begin(&rig, true);
     gateway_rig_run(&rig, MS(10));
     for (unsigned i = 0; i < 4; i++) {
@@ -168,27 +168,10 @@ static void test_gateway_restarted_gives_way_to_another_master(void) {
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
 }
 
-static void test_gateway_restarted_without_type_sends_nothing(void) {
+TEST(test_gateway_restarted_without_type_sends_nothing) {
     rig.config.setpoint_type_set = false;
     gateway_rig_begin(&rig, true);
     gateway_rig_run(&rig, MS(2000));
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent + rig.bus.refused);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched);
-    RUN_TEST(test_gateway_listening_sends_nothing);
-    RUN_TEST(test_gateway_copies_its_configuration);
-    RUN_TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo);
-    RUN_TEST(test_gateway_arm_needs_both_echoes);
-    RUN_TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again);
-    RUN_TEST(test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused);
-    RUN_TEST(test_gateway_listen_only_never_sends);
-    RUN_TEST(test_gateway_restarted_sends_zeros_then_listens);
-    RUN_TEST(test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms);
-    RUN_TEST(test_gateway_restarted_gives_way_to_another_master);
-    RUN_TEST(test_gateway_restarted_without_type_sends_nothing);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A gateway in the hands of chance: clients, buttons, faults and delays at random, and the invariants judged after each step.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 static fixture_random_t chance;
@@ -17,8 +17,6 @@ typedef struct {
 void setUp(void) {
     gateway_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 static iw_client_t any_client(void) {
     return (fixture_random_in(&chance, 0, 3) == 0) ? OTHER : HOLDER;
@@ -173,17 +171,17 @@ static void walk(uint32_t seed, uint32_t steps) {
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, rig.gateway.sender.envelope.stopped, "the gate had to stop a frame");
 }
 
-static void test_gateway_walk_with_current_limit_keeps_the_invariants(void) {
+TEST(test_gateway_walk_with_current_limit_keeps_the_invariants) {
     walk(1, 250000);
 }
 
-static void test_gateway_walk_with_current_setpoint_keeps_the_invariants(void) {
+TEST(test_gateway_walk_with_current_setpoint_keeps_the_invariants) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
     walk(2, 250000);
 }
 
-static void test_gateway_walk_with_odd_configurations_keeps_the_invariants(void) {
+TEST(test_gateway_walk_with_odd_configurations_keeps_the_invariants) {
     rig.config.invert[IW_LEFT] = true;
     rig.config.invert[IW_RIGHT] = true;
     rig.config.period_ms = 7;
@@ -200,12 +198,4 @@ static void test_gateway_walk_with_odd_configurations_keeps_the_invariants(void)
     rig.config.decel_mm_s2 = 5000;
     gateway_rig_begin(&rig, true);
     walk(4, 250000);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_walk_with_current_limit_keeps_the_invariants);
-    RUN_TEST(test_gateway_walk_with_current_setpoint_keeps_the_invariants);
-    RUN_TEST(test_gateway_walk_with_odd_configurations_keeps_the_invariants);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // Yaw in the whole gateway: what a client is answered, what leaves, and that no stop out of a turn is held up.
 #include "gateway_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 static gateway_rig_t rig;
 
@@ -27,7 +27,7 @@ static void assert_applied(int32_t left_mm_s, int32_t right_mm_s, bool limited, 
     TEST_ASSERT_EQUAL_INT(limited, applied->limited);
 }
 
-static void test_gateway_turn_is_limited_first_by_yaw_then_by_speed(void) {
+TEST(test_gateway_turn_is_limited_first_by_yaw_then_by_speed) {
     gateway_rig_arm(&rig);
     iw_applied_t applied = ask(-270, 270);
     assert_applied(-270, 270, false, &applied);
@@ -43,7 +43,7 @@ static void test_gateway_turn_is_limited_first_by_yaw_then_by_speed(void) {
     assert_applied(269, -270, true, &applied);
 }
 
-static void test_gateway_yaw_of_another_radius_is_that_of_the_machine(void) {
+TEST(test_gateway_yaw_of_another_radius_is_that_of_the_machine) {
     static const struct {
         uint16_t radius_mm;
         int16_t most_mm_s;
@@ -76,7 +76,7 @@ static void assert_stands_without_internal(void) {
 }
 
 /// At every phase: of the ramp into the pivot, within the period, and once it is reached.
-static void test_gateway_stop_out_of_the_sharpest_pivot_is_no_internal(void) {
+TEST(test_gateway_stop_out_of_the_sharpest_pivot_is_no_internal) {
     for (uint32_t ms = 100; ms <= 900U; ms += 50U) {
         for (uint32_t phase_us = 0; phase_us < 20000U; phase_us += 1700U) {
             pivot((ms / 50U) % 2U == 0U, MS(ms));
@@ -89,14 +89,14 @@ static void test_gateway_stop_out_of_the_sharpest_pivot_is_no_internal(void) {
     }
 }
 
-static void test_gateway_zero_command_in_a_pivot_takes_the_ramp_alone(void) {
+TEST(test_gateway_zero_command_in_a_pivot_takes_the_ramp_alone) {
     pivot(true, MS(900));
     TEST_ASSERT_EQUAL_INT(-270, gateway_rig_look(&rig).applied.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 0, 0, MS(250)));
     assert_stands_without_internal();
 }
 
-static void test_gateway_pivot_turned_round_passes_the_envelope(void) {
+TEST(test_gateway_pivot_turned_round_passes_the_envelope) {
     pivot(false, MS(900));
     for (unsigned i = 0; i < 8U; i++) {
         const int32_t speed = (i % 2U == 0U) ? 1000 : -1000;
@@ -108,7 +108,7 @@ static void test_gateway_pivot_turned_round_passes_the_envelope(void) {
 }
 
 /// Scheduler and envelope disagree: what the scheduler forgets the envelope stops, with zeros in the same step.
-static void test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope(void) {
+TEST(test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope) {
     gateway_rig_arm(&rig);
     rig.gateway.setpoint.yaw.most_mm_s = 2000;
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1080;
@@ -119,23 +119,11 @@ static void test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope(voi
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-static void test_gateway_yaw_that_grows_too_soon_is_stopped_by_the_envelope(void) {
+TEST(test_gateway_yaw_that_grows_too_soon_is_stopped_by_the_envelope) {
     gateway_rig_arm(&rig);
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1600;
     (void)gateway_rig_cruise(&rig, -200, 200, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_YAW, rig.gateway.permit.stop.detail);
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_turn_is_limited_first_by_yaw_then_by_speed);
-    RUN_TEST(test_gateway_yaw_of_another_radius_is_that_of_the_machine);
-    RUN_TEST(test_gateway_stop_out_of_the_sharpest_pivot_is_no_internal);
-    RUN_TEST(test_gateway_zero_command_in_a_pivot_takes_the_ramp_alone);
-    RUN_TEST(test_gateway_pivot_turned_round_passes_the_envelope);
-    RUN_TEST(test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope);
-    RUN_TEST(test_gateway_yaw_that_grows_too_soon_is_stopped_by_the_envelope);
-    return UNITY_END();
 }

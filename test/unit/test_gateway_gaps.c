@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "wheels/wheels.h"
 
+#include "unit.h"
 #include <string.h>
-#include <unity.h>
 
 static gw_gaps_t gaps;
 static iw_sent_t sent;
@@ -12,28 +12,26 @@ void setUp(void) {
     memset(&sent, 0, sizeof sent);
 }
 
-void tearDown(void) {}
-
 static void pair_after(uint32_t gap_us) {
     sent.pairs++;
     sent.gap_us = gap_us;
     gw_gaps_note(&gaps, &sent);
 }
 
-static void test_first_pair_after_silence_is_no_gap(void) {
+TEST(test_first_pair_after_silence_is_no_gap) {
     pair_after(0U);
     TEST_ASSERT_EACH_EQUAL_UINT32(0U, gaps.count, GW_GAP_BUCKETS);
     TEST_ASSERT_EQUAL_UINT32(0U, gaps.worst_us);
 }
 
-static void test_step_that_sends_nothing_counts_nothing_twice(void) {
+TEST(test_step_that_sends_nothing_counts_nothing_twice) {
     pair_after(20000U);
     gw_gaps_note(&gaps, &sent);
     gw_gaps_note(&gaps, &sent);
     TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[3]);
 }
 
-static void test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass(void) {
+TEST(test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass) {
     pair_after(1U);
     pair_after(5000U);
     pair_after(5001U);
@@ -45,14 +43,14 @@ static void test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass(void) {
     TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[GW_GAP_BUCKETS - 1U]);
 }
 
-static void test_worst_is_kept_over_silence(void) {
+TEST(test_worst_is_kept_over_silence) {
     pair_after(61000U);
     pair_after(0U);
     pair_after(20000U);
     TEST_ASSERT_EQUAL_UINT32(61000U, gaps.worst_us);
 }
 
-static void test_written_as_limits_counts_and_worst(void) {
+TEST(test_written_as_limits_counts_and_worst) {
     char line[256];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
@@ -63,14 +61,4 @@ static void test_written_as_limits_counts_and_worst(void) {
     (void)iwn_out_finish(&json);
     TEST_ASSERT_NOT_NULL(strstr(line, "\"limits_ms\":[5,10,15,20,25,30,40,50,100],\"count\":[0,0,0,1,0,0,0,0,0,0],"
                                       "\"worst_us\":20000"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_first_pair_after_silence_is_no_gap);
-    RUN_TEST(test_step_that_sends_nothing_counts_nothing_twice);
-    RUN_TEST(test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass);
-    RUN_TEST(test_worst_is_kept_over_silence);
-    RUN_TEST(test_written_as_limits_counts_and_worst);
-    return UNITY_END();
 }

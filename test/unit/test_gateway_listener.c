@@ -5,7 +5,7 @@
 #include "config/gateway_config.h"
 #include "sockets/log.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <fcntl.h>
 #include <grp.h>
@@ -95,13 +95,13 @@ static bool is_root(void) {
     return geteuid() == 0;
 }
 
-static void test_folder_of_our_own_is_used_without_a_word(void) {
+TEST(test_folder_of_our_own_is_used_without_a_word) {
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_STRING("", said);
 }
 
-static void test_folder_that_others_may_write_to_is_refused_with_the_cure(void) {
+TEST(test_folder_that_others_may_write_to_is_refused_with_the_cure) {
     static const mode_t modes[] = {0777, 0775, 0757, 0770};
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
@@ -109,7 +109,7 @@ static void test_folder_that_others_may_write_to_is_refused_with_the_cure(void) 
     }
 }
 
-static void test_folder_like_tmp_is_used_with_a_warning(void) {
+TEST(test_folder_like_tmp_is_used_with_a_warning) {
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
     TEST_ASSERT_EQUAL_INT(0, prepare());
     assert_said("warning");
@@ -117,7 +117,7 @@ static void test_folder_like_tmp_is_used_with_a_warning(void) {
     TEST_ASSERT_EQUAL_INT(0, make());
 }
 
-static void test_folder_of_another_user_is_refused_with_the_cure(void) {
+TEST(test_folder_of_another_user_is_refused_with_the_cure) {
     if (!is_root()) {
         return;
     }
@@ -129,7 +129,7 @@ static void test_folder_of_another_user_is_refused_with_the_cure(void) {
     }
 }
 
-static void test_folder_behind_a_symbolic_link_is_refused(void) {
+TEST(test_folder_behind_a_symbolic_link_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, symlink(".", in_folder("link")));
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/link/gateway.sock", folder);
     refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
@@ -137,7 +137,7 @@ static void test_folder_behind_a_symbolic_link_is_refused(void) {
     refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
 }
 
-static void test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing(void) {
+TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing) {
     char aside[80];
     struct stat status;
     (void)snprintf(aside, sizeof aside, "%s/kept", folder);
@@ -154,7 +154,7 @@ static void test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothin
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
 }
 
-static void test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood(void) {
+TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood) {
     char before[256];
     char after[256];
     struct stat status;
@@ -175,7 +175,7 @@ static void test_socket_has_its_mode_and_group_and_the_process_stands_where_it_s
     assert_logged("");
 }
 
-static void test_group_that_cannot_have_the_socket_is_told_with_the_reason(void) {
+TEST(test_group_that_cannot_have_the_socket_is_told_with_the_reason) {
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "no-such-group");
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
@@ -192,7 +192,7 @@ static int put_socket(bool answers) {
     return answers ? fd : -1;
 }
 
-static void test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not(void) {
+TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not) {
     (void)put_socket(false);
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
@@ -204,7 +204,7 @@ static void test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is
     (void)close(fd);
 }
 
-static void test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers(void) {
+TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers) {
     if (!is_root()) {
         return;
     }
@@ -216,7 +216,7 @@ static void test_socket_of_a_stranger_does_not_keep_root_from_starting_although_
     (void)close(fd);
 }
 
-static void test_link_and_plain_file_at_its_place_are_left_alone(void) {
+TEST(test_link_and_plain_file_at_its_place_are_left_alone) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, symlink("elsewhere", in_folder("gateway.sock")));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
@@ -230,28 +230,11 @@ static void test_link_and_plain_file_at_its_place_are_left_alone(void) {
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
 }
 
-static void test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end(void) {
+TEST(test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
     TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(said, folder), "/moved")));
     (void)put_socket(false);
     sock_listener_close(&listener);
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_folder_of_our_own_is_used_without_a_word);
-    RUN_TEST(test_folder_that_others_may_write_to_is_refused_with_the_cure);
-    RUN_TEST(test_folder_like_tmp_is_used_with_a_warning);
-    RUN_TEST(test_folder_of_another_user_is_refused_with_the_cure);
-    RUN_TEST(test_folder_behind_a_symbolic_link_is_refused);
-    RUN_TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing);
-    RUN_TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood);
-    RUN_TEST(test_group_that_cannot_have_the_socket_is_told_with_the_reason);
-    RUN_TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not);
-    RUN_TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers);
-    RUN_TEST(test_link_and_plain_file_at_its_place_are_left_alone);
-    RUN_TEST(test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end);
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 #include "sockets/log.h"
 #include "start/start_report.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -40,7 +40,7 @@ static void assert_line(const char *line) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(written(), line), line);
 }
 
-static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
+TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
     (void)snprintf(config.bus.interface, sizeof config.bus.interface, "can7");
     (void)snprintf(config.estop.line, sizeof config.estop.line, "gpiochip0/17");
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "/run/drive.sock");
@@ -69,7 +69,7 @@ static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
 }
 
 /// A narrower track turns further; a slow machine does not brake but settles, and its quarter may not even be noticed.
-static void test_log_at_start_reckons_angles_with_track_and_speed(void) {
+TEST(test_log_at_start_reckons_angles_with_track_and_speed) {
     config.core.track_mm = 270;
     gw_report_start(&config, false, false, &people);
     assert_line("running on 212.2 degrees a second;");
@@ -83,7 +83,7 @@ static void test_log_at_start_reckons_angles_with_track_and_speed(void) {
 }
 
 /// Nothing is reckoned with a track that nobody told.
-static void test_log_at_start_without_a_track_warns_and_has_no_angle(void) {
+TEST(test_log_at_start_without_a_track_warns_and_has_no_angle) {
     config.core.track_mm = 0;
     gw_report_start(&config, false, false, &people);
     assert_line("iwheel-gateway: warning: track_mm is not configured: arm will be refused; set it under [wheels] "
@@ -91,7 +91,7 @@ static void test_log_at_start_without_a_track_warns_and_has_no_angle(void) {
     TEST_ASSERT_NULL(strstr(written(), "angle"));
 }
 
-static void test_log_at_start_is_silent_of_what_is_not(void) {
+TEST(test_log_at_start_is_silent_of_what_is_not) {
     config.core.setpoint_type_set = true;
     config.core.current_role = IW_ROLE_LIMIT;
     config.core.listen_only = true;
@@ -102,7 +102,7 @@ static void test_log_at_start_is_silent_of_what_is_not(void) {
     TEST_ASSERT_NULL(strstr(written(), "warning"));
 }
 
-static void test_log_passes_a_burst_and_tells_how_many_lines_it_dropped(void) {
+TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped) {
     for (unsigned i = 0; i < 45U; i++) {
         sock_log(&people, SOCK_LOG_WARNING, "line %u", i);
     }
@@ -113,7 +113,7 @@ static void test_log_passes_a_burst_and_tells_how_many_lines_it_dropped(void) {
     assert_line("iwheel-gateway: error: (5 lines dropped before this one) last\n");
 }
 
-static void test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain(void) {
+TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain) {
     sock_log(&people, SOCK_LOG_DEBUG, "below");
     sock_log(&people, SOCK_LOG_INFO, "two\nlines \033[1m");
     TEST_ASSERT_NULL(strstr(written(), "below"));
@@ -123,15 +123,4 @@ static void test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain(vo
     TEST_ASSERT_TRUE(sock_log_level_of("debug", &level));
     TEST_ASSERT_EQUAL_INT(SOCK_LOG_DEBUG, level);
     TEST_ASSERT_FALSE(sock_log_level_of("loud", &level));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget);
-    RUN_TEST(test_log_at_start_reckons_angles_with_track_and_speed);
-    RUN_TEST(test_log_at_start_without_a_track_warns_and_has_no_angle);
-    RUN_TEST(test_log_at_start_is_silent_of_what_is_not);
-    RUN_TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped);
-    RUN_TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Wheels of another radius than the 192 mm that their firmware assumes: setpoints pass unchanged, and what is measured is compared
 // with them in their own unit. The simulator's wheels turn as the firmware commands; their real radius follows the configuration.
-#include "unity.h"
+#include "unit.h"
 #include "world_rig.h"
 
 #include <string.h>
@@ -10,9 +10,6 @@ static const uint16_t radii[] = {60, 192, 250, 400};
 #define RADII (sizeof radii / sizeof radii[0])
 
 static world_rig_t rig;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void begin(uint16_t radius_mm) {
     memset(&rig, FIXTURE_POISON, sizeof rig);
@@ -32,7 +29,7 @@ static void assert_armed(uint16_t radius_mm) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, iw_gateway_state(&rig.gateway), what);
 }
 
-static void test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence(void) {
+TEST(test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence) {
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
         world_rig_drive(&rig, 1000, 1000, 5000);
@@ -45,7 +42,7 @@ static void test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence(voi
     }
 }
 
-static void test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel(void) {
+TEST(test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel) {
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
         world_rig_drive(&rig, 800, 800, 5000);
@@ -55,7 +52,7 @@ static void test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel(void) {
 }
 
 /// A limit of 60 mm in the unit of setpoints is reached after the same time, whatever the radius.
-static void test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel(void) {
+TEST(test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel) {
     iw_time_us_t took_us[RADII];
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
@@ -75,7 +72,7 @@ static void test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wh
 }
 
 /// One rpm is 42 mm/s at 400 mm, and 6 at 60: rest is by rpm, and arm waits for the same real speed.
-static void test_gateway_radius_rest_is_a_speed_at_the_wheel(void) {
+TEST(test_gateway_radius_rest_is_a_speed_at_the_wheel) {
     static const struct {
         uint16_t radius_mm;
         int16_t at_rest_rpm;
@@ -92,13 +89,4 @@ static void test_gateway_radius_rest_is_a_speed_at_the_wheel(void) {
         TEST_ASSERT_EQUAL_UINT32(0, iw_wheel_rest_us(wheel, rig.now_us + 1U));
         TEST_ASSERT_GREATER_THAN_INT32(45, wheel->speed_mm_s);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence);
-    RUN_TEST(test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel);
-    RUN_TEST(test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel);
-    RUN_TEST(test_gateway_radius_rest_is_a_speed_at_the_wheel);
-    return UNITY_END();
 }

@@ -5,6 +5,7 @@
 
 #include "iwheel_northbound/line.h"
 
+#include "unit.h"
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -13,7 +14,6 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <unity.h>
 
 #define LOG "stop-000001-estop_line.log"
 
@@ -105,13 +105,13 @@ static size_t decode(uint8_t out[GW_BOX_PIECE]) {
     return length;
 }
 
-static void test_crc_is_that_of_zlib(void) {
+TEST(test_crc_is_that_of_zlib) {
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(0, "123456789", 9));
     const uint32_t first = iwn_line_crc(0, "1234", 4);
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(first, "56789", 5));
 }
 
-static void test_only_names_of_the_writer_are_known(void) {
+TEST(test_only_names_of_the_writer_are_known) {
     static const char *const good[] = {LOG, "stop-000017-wheel_lost.jsonl", "stop-4294967295-gateway_died.conf",
                                        "stop-123456-abcdefghijklmnopqrstuvwxyz_abcd.jsonl"};
     static const char *const bad[] = {"",
@@ -159,7 +159,7 @@ static void test_only_names_of_the_writer_are_known(void) {
     }
 }
 
-static void test_links_pipes_and_folders_are_not_read(void) {
+TEST(test_links_pipes_and_folders_are_not_read) {
     make("secret", 0, 10);
     TEST_ASSERT_EQUAL(0, symlink("secret", path_of("stop-000001-a.log")));
     TEST_ASSERT_EQUAL(IWN_DENIED, ask("stop-000001-a.log", 0));
@@ -174,7 +174,7 @@ static void test_links_pipes_and_folders_are_not_read(void) {
     TEST_ASSERT_EQUAL(IWN_DENIED, ask("stop-000004-a.log", 0));
 }
 
-static void test_directory_that_is_a_link_or_everybodys_is_not_read(void) {
+TEST(test_directory_that_is_a_link_or_everybodys_is_not_read) {
     char elsewhere[80];
     make(LOG, 0, 10);
     TEST_ASSERT_EQUAL(0, chmod(directory, 0777));
@@ -187,7 +187,7 @@ static void test_directory_that_is_a_link_or_everybodys_is_not_read(void) {
     TEST_ASSERT_EQUAL(IWN_DENIED, ask(LOG, 0));
 }
 
-static void test_pieces_make_the_file_whatever_its_length(void) {
+TEST(test_pieces_make_the_file_whatever_its_length) {
     static const size_t sizes[] = {
         0, 1, 2, 3, 4, GW_BOX_PIECE - 1U, GW_BOX_PIECE, GW_BOX_PIECE + 1U, 3U * GW_BOX_PIECE + 2U};
     static uint8_t piece[GW_BOX_PIECE];
@@ -217,7 +217,7 @@ static void test_pieces_make_the_file_whatever_its_length(void) {
     }
 }
 
-static void test_offset_at_the_end_is_empty_and_one_outside_is_refused(void) {
+TEST(test_offset_at_the_end_is_empty_and_one_outside_is_refused) {
     make(LOG, 0, 100);
     TEST_ASSERT_EQUAL(IWN_OK, ask(LOG, 100));
     assert_says("\"data\":\"\",\"crc32\":0,\"file_crc32\":");
@@ -228,7 +228,7 @@ static void test_offset_at_the_end_is_empty_and_one_outside_is_refused(void) {
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, INT64_MIN));
 }
 
-static void test_file_that_grows_or_goes_between_pieces_is_told(void) {
+TEST(test_file_that_grows_or_goes_between_pieces_is_told) {
     make(LOG, 0, 10);
     TEST_ASSERT_EQUAL(IWN_OK, ask(LOG, 10));
     make(LOG, 10, 25);
@@ -244,7 +244,7 @@ static void test_file_that_grows_or_goes_between_pieces_is_told(void) {
     assert_says("is not there");
 }
 
-static void test_list_has_recordings_only_the_oldest_first(void) {
+TEST(test_list_has_recordings_only_the_oldest_first) {
     TEST_ASSERT_EQUAL_STRING("\"recordings\":[]", list());
     make("stop-000010-wheel_lost.log", 0, 30);
     make("stop-000010-wheel_lost.jsonl", 0, 20);
@@ -264,7 +264,7 @@ static void test_list_has_recordings_only_the_oldest_first(void) {
     TEST_ASSERT_NULL(strstr(answer.text, "000011"));
 }
 
-static void test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line(void) {
+TEST(test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line) {
     for (unsigned i = 1; i <= 3U * GW_BOX_LISTED; i++) {
         char name[GW_BOX_CAUSE_SIZE + 40U];
         (void)snprintf(name, sizeof name, "stop-%010u-abcdefghijklmnopqrstuvwxyz_abcd.jsonl", i);
@@ -288,7 +288,7 @@ static void open_box(uint16_t seconds) {
     TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_config_t){.blackbox_s = seconds, .directory = directory}));
 }
 
-static void test_refusal_after_a_longer_answer_ends_where_it_should(void) {
+TEST(test_refusal_after_a_longer_answer_ends_where_it_should) {
     const gw_box_question_t piece = {.client = 9, .name = LOG};
     const gw_box_question_t missing = {.client = 8, .name = "stop-000099-x.log"};
     make(LOG, 0, 3U * GW_BOX_PIECE);
@@ -302,7 +302,7 @@ static void test_refusal_after_a_longer_answer_ends_where_it_should(void) {
     gw_box_close(&box);
 }
 
-static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
+TEST(test_process_answers_and_one_that_is_frozen_holds_up_nobody) {
     const gw_box_question_t question = {.client = 9, .name = LOG};
     make(LOG, 0, 3U * GW_BOX_PIECE);
     open_box(2);
@@ -327,28 +327,11 @@ static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
     gw_box_close(&box);
 }
 
-static void test_without_recordings_there_is_no_process(void) {
+TEST(test_without_recordings_there_is_no_process) {
     const gw_box_question_t question = {.client = 9, .list = true};
     open_box(0);
     TEST_ASSERT_EQUAL(-1, box.reader.fd);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question));
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_receive(&box));
     gw_box_close(&box);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_crc_is_that_of_zlib);
-    RUN_TEST(test_only_names_of_the_writer_are_known);
-    RUN_TEST(test_links_pipes_and_folders_are_not_read);
-    RUN_TEST(test_directory_that_is_a_link_or_everybodys_is_not_read);
-    RUN_TEST(test_pieces_make_the_file_whatever_its_length);
-    RUN_TEST(test_offset_at_the_end_is_empty_and_one_outside_is_refused);
-    RUN_TEST(test_file_that_grows_or_goes_between_pieces_is_told);
-    RUN_TEST(test_list_has_recordings_only_the_oldest_first);
-    RUN_TEST(test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line);
-    RUN_TEST(test_refusal_after_a_longer_answer_ends_where_it_should);
-    RUN_TEST(test_process_answers_and_one_that_is_frozen_holds_up_nobody);
-    RUN_TEST(test_without_recordings_there_is_no_process);
-    return UNITY_END();
 }

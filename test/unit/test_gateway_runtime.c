@@ -4,7 +4,7 @@
 
 #include "config/gateway_config.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -98,7 +98,7 @@ void tearDown(void) {
     remove_top();
 }
 
-static void test_second_gateway_on_interface_with_socket_elsewhere_is_refused(void) {
+TEST(test_second_gateway_on_interface_with_socket_elsewhere_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
@@ -106,7 +106,7 @@ static void test_second_gateway_on_interface_with_socket_elsewhere_is_refused(vo
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "sends nothing"), said);
 }
 
-static void test_lock_of_interface_is_free_after_close_and_after_death(void) {
+TEST(test_lock_of_interface_is_free_after_close_and_after_death) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     gw_runtime_close(&first);
     const pid_t process = fork();
@@ -119,20 +119,20 @@ static void test_lock_of_interface_is_free_after_close_and_after_death(void) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
 }
 
-static void test_many_who_ask_leave_the_lock_where_it_is(void) {
+TEST(test_many_who_ask_leave_the_lock_where_it_is) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     for (int i = 0; i < 500; i++) {
         TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     }
 }
 
-static void test_other_interface_is_free(void) {
+TEST(test_other_interface_is_free) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     (void)snprintf(other.bus.interface, sizeof other.bus.interface, "%.12sx", interface());
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&second, &other));
 }
 
-static void test_second_gateway_on_local_bus_is_refused(void) {
+TEST(test_second_gateway_on_local_bus_is_refused) {
     char bus[64];
     (void)snprintf(bus, sizeof bus, "unix:%s/bus", top);
     configure(&one, bus, "one");
@@ -153,7 +153,7 @@ static void crash_while_sending(const gateway_config_t *config) {
     gw_runtime_close(&first);
 }
 
-static void test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere(void) {
+TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere) {
     crash_while_sending(&one);
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&second, &other));
     TEST_ASSERT_TRUE(gw_runtime_crashed(&second));
@@ -163,7 +163,7 @@ static void test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere(v
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
 }
 
-static void test_marker_without_right_to_the_shared_directory_lies_beside_the_socket(void) {
+TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket) {
     FILE *in_the_way = fopen(shared, "w"); // Keeps root out too.
     TEST_ASSERT_NOT_NULL(in_the_way);
     (void)fclose(in_the_way);
@@ -177,7 +177,7 @@ static void test_marker_without_right_to_the_shared_directory_lies_beside_the_so
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
 }
 
-static void test_marker_that_cannot_be_set_or_removed_is_told_with_its_path(void) {
+TEST(test_marker_that_cannot_be_set_or_removed_is_told_with_its_path) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     // A directory can neither be opened for writing nor unlinked, not even by root.
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[0], 0755));
@@ -191,7 +191,7 @@ static void test_marker_that_cannot_be_set_or_removed_is_told_with_its_path(void
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
 }
 
-static void test_marker_that_could_be_removed_in_one_place_only_is_set_anew(void) {
+TEST(test_marker_that_could_be_removed_in_one_place_only_is_set_anew) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
@@ -268,7 +268,7 @@ static bool is_root(void) {
     return geteuid() == 0;
 }
 
-static void test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named(void) {
+TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named) {
     if (!is_root()) {
         return;
     }
@@ -279,7 +279,7 @@ static void test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
-static void test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told(void) {
+TEST(test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told) {
     if (!is_root()) {
         return;
     }
@@ -291,7 +291,7 @@ static void test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_tol
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
-static void test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file(void) {
+TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file) {
     if (!is_root()) {
         return;
     }
@@ -308,7 +308,7 @@ static void spoil_shared(void) {
     (void)fclose(in_the_way);
 }
 
-static void test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first(void) {
+TEST(test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first) {
     if (!is_root()) {
         return;
     }
@@ -322,7 +322,7 @@ static void test_lock_without_its_file_excludes_by_name_although_a_stranger_hold
     assert_said_pid(getpid());
 }
 
-static void test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone(void) {
+TEST(test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone) {
     if (!is_root()) {
         return;
     }
@@ -339,7 +339,7 @@ static int hold_file(void) {
     return (fd >= 0) ? flock(fd, LOCK_EX | LOCK_NB) : -1;
 }
 
-static void test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes(void) {
+TEST(test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes) {
     char bus[64];
     if (!is_root()) {
         return;
@@ -362,7 +362,7 @@ static int open_second(void) {
     return open_runtime(&second, &other);
 }
 
-static void test_lock_held_by_root_keeps_out_the_service_and_everybody_else(void) {
+TEST(test_lock_held_by_root_keeps_out_the_service_and_everybody_else) {
     if (!is_root()) {
         return;
     }
@@ -374,7 +374,7 @@ static void test_lock_held_by_root_keeps_out_the_service_and_everybody_else(void
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, in_process_of(STRANGER, open_second));
 }
 
-static void test_lock_held_by_the_service_keeps_out_root_and_everybody_else(void) {
+TEST(test_lock_held_by_the_service_keeps_out_root_and_everybody_else) {
     if (!is_root()) {
         return;
     }
@@ -410,7 +410,7 @@ static int open_and_tend(void) {
     return (read(told[0], &byte, 1) == 1) ? result : -1;
 }
 
-static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up(void) {
+TEST(test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up) {
     gw_holder_t holder = {0};
     if (!is_root()) {
         return;
@@ -473,7 +473,7 @@ static int how_many_run(void) {
     return running;
 }
 
-static void test_lock_of_several_that_start_in_the_same_moment_goes_to_one(void) {
+TEST(test_lock_of_several_that_start_in_the_same_moment_goes_to_one) {
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
@@ -487,7 +487,7 @@ static void test_lock_of_several_that_start_in_the_same_moment_goes_to_one(void)
 
 // Markers -------------------------------------------------------------------------------------------------------------
 
-static void test_marker_of_a_stranger_is_none_and_is_not_used(void) {
+TEST(test_marker_of_a_stranger_is_none_and_is_not_used) {
     struct stat status;
     if (!is_root()) {
         return;
@@ -504,29 +504,4 @@ static void test_marker_of_a_stranger_is_none_and_is_not_used(void) {
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, lstat(first.marker_path, &status));
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "he could take his own away again");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_second_gateway_on_interface_with_socket_elsewhere_is_refused);
-    RUN_TEST(test_lock_of_interface_is_free_after_close_and_after_death);
-    RUN_TEST(test_many_who_ask_leave_the_lock_where_it_is);
-    RUN_TEST(test_other_interface_is_free);
-    RUN_TEST(test_second_gateway_on_local_bus_is_refused);
-    RUN_TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere);
-    RUN_TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket);
-    RUN_TEST(test_marker_that_cannot_be_set_or_removed_is_told_with_its_path);
-    RUN_TEST(test_marker_that_could_be_removed_in_one_place_only_is_set_anew);
-    RUN_TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named);
-    RUN_TEST(test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told);
-    RUN_TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file);
-    RUN_TEST(test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first);
-    RUN_TEST(test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone);
-    RUN_TEST(test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes);
-    RUN_TEST(test_lock_held_by_root_keeps_out_the_service_and_everybody_else);
-    RUN_TEST(test_lock_held_by_the_service_keeps_out_root_and_everybody_else);
-    RUN_TEST(test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up);
-    RUN_TEST(test_lock_of_several_that_start_in_the_same_moment_goes_to_one);
-    RUN_TEST(test_marker_of_a_stranger_is_none_and_is_not_used);
-    return UNITY_END();
 }

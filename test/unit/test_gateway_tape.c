@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "wheels/tape.h"
 
+#include "unit.h"
 #include <stdlib.h>
 #include <string.h>
-#include <unity.h>
 
 static blackbox_ring_t *ring;
 static gw_tape_t tape;
@@ -87,7 +87,7 @@ static void expect_kinds(const uint8_t *kinds, size_t expected) {
     }
 }
 
-static void test_answers_are_noted_first_and_when_they_change(void) {
+TEST(test_answers_are_noted_first_and_when_they_change) {
     const uint8_t kinds[] = {BLACKBOX_ESTOP, BLACKBOX_BUS,  BLACKBOX_STEP, BLACKBOX_STEP,
                              BLACKBOX_ESTOP, BLACKBOX_STEP, BLACKBOX_BUS,  BLACKBOX_STEP};
     step(1);
@@ -102,7 +102,7 @@ static void test_answers_are_noted_first_and_when_they_change(void) {
     TEST_ASSERT_EQUAL_UINT64(4, entries[7].at_us);
 }
 
-static void test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus(void) {
+TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     const uint8_t kinds[] = {BLACKBOX_NOT_SENT, BLACKBOX_NOT_SENT};
     gw_tape_step_begin(&tape, 5);
@@ -117,7 +117,7 @@ static void test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_
     TEST_ASSERT_EQUAL_UINT32(266, entries[1].number);
 }
 
-static void test_frames_have_the_time_of_their_step_and_stand_for_it(void) {
+TEST(test_frames_have_the_time_of_their_step_and_stand_for_it) {
     const uint8_t kinds[] = {BLACKBOX_ESTOP, BLACKBOX_BUS, BLACKBOX_FRAME, BLACKBOX_FRAME, BLACKBOX_STEP};
     waiting = 2;
     step(7);
@@ -129,7 +129,7 @@ static void test_frames_have_the_time_of_their_step_and_stand_for_it(void) {
     TEST_ASSERT_EQUAL(2, entries[2].as.data[0]);
 }
 
-static void test_only_a_send_that_failed_is_noted(void) {
+TEST(test_only_a_send_that_failed_is_noted) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     gw_tape_step_begin(&tape, 5);
     TEST_ASSERT_EQUAL(1, hal.send(hal.context, &frame, 1));
@@ -144,7 +144,7 @@ static void test_only_a_send_that_failed_is_noted(void) {
     TEST_ASSERT_EQUAL(BLACKBOX_PURGE, entries[1].kind);
 }
 
-static void test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted(void) {
+TEST(test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted) {
     static const int answers[] = {2, 1, 0, -1};
     const iw_can_frame_t pair[] = {{.id = 266, .dlc = 5}, {.id = 298, .dlc = 5}};
     gw_tape_step_begin(&tape, 5);
@@ -162,7 +162,7 @@ static void test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_n
     TEST_ASSERT_EQUAL_INT64(-1, entries[2].as.value);
 }
 
-static void test_answers_are_noted_again_each_second(void) {
+TEST(test_answers_are_noted_again_each_second) {
     const iw_bus_facts_t facts = {.timing_contradicted = true, .echo_proven = true};
     TEST_ASSERT_FALSE(gw_tape_again(&tape, 5000000)); // Nothing has been asked yet.
     gw_tape_facts(&tape, 1, &facts);
@@ -178,7 +178,7 @@ static void test_answers_are_noted_again_each_second(void) {
     TEST_ASSERT_EQUAL(1, entries[9].b);
 }
 
-static void test_drive_keeps_what_was_asked_and_when_it_was_sent(void) {
+TEST(test_drive_keeps_what_was_asked_and_when_it_was_sent) {
     const iw_drive_t request = {.speed_mm_s = {300, -2147483647}, .current_mA = {100000, -100000}, .has_current = true};
     const blackbox_entry_t entry = {.at_us = 1000, .number = 7, .b = IW_REFUSE_BUSY};
     gw_tape_drive(&tape, &entry, &request, 400);
@@ -193,7 +193,7 @@ static void test_drive_keeps_what_was_asked_and_when_it_was_sent(void) {
     TEST_ASSERT_EQUAL_UINT32(600, entries[0].as.drive.age_us);
 }
 
-static void test_frames_around_a_stop_are_kept_apart(void) {
+TEST(test_frames_around_a_stop_are_kept_apart) {
     for (iw_time_us_t at_us = 1; at_us <= 100; at_us++) {
         waiting = 1;
         step(at_us);
@@ -214,14 +214,14 @@ static void test_frames_around_a_stop_are_kept_apart(void) {
     TEST_ASSERT_EQUAL_UINT64(100, tape.before[GW_AROUND - 1U].at_us);
 }
 
-static void test_few_frames_before_a_stop_are_all_there_is(void) {
+TEST(test_few_frames_before_a_stop_are_all_there_is) {
     waiting = 3;
     step(1);
     gw_tape_mark(&tape);
     TEST_ASSERT_EQUAL_UINT32(3, tape.before_count);
 }
 
-static void test_without_a_ring_nothing_is_noted_and_all_passes(void) {
+TEST(test_without_a_ring_nothing_is_noted_and_all_passes) {
     gw_tape_init(&tape, NULL);
     hal = gw_tape_hal(&tape, &port);
     waiting = 2;
@@ -231,19 +231,4 @@ static void test_without_a_ring_nothing_is_noted_and_all_passes(void) {
     TEST_ASSERT_EQUAL(0, waiting);
     TEST_ASSERT_EQUAL(-1, hal.estop_pressed(hal.context));
     TEST_ASSERT_EQUAL_UINT32(0, tape.before_count);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_answers_are_noted_first_and_when_they_change);
-    RUN_TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus);
-    RUN_TEST(test_frames_have_the_time_of_their_step_and_stand_for_it);
-    RUN_TEST(test_only_a_send_that_failed_is_noted);
-    RUN_TEST(test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted);
-    RUN_TEST(test_answers_are_noted_again_each_second);
-    RUN_TEST(test_drive_keeps_what_was_asked_and_when_it_was_sent);
-    RUN_TEST(test_frames_around_a_stop_are_kept_apart);
-    RUN_TEST(test_few_frames_before_a_stop_are_all_there_is);
-    RUN_TEST(test_without_a_ring_nothing_is_noted_and_all_passes);
-    return UNITY_END();
 }

@@ -3,13 +3,13 @@
 
 #include "iwheel_linux/clock.h"
 
+#include "unit.h"
 #include <poll.h>
 #include <signal.h>
 #include <stdbool.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
-#include <unity.h>
 
 #define SOON_US  20000U
 #define LATER_US 3600000000U
@@ -83,23 +83,23 @@ static void check_event_wakes_before_any_time(void) {
     TEST_ASSERT_EQUAL_INT(1, wait_until(IW_NEVER));
 }
 
-static void test_wakes_at_its_time_and_not_before(void) {
+TEST(test_wakes_at_its_time_and_not_before) {
     check_wakes_at_its_time_and_not_before();
 }
 
-static void test_time_that_was_read_before_is_not_read_again(void) {
+TEST(test_time_that_was_read_before_is_not_read_again) {
     check_time_that_was_read_before_is_not_read_again();
 }
 
-static void test_time_that_is_past_only_looks(void) {
+TEST(test_time_that_is_past_only_looks) {
     check_time_that_is_past_only_looks();
 }
 
-static void test_event_wakes_before_any_time(void) {
+TEST(test_event_wakes_before_any_time) {
     check_event_wakes_before_any_time();
 }
 
-static void test_old_kernel_does_the_same_by_two_calls(void) {
+TEST(test_old_kernel_does_the_same_by_two_calls) {
     wakeup.two_calls = true;
     check_wakes_at_its_time_and_not_before();
     check_time_that_was_read_before_is_not_read_again();
@@ -107,22 +107,11 @@ static void test_old_kernel_does_the_same_by_two_calls(void) {
     check_event_wakes_before_any_time();
 }
 
-static void test_wait_of_seconds_is_told_in_seconds_and_the_rest(void) {
+TEST(test_wait_of_seconds_is_told_in_seconds_and_the_rest) {
     wakeup.two_calls = true;
     asks_only = true;
     TEST_ASSERT_EQUAL_INT(0, wait_until(in_us(7800000U)));
     asks_only = false;
     TEST_ASSERT_EQUAL_INT(7, (int)asked_for.tv_sec);
     TEST_ASSERT_INT_WITHIN(100000000, 700000000, (int)asked_for.tv_nsec);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_wakes_at_its_time_and_not_before);
-    RUN_TEST(test_time_that_was_read_before_is_not_read_again);
-    RUN_TEST(test_time_that_is_past_only_looks);
-    RUN_TEST(test_event_wakes_before_any_time);
-    RUN_TEST(test_old_kernel_does_the_same_by_two_calls);
-    RUN_TEST(test_wait_of_seconds_is_told_in_seconds_and_the_rest);
-    return UNITY_END();
 }

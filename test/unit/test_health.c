@@ -3,7 +3,7 @@
 #include "wheels/health.h"
 
 #include "iwheel/codec.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -23,8 +23,6 @@ void setUp(void) {
     }
 }
 
-void tearDown(void) {}
-
 static void step(iw_time_us_t after_us) {
     seen.at_us += after_us;
     for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -33,13 +31,13 @@ static void step(iw_time_us_t after_us) {
     gw_health_look(&health, &seen);
 }
 
-static void test_health_at_the_thresholds_is_no_fault(void) {
+TEST(test_health_at_the_thresholds_is_no_fault) {
     step(0);
     step(2U * GW_HEALTH_US);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
-static void test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel(void) {
+TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel) {
     told[IW_LEFT].status.battery_dV = 219;
     told[IW_RIGHT].status.temperature_degC = 61;
     step(0);
@@ -53,7 +51,7 @@ static void test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel(void) {
     TEST_ASSERT_TRUE(health.present[IW_RIGHT][GW_TEMPERATURE_HIGH]);
 }
 
-static void test_health_fault_is_gone_after_five_seconds_within(void) {
+TEST(test_health_fault_is_gone_after_five_seconds_within) {
     told[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US);
@@ -66,7 +64,7 @@ static void test_health_fault_is_gone_after_five_seconds_within(void) {
     TEST_ASSERT_EQUAL_UINT32(2, health.changes);
 }
 
-static void test_health_dip_in_between_begins_anew(void) {
+TEST(test_health_dip_in_between_begins_anew) {
     told[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US - 1U);
@@ -80,7 +78,7 @@ static void test_health_dip_in_between_begins_anew(void) {
     TEST_ASSERT_EQUAL_UINT32(1, health.changes);
 }
 
-static void test_health_without_thresholds_knows_no_fault(void) {
+TEST(test_health_without_thresholds_knows_no_fault) {
     health.limits = (gw_health_limits_t){0, 0};
     told[IW_LEFT].status.battery_dV = 0;
     told[IW_LEFT].status.temperature_degC = 200;
@@ -89,7 +87,7 @@ static void test_health_without_thresholds_knows_no_fault(void) {
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
-static void test_health_value_that_is_not_known_changes_nothing(void) {
+TEST(test_health_value_that_is_not_known_changes_nothing) {
     told[IW_LEFT].status.battery_dV = 100;
     told[IW_RIGHT].status.temperature_degC = IW_TEMPERATURE_MAX_degC + 1U;
     step(0);
@@ -107,7 +105,7 @@ static void test_health_value_that_is_not_known_changes_nothing(void) {
     TEST_ASSERT_TRUE(health.present[IW_LEFT][GW_BATTERY_LOW]);
 }
 
-static void test_health_sentences_name_wheel_value_and_threshold(void) {
+TEST(test_health_sentences_name_wheel_value_and_threshold) {
     char text[128];
     told[IW_LEFT].status.battery_dV = 219;
     told[IW_RIGHT].status.temperature_degC = 61;
@@ -116,16 +114,4 @@ static void test_health_sentences_name_wheel_value_and_threshold(void) {
     TEST_ASSERT_EQUAL_STRING("the left wheel's battery has 219 dV, below battery_low_dV 220; charge it", text);
     gw_health_sentence(&health, &seen, IW_RIGHT, GW_TEMPERATURE_HIGH, text);
     TEST_ASSERT_EQUAL_STRING("the right wheel has 61 degC, above temperature_high_degC 60; let it cool", text);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_health_at_the_thresholds_is_no_fault);
-    RUN_TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel);
-    RUN_TEST(test_health_fault_is_gone_after_five_seconds_within);
-    RUN_TEST(test_health_dip_in_between_begins_anew);
-    RUN_TEST(test_health_without_thresholds_knows_no_fault);
-    RUN_TEST(test_health_value_that_is_not_known_changes_nothing);
-    RUN_TEST(test_health_sentences_name_wheel_value_and_threshold);
-    return UNITY_END();
 }

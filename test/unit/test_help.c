@@ -20,20 +20,16 @@
 #include "web_texts.h"
 #endif
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static void expect_said(const char *text, const char *what) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, what), what);
 }
 
-static void test_help_names_the_configuration_that_is_read(void) {
+TEST(test_help_names_the_configuration_that_is_read) {
     expect_said(gateway_help, "configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n");
     expect_said(help_doctor, "else " GATEWAY_CONFIG_PATH ", if it is there\n");
     expect_said(help_bringup, "else " GATEWAY_CONFIG_PATH ", if");
@@ -62,7 +58,7 @@ static void expect_comments(const settings_form_t *form) {
     }
 }
 
-static void test_help_of_each_key_is_in_its_configuration_file(void) {
+TEST(test_help_of_each_key_is_in_its_configuration_file) {
     expect_comments(&mqtt_settings_form);
     expect_comments(&ros_settings_form);
     expect_comments(&serial_settings_form);
@@ -71,7 +67,7 @@ static void test_help_of_each_key_is_in_its_configuration_file(void) {
 #endif
 }
 
-static void test_help_says_durations_as_they_are_read(void) {
+TEST(test_help_says_durations_as_they_are_read) {
     expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
     expect_said(help_record, "--for TIME  " DURATION_FORM ";");
 }
@@ -83,7 +79,7 @@ static const verb_t *verb_at(unsigned number) {
 }
 
 /// Completion and the program's page take the words and the summary from their places in the page.
-static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
+TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places) {
     const verb_t *verb = NULL;
     for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         char begin[64];
@@ -98,7 +94,7 @@ static void test_help_of_each_verb_has_usage_and_summary_in_their_places(void) {
     }
 }
 
-static void test_help_fits_a_terminal_of_80_columns(void) {
+TEST(test_help_fits_a_terminal_of_80_columns) {
     const verb_t *verb = NULL;
     for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
         for (const char *line = verb->page; *line != '\0'; line += strcspn(line, "\n") + 1U) {
@@ -108,7 +104,7 @@ static void test_help_fits_a_terminal_of_80_columns(void) {
 }
 
 /// Each word of the choice, where the page lists them or in the usage.
-static void test_help_names_each_word_that_may_follow(void) {
+TEST(test_help_names_each_word_that_may_follow) {
     const verb_t *verb = NULL;
     unsigned choices = 0;
     for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
@@ -120,7 +116,7 @@ static void test_help_names_each_word_that_may_follow(void) {
     TEST_ASSERT_GREATER_THAN(IW_ASSUMPTION_ITEMS + IWN_TOPICS, choices);
 }
 
-static void test_help_of_confirm_lists_the_items_and_no_other(void) {
+TEST(test_help_of_confirm_lists_the_items_and_no_other) {
     char expected[512] = "\nITEM  ";
     char found[512] = "";
     for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {
@@ -138,16 +134,4 @@ static void test_help_of_confirm_lists_the_items_and_no_other(void) {
         }
     }
     TEST_ASSERT_EQUAL_STRING(strcat(expected, "\n"), found);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_help_names_the_configuration_that_is_read);
-    RUN_TEST(test_help_of_each_key_is_in_its_configuration_file);
-    RUN_TEST(test_help_says_durations_as_they_are_read);
-    RUN_TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places);
-    RUN_TEST(test_help_fits_a_terminal_of_80_columns);
-    RUN_TEST(test_help_names_each_word_that_may_follow);
-    RUN_TEST(test_help_of_confirm_lists_the_items_and_no_other);
-    return UNITY_END();
 }

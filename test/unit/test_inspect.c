@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "inspect.h"
 
+#include "unit.h"
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
-#include <unity.h>
 
 static inspect_findings_t findings;
 static inspect_heard_t heard;
@@ -16,8 +16,6 @@ void setUp(void) {
     inspect_begin(&findings);
     inspect_heard_begin(&heard);
 }
-
-void tearDown(void) {}
 
 /// Two seconds of a healthy pair.
 static void hear_healthy(void) {
@@ -47,7 +45,7 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
     TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every trouble has a cure");
 }
 
-static void test_healthy_bus_finds_nothing_to_mend(void) {
+TEST(test_healthy_bus_finds_nothing_to_mend) {
     hear_healthy();
     inspect_bus(&local, &heard, &config, &findings);
     expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
@@ -56,7 +54,7 @@ static void test_healthy_bus_finds_nothing_to_mend(void) {
     TEST_ASSERT_EQUAL(findings.count, findings.total[INSPECT_OK]);
 }
 
-static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(void) {
+TEST(test_silent_wheel_fails_and_its_other_messages_are_not_asked_for) {
     hear_healthy();
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
@@ -67,7 +65,7 @@ static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(voi
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
 
-static void test_rate_off_by_more_than_a_tenth_warns_with_both_numbers(void) {
+TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
     inspect_bus(&local, &heard, &config, &findings);
@@ -75,7 +73,7 @@ static void test_rate_off_by_more_than_a_tenth_warns_with_both_numbers(void) {
     TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
 }
 
-static void test_rate_within_a_tenth_or_two_frames_is_right(void) {
+TEST(test_rate_within_a_tenth_or_two_frames_is_right) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
     heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
@@ -86,21 +84,21 @@ static void test_rate_within_a_tenth_or_two_frames_is_right(void) {
     TEST_ASSERT_NOT_NULL(find("rates"));
 }
 
-static void test_message_that_never_comes_is_named(void) {
+TEST(test_message_that_never_comes_is_named) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
     inspect_bus(&local, &heard, &config, &findings);
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
 }
 
-static void test_offsets_may_be_missing_after_the_first_minute(void) {
+TEST(test_offsets_may_be_missing_after_the_first_minute) {
     hear_healthy();
     TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
     inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
 }
 
-static void test_setpoints_of_others_fail_unless_a_gateway_judges_them(void) {
+TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them) {
     inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
     hear_healthy();
@@ -111,7 +109,7 @@ static void test_setpoints_of_others_fail_unless_a_gateway_judges_them(void) {
     expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
 }
 
-static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
+TEST(test_unknown_ids_are_listed_and_the_list_is_bounded) {
     iw_can_frame_t frame = {.id = 0x266U};
     hear_healthy();
     inspect_heard_take(&heard, &frame);
@@ -131,7 +129,7 @@ static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
     TEST_ASSERT_NOT_NULL(strstr(find("unknown_ids")->text, " ..."));
 }
 
-static void test_damaged_frames_are_counted_apart(void) {
+TEST(test_damaged_frames_are_counted_apart) {
     const iw_can_frame_t brief = {.id = IW_ID_LEFT_SPEED, .dlc = 3};
     const iw_can_frame_t remote = {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 4};
     const iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
@@ -144,14 +142,14 @@ static void test_damaged_frames_are_counted_apart(void) {
     TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, heard.bits);
 }
 
-static void test_full_bus_warns(void) {
+TEST(test_full_bus_warns) {
     hear_healthy();
     heard.bits = 1100000U;
     inspect_bus(&local, &heard, &config, &findings);
     expect("load", INSPECT_WARN, "55.0 %", "lower ids");
 }
 
-static void test_bus_that_never_lived_says_nothing_of_wheels(void) {
+TEST(test_bus_that_never_lived_says_nothing_of_wheels) {
     iwl_bus_link_t link = {.presence = IWL_LINK_UP};
     inspect_bus(&link, &heard, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
@@ -161,14 +159,14 @@ static void test_bus_that_never_lived_says_nothing_of_wheels(void) {
     expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
 }
 
-static void test_error_passive_bus_warns(void) {
+TEST(test_error_passive_bus_warns) {
     hear_healthy();
     heard.worst = IW_BUS_PASSIVE;
     inspect_bus(&local, &heard, &config, &findings);
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
 }
 
-static void test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it(void) {
+TEST(test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP};
     heard.was_up = true; // Before it went off, or before its first error frame came.
     heard.worst = IW_BUS_OFF;
@@ -182,7 +180,7 @@ static void test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because
     TEST_ASSERT_NULL(find("left_wheel"));
 }
 
-static void test_bus_off_that_is_over_warns_and_the_wheels_are_judged(void) {
+TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged) {
     hear_healthy();
     heard.worst = IW_BUS_OFF;
     inspect_bus(&local, &heard, &config, &findings);
@@ -190,7 +188,7 @@ static void test_bus_off_that_is_over_warns_and_the_wheels_are_judged(void) {
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
 
-static void test_what_a_machine_cannot_have_gets_the_verdict_asked_for(void) {
+TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for) {
     const inspect_estop_t estop = {
         .line = "ESTOP", .present = true, .level = -1, .trouble = "no chip", .no_gpio = true};
     findings.absent = INSPECT_SKIP;
@@ -205,7 +203,7 @@ static void test_what_a_machine_cannot_have_gets_the_verdict_asked_for(void) {
     TEST_ASSERT_EQUAL_STRING("skip", inspect_verdict_word(INSPECT_SKIP));
 }
 
-static void test_right_link_has_nothing_to_mend(void) {
+TEST(test_right_link_has_nothing_to_mend) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
                                  .echo_proven = true,
                                  .bitrate_hz = 1000000,
@@ -217,7 +215,7 @@ static void test_right_link_has_nothing_to_mend(void) {
     expect("bit_timing", INSPECT_OK, "1000000 bit/s, sample point 62.5 %", "");
 }
 
-static void test_each_fault_of_the_link_has_its_command(void) {
+TEST(test_each_fault_of_the_link_has_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
                                  .is_mute = true,
                                  .bitrate_hz = 500000,
@@ -232,20 +230,20 @@ static void test_each_fault_of_the_link_has_its_command(void) {
     expect("echo", INSPECT_WARN, "unproven", "IFF_ECHO");
 }
 
-static void test_room_for_frames_that_is_granted_is_told(void) {
+TEST(test_room_for_frames_that_is_granted_is_told) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 2U * IWL_LINK_ROOM_BYTES};
     inspect_room(&link, &findings);
     expect("room", INSPECT_OK, "4096 of 4096 KiB granted, 512 ms of a full bus", "");
 }
 
-static void test_room_for_frames_that_is_not_granted_has_its_command(void) {
+TEST(test_room_for_frames_that_is_not_granted_has_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 425984U};
     inspect_room(&link, &findings);
     expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; when others",
            "sudo sysctl net.core.rmem_max=4194304");
 }
 
-static void test_room_for_frames_that_is_not_known_is_not_judged(void) {
+TEST(test_room_for_frames_that_is_not_known_is_not_judged) {
     const iwl_bus_link_t hub = {.presence = IWL_LINK_LOCAL, .room_bytes = 425984U};
     const iwl_bus_link_t unknown = {.presence = IWL_LINK_UP};
     inspect_room(&hub, &findings);
@@ -253,7 +251,7 @@ static void test_room_for_frames_that_is_not_known_is_not_judged(void) {
     TEST_ASSERT_EQUAL_UINT(0U, findings.count);
 }
 
-static void test_wrong_timing_only_warns_where_it_is_configured_so(void) {
+TEST(test_wrong_timing_only_warns_where_it_is_configured_so) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
     inspect_config_t lenient = config;
     lenient.refuses = false;
@@ -261,7 +259,7 @@ static void test_wrong_timing_only_warns_where_it_is_configured_so(void) {
     expect("bit_timing", INSPECT_WARN, "500000", "bitrate 1000000");
 }
 
-static void test_absent_and_foreign_interfaces_are_told_apart(void) {
+TEST(test_absent_and_foreign_interfaces_are_told_apart) {
     iwl_bus_link_t link = {.presence = IWL_LINK_ABSENT};
     inspect_link(&link, &config, &findings);
     expect("interface", INSPECT_FAIL, "no such interface", "ip -brief link show type can");
@@ -277,7 +275,7 @@ static void test_absent_and_foreign_interfaces_are_told_apart(void) {
     expect("interface", INSPECT_FAIL, "is down", "ip link set can0 up");
 }
 
-static void test_estop_levels(void) {
+TEST(test_estop_levels) {
     inspect_estop_t estop = {.line = "ESTOP", .present = true, .level = -1, .trouble = "gpioinfo lists them"};
     inspect_estop(&estop, &findings);
     expect("estop", INSPECT_FAIL, "unreadable, which counts as pressed", "gpioinfo");
@@ -311,7 +309,7 @@ static void test_estop_levels(void) {
     expect("estop", INSPECT_WARN, "none", "[estop] line");
 }
 
-static void test_full_list_counts_on_and_loses_no_failure(void) {
+TEST(test_full_list_counts_on_and_loses_no_failure) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
         inspect_cure(&findings, "cure %u", i);
@@ -319,33 +317,4 @@ static void test_full_list_counts_on_and_loses_no_failure(void) {
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX, findings.count);
     TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX + 3U, findings.total[INSPECT_FAIL]);
     TEST_ASSERT_EQUAL_STRING("cure 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].cure);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_healthy_bus_finds_nothing_to_mend);
-    RUN_TEST(test_silent_wheel_fails_and_its_other_messages_are_not_asked_for);
-    RUN_TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers);
-    RUN_TEST(test_rate_within_a_tenth_or_two_frames_is_right);
-    RUN_TEST(test_message_that_never_comes_is_named);
-    RUN_TEST(test_offsets_may_be_missing_after_the_first_minute);
-    RUN_TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them);
-    RUN_TEST(test_unknown_ids_are_listed_and_the_list_is_bounded);
-    RUN_TEST(test_damaged_frames_are_counted_apart);
-    RUN_TEST(test_full_bus_warns);
-    RUN_TEST(test_bus_that_never_lived_says_nothing_of_wheels);
-    RUN_TEST(test_error_passive_bus_warns);
-    RUN_TEST(test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it);
-    RUN_TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged);
-    RUN_TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for);
-    RUN_TEST(test_right_link_has_nothing_to_mend);
-    RUN_TEST(test_each_fault_of_the_link_has_its_command);
-    RUN_TEST(test_room_for_frames_that_is_granted_is_told);
-    RUN_TEST(test_room_for_frames_that_is_not_granted_has_its_command);
-    RUN_TEST(test_room_for_frames_that_is_not_known_is_not_judged);
-    RUN_TEST(test_wrong_timing_only_warns_where_it_is_configured_so);
-    RUN_TEST(test_absent_and_foreign_interfaces_are_told_apart);
-    RUN_TEST(test_estop_levels);
-    RUN_TEST(test_full_list_counts_on_and_loses_no_failure);
-    return UNITY_END();
 }

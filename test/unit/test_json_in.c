@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Reading JSON where it lies: what is JSON and what is not, and walking what is.
 #include "iwheel_northbound/json_in.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,8 +15,6 @@ void setUp(void) {
     memset(&work, 0xA5, sizeof work);
     why[0] = '\0';
 }
-
-void tearDown(void) {}
 
 /// In a copy of exactly that length, so that sanitizers see a byte read behind it.
 static bool check(const char *text, size_t length) {
@@ -46,11 +44,11 @@ static iwn_json_t member(const char *name) {
 #define OWN_YES(name, text) YES(name, text)
 #define OWN_NO(name, text)  NO(name, text)
 
-static void test_json_every_vector_is_read_or_refused_as_the_table_says(void) {
+TEST(test_json_every_vector_is_read_or_refused_as_the_table_says){
 #include "json_vectors.inc"
 }
 
-static void test_json_cut_anywhere_is_refused(void) {
+TEST(test_json_cut_anywhere_is_refused) {
     const char *text = "{\"a\":[1,-2.5e3,\"\\u20ac\\\"\"],\"b\":{\"c\":null},\"d\":true}";
     for (size_t length = 0; length < strlen(text); length++) {
         TEST_ASSERT_FALSE(check(text, length));
@@ -58,7 +56,7 @@ static void test_json_cut_anywhere_is_refused(void) {
     TEST_ASSERT_TRUE(check(text, strlen(text)));
 }
 
-static void test_json_nul_byte_anywhere_is_refused(void) {
+TEST(test_json_nul_byte_anywhere_is_refused) {
     const char *text = "{\"a\":[1,-2.5e3,\"x\"],\"b\":true}";
     const size_t length = strlen(text);
     char spoilt[64];
@@ -70,7 +68,7 @@ static void test_json_nul_byte_anywhere_is_refused(void) {
     }
 }
 
-static void test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line(void) {
+TEST(test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line) {
     static char text[16384];
     size_t length = (size_t)snprintf(text, sizeof text, "{\"z\":0");
     for (unsigned i = 0; i < IWN_NAMES_MAX - 1U; i++) {
@@ -84,7 +82,7 @@ static void test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_lin
     refused(text, "too many names near '\"y\"'");
 }
 
-static void test_json_text_longer_than_its_places_can_be_told_is_refused(void) {
+TEST(test_json_text_longer_than_its_places_can_be_told_is_refused) {
     static char text[IWN_JSON_MAX + 1U];
     memset(text, ' ', sizeof text);
     memcpy(text, "[]", 2);
@@ -92,7 +90,7 @@ static void test_json_text_longer_than_its_places_can_be_told_is_refused(void) {
     TEST_ASSERT_FALSE(check(text, IWN_JSON_MAX + 1U));
 }
 
-static void test_json_refusal_tells_what_is_wrong_and_near_what(void) {
+TEST(test_json_refusal_tells_what_is_wrong_and_near_what) {
     refused("", "'[' or '{' expected near end of file");
     refused("x", "'[' or '{' expected near 'x'");
     refused("{\"a\":1,}", "string or '}' expected near '}'");
@@ -123,14 +121,14 @@ static void test_json_refusal_tells_what_is_wrong_and_near_what(void) {
     refused("[truetruetruetruetruet]", "invalid token");
 }
 
-static void test_json_character_cut_by_the_end_is_not_completed_from_behind(void) {
+TEST(test_json_character_cut_by_the_end_is_not_completed_from_behind) {
     static const char text[] = "[\"\xC3\xA9\"]";
     iwn_text_t fault = iwn_text_begin(why, sizeof why);
     TEST_ASSERT_FALSE(iwn_json_check(text, 3U, &work, &root, &fault));
     TEST_ASSERT_EQUAL_STRING("unable to decode byte 0xc3 near '\"'", why);
 }
 
-static void test_json_walk_gives_members_and_values_in_their_order(void) {
+TEST(test_json_walk_gives_members_and_values_in_their_order) {
     const char *text = " { \"a\" : [ 1 , \"]\" , { } ] , \"b\" : { \"c\\\"\" : null } , \"d\" : -5 } ";
     static const char *const names[] = {"a", "b", "d"};
     iwn_json_t name;
@@ -154,7 +152,27 @@ static void test_json_walk_gives_members_and_values_in_their_order(void) {
     TEST_ASSERT_FALSE(iwn_json_find(member("d"), "c", &value));
 }
 
-static void test_json_kinds_are_told_apart(void) {
+TEST(test_json_names_of_the_root_are_found_in_their_order) {
+    const char *text = " {\"d\":-5,\"b\" : {\"z\":1,\"a\":{}} ,\"\\u0061\":[{\"e\":1}],\"c\":\"x\"}";
+    static const char *const names[] = {"a", "b", "c", "d"};
+    static const iwn_json_kind_t kinds[] = {IWN_JSON_LIST, IWN_JSON_OBJECT, IWN_JSON_TEXT, IWN_JSON_INTEGER};
+    TEST_ASSERT_TRUE(check(text, strlen(text)));
+    TEST_ASSERT_EQUAL_PTR(root.at, iwn_json_root(root.at - 1).at);
+    TEST_ASSERT_EQUAL_PTR(root.at, iwn_json_root(root.at).at);
+    TEST_ASSERT_EQUAL_UINT16(4, work.names);
+    for (unsigned i = 0; i < 4U; i++) {
+        const iwn_json_t name = iwn_json_name(root.at - 1, &work, i);
+        TEST_ASSERT_TRUE_MESSAGE(iwn_json_is(name, names[i]), names[i]);
+        TEST_ASSERT_EQUAL_INT(kinds[i], iwn_json_kind(iwn_json_value(name)));
+        TEST_ASSERT_EQUAL_PTR(member(names[i]).at, iwn_json_value(name).at);
+    }
+    TEST_ASSERT_TRUE(check("{}", 2U));
+    TEST_ASSERT_EQUAL_UINT16(0, work.names);
+    TEST_ASSERT_TRUE(check("[{\"a\":1}]", 9U));
+    TEST_ASSERT_EQUAL_UINT16(0, work.names);
+}
+
+TEST(test_json_kinds_are_told_apart) {
     const char *text = "{\"t\":true,\"f\":false,\"n\":null,\"i\":-0,\"r\":0.0,\"e\":1E5,\"s\":\"\",\"o\":{},\"l\":[]}";
     TEST_ASSERT_TRUE(check(text, strlen(text)));
     TEST_ASSERT_EQUAL_INT(IWN_JSON_TRUE, iwn_json_kind(member("t")));
@@ -168,7 +186,7 @@ static void test_json_kinds_are_told_apart(void) {
     TEST_ASSERT_EQUAL_INT(IWN_JSON_LIST, iwn_json_kind(member("l")));
 }
 
-static void test_json_integers_come_as_sent_to_the_last_one(void) {
+TEST(test_json_integers_come_as_sent_to_the_last_one) {
     const char *text = "{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":-0,\"d\":42}";
     TEST_ASSERT_TRUE(check(text, strlen(text)));
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, iwn_json_integer(member("a")));
@@ -177,7 +195,7 @@ static void test_json_integers_come_as_sent_to_the_last_one(void) {
     TEST_ASSERT_EQUAL_INT64(42, iwn_json_integer(member("d")));
 }
 
-static void test_json_text_is_given_as_it_means_if_it_fits(void) {
+TEST(test_json_text_is_given_as_it_means_if_it_fits) {
     const char *text =
         "{\"a\":\"\\\"\\\\\\/\\b\\f\\n\\r\\t\\u0041\\u00e9\\u20AC\\ud83d\\ude00\xC3\xA9\",\"b\":\"1234567\",\"c\":7}";
     char out[32];
@@ -192,20 +210,4 @@ static void test_json_text_is_given_as_it_means_if_it_fits(void) {
     TEST_ASSERT_FALSE(iwn_json_is(member("c"), "7"));
     TEST_ASSERT_FALSE(iwn_json_is(member("b"), "123456"));
     TEST_ASSERT_FALSE(iwn_json_is(member("b"), "12345678"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_json_every_vector_is_read_or_refused_as_the_table_says);
-    RUN_TEST(test_json_cut_anywhere_is_refused);
-    RUN_TEST(test_json_nul_byte_anywhere_is_refused);
-    RUN_TEST(test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line);
-    RUN_TEST(test_json_text_longer_than_its_places_can_be_told_is_refused);
-    RUN_TEST(test_json_refusal_tells_what_is_wrong_and_near_what);
-    RUN_TEST(test_json_character_cut_by_the_end_is_not_completed_from_behind);
-    RUN_TEST(test_json_walk_gives_members_and_values_in_their_order);
-    RUN_TEST(test_json_kinds_are_told_apart);
-    RUN_TEST(test_json_integers_come_as_sent_to_the_last_one);
-    RUN_TEST(test_json_text_is_given_as_it_means_if_it_fits);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The writer of replies and events: the same bytes as a writer that goes byte by byte, and never one too many.
 #include "iwheel_northbound/json_out.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -14,15 +14,13 @@ void setUp(void) {
     iwn_out_init(&json, line, sizeof line);
 }
 
-void tearDown(void) {}
-
 static void expect(const char *text) {
     TEST_ASSERT_FALSE(json.overflow);
     TEST_ASSERT_EQUAL_UINT(strlen(text), json.length);
     TEST_ASSERT_EQUAL_STRING_LEN(text, line, json.length);
 }
 
-static void test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8(void) {
+TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8) {
     iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
@@ -32,7 +30,7 @@ static void test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_
         "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
 }
 
-static void test_json_escapes_and_separates(void) {
+TEST(test_json_escapes_and_separates) {
     iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "low", INT64_MIN);
@@ -55,7 +53,7 @@ static void test_json_escapes_and_separates(void) {
         line);
 }
 
-static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
+TEST(test_json_that_does_not_fit_is_no_line_at_any_size) {
     for (size_t size = 1; size <= 64U; size++) {
         memset(line, 0x5A, sizeof line);
         iwn_out_init(&json, line, size);
@@ -70,7 +68,7 @@ static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
     }
 }
 
-static void test_json_number_is_written_as_printf_writes_it(void) {
+TEST(test_json_number_is_written_as_printf_writes_it) {
     int64_t number = 1;
     for (unsigned digits = 1; digits < 19U; digits++) {
         number *= 10;
@@ -105,7 +103,7 @@ static void write_slowly(const char *text, char *out) {
     (void)sprintf(out, "\"");
 }
 
-static void test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte(void) {
+TEST(test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte) {
     char text[32];
     char wanted[256];
     for (size_t length = 1; length < 20U; length++) {
@@ -123,7 +121,7 @@ static void test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_
     }
 }
 
-static void test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place(void) {
+TEST(test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place) {
     char text[32];
     for (size_t at = 0; at < 18U; at++) {
         for (int byte = 0x80; byte < 0x100; byte++) {
@@ -138,12 +136,12 @@ static void test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_p
     }
 }
 
-static void test_json_text_beyond_ascii_is_kept(void) {
+TEST(test_json_text_beyond_ascii_is_kept) {
     iwn_out_text(&json, "t", "a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9");
     expect("\"t\":\"a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9\"");
 }
 
-static void test_json_every_element_fits_to_the_last_byte_and_not_one_less(void) {
+TEST(test_json_every_element_fits_to_the_last_byte_and_not_one_less) {
     char whole[512];
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "int", -1234567);
@@ -176,7 +174,7 @@ static void test_json_every_element_fits_to_the_last_byte_and_not_one_less(void)
         line, length);
 }
 
-static void test_json_frame_has_its_bytes_its_kind_and_its_flags(void) {
+TEST(test_json_frame_has_its_bytes_its_kind_and_its_flags) {
     const iw_can_frame_t frame = {.id = 0x10AU, .dlc = 3, .kind = (uint8_t)IW_CAN_ECHO, .data = {0x00, 0x9F, 0xA0}};
     iwn_out_frame(&frame, 17, &json);
     expect("\"t_us\":17,\"id\":266,\"dlc\":3,\"data\":\"009FA0\",\"kind\":\"echo\",\"flags\":[]");
@@ -185,18 +183,4 @@ static void test_json_frame_has_its_bytes_its_kind_and_its_flags(void) {
     iwn_out_frame(&odd, 0, &json);
     expect("\"t_us\":0,\"id\":536870911,\"dlc\":0,\"data\":\"\",\"kind\":\"received\",\"flags\":[\"extended\","
            "\"remote\"]");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8);
-    RUN_TEST(test_json_escapes_and_separates);
-    RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
-    RUN_TEST(test_json_number_is_written_as_printf_writes_it);
-    RUN_TEST(test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte);
-    RUN_TEST(test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place);
-    RUN_TEST(test_json_text_beyond_ascii_is_kept);
-    RUN_TEST(test_json_every_element_fits_to_the_last_byte_and_not_one_less);
-    RUN_TEST(test_json_frame_has_its_bytes_its_kind_and_its_flags);
-    return UNITY_END();
 }

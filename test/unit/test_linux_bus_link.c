@@ -5,13 +5,9 @@
 #include "iwheel/bit_timing.h"
 #include "netlink.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static iwl_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
     const iwl_bus_link_t link = {
@@ -19,7 +15,7 @@ static iwl_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
     return iwl_timing_judge(&link, IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE);
 }
 
-static void test_timing_bands_around_the_wanted_sample_point(void) {
+TEST(test_timing_bands_around_the_wanted_sample_point) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const int off = (permille > 625) ? permille - 625 : 625 - permille;
         const iwl_timing_t expected = (off <= 5) ? IWL_TIMING_RIGHT : (off <= 25) ? IWL_TIMING_NEAR : IWL_TIMING_WRONG;
@@ -27,25 +23,25 @@ static void test_timing_bands_around_the_wanted_sample_point(void) {
     }
 }
 
-static void test_timing_another_bit_rate_is_wrong_whatever_the_sample_point(void) {
+TEST(test_timing_another_bit_rate_is_wrong_whatever_the_sample_point) {
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(999999, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 0));
 }
 
-static void test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts(void) {
+TEST(test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts) {
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(1000000, 0));
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 0));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(0, 750));
 }
 
-static void test_timing_of_a_virtual_link_does_not_exist(void) {
+TEST(test_timing_of_a_virtual_link_does_not_exist) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .is_virtual = true, .bitrate_hz = 5};
     TEST_ASSERT_EQUAL(IWL_TIMING_VIRTUAL, iwl_timing_judge(&link, 1000000, 625));
 }
 
-static void test_same_looks_at_everything_the_interface_tells_and_nothing_else(void) {
+TEST(test_same_looks_at_everything_the_interface_tells_and_nothing_else) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .bitrate_hz = 1, .queue_length = 2};
     iwl_bus_link_t other = link;
     other.purge = IWL_LINK_PURGE_DONE;
@@ -69,7 +65,7 @@ static void test_same_looks_at_everything_the_interface_tells_and_nothing_else(v
 }
 
 /// The loopback has a carrier, unless it is down: then the kernel gives no answer.
-static void test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing(void) {
+TEST(test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing) {
     char told[8] = "";
     FILE *file = fopen("/sys/class/net/lo/carrier", "r");
     TEST_ASSERT_NOT_NULL(file);
@@ -77,15 +73,4 @@ static void test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_not
     (void)fclose(file);
     TEST_ASSERT_EQUAL_INT(known ? told[0] - '0' : -1, iwl_netdev_carrier("lo"));
     TEST_ASSERT_EQUAL_INT(-1, iwl_netdev_carrier("no-such-one"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_timing_bands_around_the_wanted_sample_point);
-    RUN_TEST(test_timing_another_bit_rate_is_wrong_whatever_the_sample_point);
-    RUN_TEST(test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts);
-    RUN_TEST(test_timing_of_a_virtual_link_does_not_exist);
-    RUN_TEST(test_same_looks_at_everything_the_interface_tells_and_nothing_else);
-    RUN_TEST(test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing);
-    return UNITY_END();
 }

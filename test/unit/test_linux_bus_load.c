@@ -2,7 +2,7 @@
 // The load of the bus, told once a second.
 #include "bus.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #define START_US 5000000U
 #define SECOND   1000000U
@@ -15,9 +15,7 @@ void setUp(void) {
     permille = 77U;
 }
 
-void tearDown(void) {}
-
-static void test_load_is_told_when_the_second_is_over_and_not_before(void) {
+TEST(test_load_is_told_when_the_second_is_over_and_not_before) {
     load.bits = 250000U;
     TEST_ASSERT_FALSE(iwl_bus_load_take(&load, START_US + SECOND - 1U, 1000000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(77U, permille);
@@ -25,7 +23,7 @@ static void test_load_is_told_when_the_second_is_over_and_not_before(void) {
     TEST_ASSERT_EQUAL_UINT32(250U, permille);
 }
 
-static void test_load_every_second_begins_anew(void) {
+TEST(test_load_every_second_begins_anew) {
     load.bits = 250000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + SECOND, 1000000U, &permille));
     TEST_ASSERT_FALSE(iwl_bus_load_take(&load, START_US + SECOND + 1U, 1000000U, &permille));
@@ -33,26 +31,17 @@ static void test_load_every_second_begins_anew(void) {
     TEST_ASSERT_EQUAL_UINT32(0U, permille);
 }
 
-static void test_load_of_a_look_that_comes_late_is_of_all_the_time(void) {
+TEST(test_load_of_a_look_that_comes_late_is_of_all_the_time) {
     load.bits = 1000000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + 4U * SECOND, 1000000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(250U, permille);
 }
 
-static void test_load_is_of_the_bit_rate_and_of_the_wheels_if_none_is_known(void) {
+TEST(test_load_is_of_the_bit_rate_and_of_the_wheels_if_none_is_known) {
     load.bits = 250000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + SECOND, 500000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(500U, permille);
     load.bits = 250000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + 2U * SECOND, 0U, &permille));
     TEST_ASSERT_EQUAL_UINT32(250U, permille);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_load_is_told_when_the_second_is_over_and_not_before);
-    RUN_TEST(test_load_every_second_begins_anew);
-    RUN_TEST(test_load_of_a_look_that_comes_late_is_of_all_the_time);
-    RUN_TEST(test_load_is_of_the_bit_rate_and_of_the_wheels_if_none_is_known);
-    return UNITY_END();
 }

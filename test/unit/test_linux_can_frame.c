@@ -4,7 +4,7 @@
 
 #include "iwheel/codec.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <linux/can/error.h>
 #include <string.h>
@@ -18,8 +18,6 @@ void setUp(void) {
     iwl_socketcan_filters(IWL_SOCKETCAN_OURS, ours);
     iwl_socketcan_filters(IWL_SOCKETCAN_OTHERS, others);
 }
-
-void tearDown(void) {}
 
 /// The kernel's rule (can/raw.h, af_can.c): one filter is enough; an inverted one passes what it does not match.
 static bool passes(const struct can_filter *filter, canid_t can_id) {
@@ -52,7 +50,7 @@ static bool is_known(uint32_t number) {
     return known;
 }
 
-static void test_filters_every_standard_id_goes_to_exactly_one_socket(void) {
+TEST(test_filters_every_standard_id_goes_to_exactly_one_socket) {
     for (uint32_t id = 0; id <= CAN_SFF_MASK; id++) {
         TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id), "ours");
         TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id | CAN_RTR_FLAG), "remote");
@@ -61,7 +59,7 @@ static void test_filters_every_standard_id_goes_to_exactly_one_socket(void) {
     }
 }
 
-static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
+TEST(test_filters_an_extended_frame_counts_by_its_whole_number) {
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         TEST_ASSERT_TRUE(is_ours(ids[i] | CAN_EFF_FLAG));
         TEST_ASSERT_FALSE(is_others(ids[i] | CAN_EFF_FLAG));
@@ -70,7 +68,7 @@ static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
     }
 }
 
-static void test_filters_do_not_ask_for_error_frames(void) {
+TEST(test_filters_do_not_ask_for_error_frames) {
     for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
         TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
@@ -83,7 +81,7 @@ static iw_can_frame_t translate(canid_t can_id, uint8_t length, int flags) {
     return iwl_socketcan_translate(&raw, flags);
 }
 
-static void test_translate_keeps_format_number_and_data(void) {
+TEST(test_translate_keeps_format_number_and_data) {
     const iw_can_frame_t plain = translate(256, 4, 0);
     TEST_ASSERT_EQUAL_HEX32(256, plain.id);
     TEST_ASSERT_EQUAL(4, plain.dlc);
@@ -95,13 +93,13 @@ static void test_translate_keeps_format_number_and_data(void) {
                             translate(256U | CAN_EFF_FLAG | CAN_RTR_FLAG, 0, 0).id);
 }
 
-static void test_translate_only_our_own_sockets_frame_is_an_echo(void) {
+TEST(test_translate_only_our_own_sockets_frame_is_an_echo) {
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, translate(266, 5, MSG_CONFIRM | MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, 0).kind);
 }
 
-static void test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry(void) {
+TEST(test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry) {
     iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t frame = translate(256, 64, MSG_TRUNC);
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_FD, frame.id);
@@ -118,7 +116,7 @@ static iwl_can_error_t error_of(canid_t classes, uint8_t controller) {
     return iwl_can_error_of(&raw);
 }
 
-static void test_error_frames_tell_the_state(void) {
+TEST(test_error_frames_tell_the_state) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF, error_of(CAN_ERR_BUSOFF, 0));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED, 0));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
@@ -129,13 +127,13 @@ static void test_error_frames_tell_the_state(void) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
 }
 
-static void test_error_frames_the_gravest_news_comes_first(void) {
+TEST(test_error_frames_the_gravest_news_comes_first) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF,
                       error_of(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
 }
 
-static void test_error_frames_that_are_about_something_else_change_no_state(void) {
+TEST(test_error_frames_that_are_about_something_else_change_no_state) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_LOSTARB, 0xFF));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_PROT | CAN_ERR_ACK | CAN_ERR_BUSERROR, 0xFF));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, 0));
@@ -143,31 +141,15 @@ static void test_error_frames_that_are_about_something_else_change_no_state(void
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW));
 }
 
-static void test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration(void) {
+TEST(test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration) {
     TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iwl_can_error_mask());
 }
 
-static void test_bits_of_frames(void) {
+TEST(test_bits_of_frames) {
     struct can_frame raw = {.can_id = 266, .len = 5};
     TEST_ASSERT_EQUAL_UINT32(47 + 40, iwl_socketcan_bits(&raw));
     raw.can_id = 266U | CAN_RTR_FLAG;
     TEST_ASSERT_EQUAL_UINT32(47, iwl_socketcan_bits(&raw));
     raw = (struct can_frame){.can_id = CAN_EFF_FLAG, .len = 8};
     TEST_ASSERT_EQUAL_UINT32(67 + 64, iwl_socketcan_bits(&raw));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_filters_every_standard_id_goes_to_exactly_one_socket);
-    RUN_TEST(test_filters_an_extended_frame_counts_by_its_whole_number);
-    RUN_TEST(test_filters_do_not_ask_for_error_frames);
-    RUN_TEST(test_translate_keeps_format_number_and_data);
-    RUN_TEST(test_translate_only_our_own_sockets_frame_is_an_echo);
-    RUN_TEST(test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry);
-    RUN_TEST(test_error_frames_tell_the_state);
-    RUN_TEST(test_error_frames_the_gravest_news_comes_first);
-    RUN_TEST(test_error_frames_that_are_about_something_else_change_no_state);
-    RUN_TEST(test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration);
-    RUN_TEST(test_bits_of_frames);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The socket of the bus against what the kernel promises: what is asked for, what an error means, what is sent. The calls are this file's own.
 #include "socketcan_socket.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -119,7 +119,7 @@ static bool was_asked(int level, int name, int value) {
     return false;
 }
 
-static void test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost(void) {
+TEST(test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost) {
     bus.lost = 7;
     bus.count = 5;
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
@@ -132,13 +132,13 @@ static void test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost(voi
     TEST_ASSERT_EQUAL_UINT32(0, bus.count);
 }
 
-static void test_can_socket_of_others_joins_its_filters_and_wants_no_errors(void) {
+TEST(test_can_socket_of_others_joins_its_filters_and_wants_no_errors) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
     TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1));
     TEST_ASSERT_FALSE(was_asked(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1));
 }
 
-static void test_can_socket_without_what_it_needs_is_not_opened(void) {
+TEST(test_can_socket_without_what_it_needs_is_not_opened) {
     static const int needed[] = {CAN_RAW_FILTER, CAN_RAW_ERR_FILTER, CAN_RAW_RECV_OWN_MSGS, SO_RXQ_OVFL};
     for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
         count = 0;
@@ -151,7 +151,7 @@ static void test_can_socket_without_what_it_needs_is_not_opened(void) {
     TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
 }
 
-static void test_can_socket_tells_frames_nothing_and_an_interface_that_went(void) {
+TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     before = ENODEV;
     come = (int)IWL_SOCKETCAN_BATCH;
@@ -167,7 +167,7 @@ static void test_can_socket_tells_frames_nothing_and_an_interface_that_went(void
     TEST_ASSERT_EQUAL_INT(ENETDOWN, iwl_socketcan_socket_fill(&bus));
 }
 
-static void test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained(void) {
+TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     come = 3;
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_drop(&bus));
@@ -178,7 +178,7 @@ static void test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be
     TEST_ASSERT_EQUAL_INT(ENODEV, iwl_socketcan_socket_drop(&bus));
 }
 
-static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(void) {
+TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, 1));
     static const int for_now[] = {EAGAIN, ENOBUFS, EINTR};
@@ -197,7 +197,7 @@ static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(vo
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
 }
 
-static void test_can_socket_pair_leaves_in_one_call_left_first(void) {
+TEST(test_can_socket_pair_leaves_in_one_call_left_first) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     TEST_ASSERT_EQUAL_INT(1, calls);
@@ -208,7 +208,7 @@ static void test_can_socket_pair_leaves_in_one_call_left_first(void) {
     }
 }
 
-static void test_can_socket_of_a_pair_that_leaves_in_half_reports_one(void) {
+TEST(test_can_socket_of_a_pair_that_leaves_in_half_reports_one) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     taken = 1;
     before = ENOBUFS;
@@ -216,13 +216,13 @@ static void test_can_socket_of_a_pair_that_leaves_in_half_reports_one(void) {
     TEST_ASSERT_EQUAL_INT(1, calls); // The second frame is not tried again.
 }
 
-static void test_can_socket_call_never_brings_more_frames_than_wheels(void) {
+TEST(test_can_socket_call_never_brings_more_frames_than_wheels) {
     iw_can_frame_t many[IW_SIDES + 1U] = {{.id = 1}, {.id = 2}, {.id = 3}};
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, many, IW_SIDES + 1U));
 }
 
-static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) {
+TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such) {
     unknown = true;
     memset(&bus, 0xA5, sizeof bus);
     const int error = iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS);
@@ -232,26 +232,10 @@ static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) 
     TEST_ASSERT_EQUAL_UINT(0, count);
 }
 
-static void test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one(void) {
+TEST(test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one) {
     iwl_socketcan_socket_use(&bus, 77, true);
     TEST_ASSERT_EQUAL_INT(77, bus.fd);
     TEST_ASSERT_TRUE(bus.is_hub);
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_FALSE(bus.is_hub);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost);
-    RUN_TEST(test_can_socket_of_others_joins_its_filters_and_wants_no_errors);
-    RUN_TEST(test_can_socket_without_what_it_needs_is_not_opened);
-    RUN_TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went);
-    RUN_TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained);
-    RUN_TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone);
-    RUN_TEST(test_can_socket_pair_leaves_in_one_call_left_first);
-    RUN_TEST(test_can_socket_of_a_pair_that_leaves_in_half_reports_one);
-    RUN_TEST(test_can_socket_call_never_brings_more_frames_than_wheels);
-    RUN_TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such);
-    RUN_TEST(test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // Which of the kernel's clocks is which: the wall's may be set, and the one that counts the machine's sleep is not the loop's.
 #include "iwheel_linux/clock.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <time.h>
 
@@ -26,9 +26,7 @@ void setUp(void) {
     passes_ns = 0;
 }
 
-void tearDown(void) {}
-
-static void test_clock_of_the_loop_is_monotonic_in_microseconds(void) {
+TEST(test_clock_of_the_loop_is_monotonic_in_microseconds) {
     TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_now_us());
     wall.tv_sec -= 3600;
     boot.tv_sec += 60;
@@ -37,7 +35,7 @@ static void test_clock_of_the_loop_is_monotonic_in_microseconds(void) {
     TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_read(&suspended_us));
 }
 
-static void test_clock_tells_sleep_that_the_loop_does_not_count(void) {
+TEST(test_clock_tells_sleep_that_the_loop_does_not_count) {
     iw_time_us_t suspended_us = 1;
     (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
@@ -49,7 +47,7 @@ static void test_clock_tells_sleep_that_the_loop_does_not_count(void) {
     TEST_ASSERT_EQUAL_UINT64(2000000, iwl_clock_suspended_us());
 }
 
-static void test_clock_time_between_the_two_looks_is_never_taken_for_sleep(void) {
+TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep) {
     iw_time_us_t suspended_us = 1;
     passes_ns = 40000000;
     (void)iwl_clock_read(&suspended_us);
@@ -59,7 +57,7 @@ static void test_clock_time_between_the_two_looks_is_never_taken_for_sleep(void)
     TEST_ASSERT_TRUE(suspended_us <= 2000000U);
 }
 
-static void test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known(void) {
+TEST(test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known) {
     TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(0));
     boot.tv_sec += 2;
     wall.tv_sec += 3600;
@@ -67,16 +65,6 @@ static void test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_
     TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(2000000U));
 }
 
-static void test_clock_of_the_wall_is_for_people_only(void) {
+TEST(test_clock_of_the_wall_is_for_people_only) {
     TEST_ASSERT_EQUAL_INT64(1700000000987654, iwl_clock_wall_us());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_clock_of_the_loop_is_monotonic_in_microseconds);
-    RUN_TEST(test_clock_tells_sleep_that_the_loop_does_not_count);
-    RUN_TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep);
-    RUN_TEST(test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known);
-    RUN_TEST(test_clock_of_the_wall_is_for_people_only);
-    return UNITY_END();
 }

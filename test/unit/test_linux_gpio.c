@@ -2,7 +2,7 @@
 // How a GPIO line is named, and when its button counts as released.
 #include "gpio.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <string.h>
@@ -21,9 +21,7 @@ void setUp(void) {
     now_us = START_US;
 }
 
-void tearDown(void) {}
-
-static void test_address_by_chip_and_offset(void) {
+TEST(test_address_by_chip_and_offset) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("gpiochip0:4", &address));
     TEST_ASSERT_TRUE(address.by_offset);
     TEST_ASSERT_EQUAL_STRING("gpiochip0", address.name);
@@ -33,7 +31,7 @@ static void test_address_by_chip_and_offset(void) {
     TEST_ASSERT_EQUAL_UINT(65535, address.offset);
 }
 
-static void test_address_by_name(void) {
+TEST(test_address_by_name) {
     static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_gpio_address_parse(names[i], &address), names[i]);
@@ -42,7 +40,7 @@ static void test_address_by_name(void) {
     }
 }
 
-static void test_address_that_is_none_is_refused_and_changes_nothing(void) {
+TEST(test_address_that_is_none_is_refused_and_changes_nothing) {
     static const char *const wrong[] = {"",
                                         "gpiochip:4",
                                         "gpiochip0:",
@@ -62,7 +60,7 @@ static void test_address_that_is_none_is_refused_and_changes_nothing(void) {
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, &address, sizeof address);
 }
 
-static void test_address_the_longest_name_fits(void) {
+TEST(test_address_the_longest_name_fits) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
     TEST_ASSERT_EQUAL_size_t(31, strlen(address.name));
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
@@ -77,13 +75,13 @@ static bool pressed(void) {
     return iwl_gpio_release_take_pressed(&release, now_us);
 }
 
-static void test_release_a_line_that_is_inactive_from_the_start_is_released_at_once(void) {
+TEST(test_release_a_line_that_is_inactive_from_the_start_is_released_at_once) {
     look(0, false, false);
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
-static void test_release_a_press_counts_at_once(void) {
+TEST(test_release_a_press_counts_at_once) {
     look(0, true, false);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
@@ -92,7 +90,7 @@ static void test_release_a_press_counts_at_once(void) {
     TEST_ASSERT_TRUE(pressed());
 }
 
-static void test_release_counts_when_it_has_lasted(void) {
+TEST(test_release_counts_when_it_has_lasted) {
     look(0, true, true);
     (void)pressed();
     look(1000U * MS, false, true);
@@ -105,7 +103,7 @@ static void test_release_counts_when_it_has_lasted(void) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
-static void test_release_is_put_off_by_every_bounce(void) {
+TEST(test_release_is_put_off_by_every_bounce) {
     look(0, true, true);
     (void)pressed();
     for (unsigned bounce = 0; bounce < 20U; bounce++) {
@@ -120,7 +118,7 @@ static void test_release_is_put_off_by_every_bounce(void) {
     TEST_ASSERT_FALSE(pressed());
 }
 
-static void test_release_a_pulse_between_two_looks_is_told(void) {
+TEST(test_release_a_pulse_between_two_looks_is_told) {
     look(0, false, false);
     (void)pressed();
     look(20U * MS, false, true);
@@ -129,14 +127,14 @@ static void test_release_a_pulse_between_two_looks_is_told(void) {
     TEST_ASSERT_FALSE(pressed());
 }
 
-static void test_release_an_edge_is_told_however_late_it_is_asked_for(void) {
+TEST(test_release_an_edge_is_told_however_late_it_is_asked_for) {
     look(0, false, true);
     now_us += 1000U * MS;
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
 }
 
-static void test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked(void) {
+TEST(test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked) {
     look(0, false, true);
     look(10U * MS, false, false);
     now_us += 1000U * MS;
@@ -144,7 +142,7 @@ static void test_release_an_edge_is_told_although_it_was_looked_at_again_before_
     TEST_ASSERT_FALSE(pressed());
 }
 
-static void test_release_a_level_seen_and_gone_again_is_told_without_any_edge(void) {
+TEST(test_release_a_level_seen_and_gone_again_is_told_without_any_edge) {
     look(0, true, false);
     look(10U * MS, false, false);
     now_us += 1000U * MS;
@@ -152,7 +150,7 @@ static void test_release_a_level_seen_and_gone_again_is_told_without_any_edge(vo
     TEST_ASSERT_FALSE(pressed());
 }
 
-static void test_release_without_debounce_follows_the_level(void) {
+TEST(test_release_without_debounce_follows_the_level) {
     iwl_gpio_release_init(&release, 0);
     look(0, true, true);
     TEST_ASSERT_TRUE(pressed());
@@ -160,22 +158,4 @@ static void test_release_without_debounce_follows_the_level(void) {
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_address_by_chip_and_offset);
-    RUN_TEST(test_address_by_name);
-    RUN_TEST(test_address_that_is_none_is_refused_and_changes_nothing);
-    RUN_TEST(test_address_the_longest_name_fits);
-    RUN_TEST(test_release_a_line_that_is_inactive_from_the_start_is_released_at_once);
-    RUN_TEST(test_release_a_press_counts_at_once);
-    RUN_TEST(test_release_counts_when_it_has_lasted);
-    RUN_TEST(test_release_is_put_off_by_every_bounce);
-    RUN_TEST(test_release_a_pulse_between_two_looks_is_told);
-    RUN_TEST(test_release_an_edge_is_told_however_late_it_is_asked_for);
-    RUN_TEST(test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked);
-    RUN_TEST(test_release_a_level_seen_and_gone_again_is_told_without_any_edge);
-    RUN_TEST(test_release_without_debounce_follows_the_level);
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 
 #include "iwheel_linux/backend.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -91,7 +91,7 @@ void tearDown(void) {
     iwl_gpio_estop_ops->close(&store);
 }
 
-static void test_estop_line_low_is_pressed_and_high_is_released(void) {
+TEST(test_estop_line_low_is_pressed_and_high_is_released) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 0;
     wire.edges = 1;
@@ -108,7 +108,7 @@ static void test_estop_line_low_is_pressed_and_high_is_released(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
-static void test_estop_line_active_high_is_the_other_way_round(void) {
+TEST(test_estop_line_active_high_is_the_other_way_round) {
     tearDown();
     begin(true);
     TEST_ASSERT_EQUAL_INT(0, pressed());
@@ -118,14 +118,14 @@ static void test_estop_line_active_high_is_the_other_way_round(void) {
     TEST_ASSERT_EQUAL_INT(1, pressed());
 }
 
-static void test_estop_level_is_looked_at_although_the_wait_has_told_nothing(void) {
+TEST(test_estop_level_is_looked_at_although_the_wait_has_told_nothing) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 0;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, iwl_gpio_estop_ops->pressed(&store, true));
 }
 
-static void test_estop_pulse_of_which_only_the_edges_are_left_is_a_press(void) {
+TEST(test_estop_pulse_of_which_only_the_edges_are_left_is_a_press) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = 2;
     poll_after(1);
@@ -134,7 +134,7 @@ static void test_estop_pulse_of_which_only_the_edges_are_left_is_a_press(void) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
-static void test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges(void) {
+TEST(test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges) {
     wire.level = -1;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
@@ -148,7 +148,7 @@ static void test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edge
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
-static void test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once(void) {
+TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once) {
     wire.level = -1;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
@@ -159,7 +159,7 @@ static void test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unre
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->trouble(&store));
 }
 
-static void test_estop_chip_that_is_gone_is_tried_again_once_in_a_while(void) {
+TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while) {
     wire.level = -1;
     poll_after(1);
     (void)pressed();
@@ -175,7 +175,7 @@ static void test_estop_chip_that_is_gone_is_tried_again_once_in_a_while(void) {
     TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_estop_ops->trouble(&store));
 }
 
-static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can(void) {
+TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can) {
     tearDown();
     wire.open_error = EBUSY;
     begin(false);
@@ -187,7 +187,7 @@ static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_c
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_estop_ops->next_us(&store));
 }
 
-static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
+TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed) {
     tearDown();
     wire.open_error = EREMCHG;
     begin(false);
@@ -197,7 +197,7 @@ static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
-static void test_estop_line_has_names_as_long_as_it_can_be_read(void) {
+TEST(test_estop_line_has_names_as_long_as_it_can_be_read) {
     const iwl_estop_seen_t *seen = iwl_gpio_estop_ops->seen(&store);
     TEST_ASSERT_NOT_NULL(seen);
     TEST_ASSERT_EQUAL_STRING("label", seen->chip);
@@ -207,7 +207,7 @@ static void test_estop_line_has_names_as_long_as_it_can_be_read(void) {
     TEST_ASSERT_NULL(iwl_gpio_estop_ops->seen(&store));
 }
 
-static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
+TEST(test_estop_expects_what_is_configured_and_nothing_for_any) {
     static const char *const longest = "0123456789012345678901234567890";
     static const struct {
         const char *chip;
@@ -234,7 +234,7 @@ static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
     begin(false);
 }
 
-static void test_estop_that_is_no_line_is_called_nothing(void) {
+TEST(test_estop_that_is_no_line_is_called_nothing) {
     iwl_estop_seen_t seen;
     TEST_ASSERT_EQUAL_INT(ENOTSUP, iwl_estop_see("unix:/tmp/button", &seen));
     TEST_ASSERT_EQUAL_INT(EINVAL, iwl_estop_see("gpiochip:4", &seen));
@@ -242,7 +242,7 @@ static void test_estop_that_is_no_line_is_called_nothing(void) {
     TEST_ASSERT_EQUAL_STRING("label", seen.chip);
 }
 
-static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
+TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now) {
     const uint64_t one = 1;
     struct pollfd wait = {.fd = iwl_gpio_estop_ops->watch_fd(&store), .events = POLLIN};
     TEST_ASSERT_EQUAL_INT(0, poll(&wait, 1, 0));
@@ -255,7 +255,7 @@ static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
     TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
 }
 
-static void test_estop_without_a_descriptor_for_waiting_is_refused(void) {
+TEST(test_estop_without_a_descriptor_for_waiting_is_refused) {
     struct rlimit before;
     tearDown();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
@@ -266,23 +266,4 @@ static void test_estop_without_a_descriptor_for_waiting_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_INT(EMFILE, error);
     begin(false);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_estop_line_low_is_pressed_and_high_is_released);
-    RUN_TEST(test_estop_line_active_high_is_the_other_way_round);
-    RUN_TEST(test_estop_level_is_looked_at_although_the_wait_has_told_nothing);
-    RUN_TEST(test_estop_pulse_of_which_only_the_edges_are_left_is_a_press);
-    RUN_TEST(test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges);
-    RUN_TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once);
-    RUN_TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while);
-    RUN_TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can);
-    RUN_TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed);
-    RUN_TEST(test_estop_line_has_names_as_long_as_it_can_be_read);
-    RUN_TEST(test_estop_expects_what_is_configured_and_nothing_for_any);
-    RUN_TEST(test_estop_that_is_no_line_is_called_nothing);
-    RUN_TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now);
-    RUN_TEST(test_estop_without_a_descriptor_for_waiting_is_refused);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "../support/fake_gpio.h"
 #include "gpio.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -54,7 +54,7 @@ void tearDown(void) {
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
 }
 
-static void test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait(void) {
+TEST(test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait) {
     TEST_ASSERT_EQUAL_INT(1, fake_gpio.requested);
     TEST_ASSERT_TRUE(fake_gpio.is_input);
     TEST_ASSERT_TRUE(fake_gpio.pulled_up);
@@ -65,7 +65,7 @@ static void test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait(vo
     TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
 }
 
-static void test_line_by_chip_and_offset_is_that_line(void) {
+TEST(test_line_by_chip_and_offset_is_that_line) {
     iwl_gpio_line_close(&line);
     fake_gpio.offset = 0;
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_offset));
@@ -73,7 +73,7 @@ static void test_line_by_chip_and_offset_is_that_line(void) {
     TEST_ASSERT_EQUAL_INT(1, fake_gpio.open);
 }
 
-static void test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read(void) {
+TEST(test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read) {
     fake_gpio.level = 1;
     TEST_ASSERT_EQUAL_INT(1, iwl_gpio_line_level(&line));
     fake_gpio.level = 0;
@@ -82,7 +82,7 @@ static void test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read(void)
     TEST_ASSERT_TRUE(iwl_gpio_line_level(&line) < 0);
 }
 
-static void test_edges_are_all_taken_and_counted(void) {
+TEST(test_edges_are_all_taken_and_counted) {
     static const int numbers[] = {0, 1, 2, 15, 16, 17, 33};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         fake_gpio.edges = numbers[i];
@@ -91,13 +91,13 @@ static void test_edges_are_all_taken_and_counted(void) {
     }
 }
 
-static void test_edges_without_end_take_a_bounded_time(void) {
+TEST(test_edges_without_end_take_a_bounded_time) {
     fake_gpio.edges = 1000000;
     TEST_ASSERT_GREATER_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, iwl_gpio_line_take_edges(&line));
     TEST_ASSERT_LESS_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, fake_gpio.reads);
 }
 
-static void test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none(void) {
+TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none) {
     fake_gpio.edges_error = ENODEV;
     TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0);
     fake_gpio.edges = 3;
@@ -109,7 +109,7 @@ static void test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_i
     TEST_ASSERT_EQUAL_INT(5, iwl_gpio_line_take_edges(&line));
 }
 
-static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) {
+TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open) {
     iwl_gpio_line_close(&line);
     fake_gpio.busy_error = EBUSY;
     TEST_ASSERT_EQUAL_INT(EBUSY, iwl_gpio_line_open(&line, &by_name));
@@ -131,7 +131,7 @@ static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) 
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
 }
 
-static void test_line_name_that_exists_twice_is_refused(void) {
+TEST(test_line_name_that_exists_twice_is_refused) {
     for (int twin = 1; twin <= 2; twin++) {
         iwl_gpio_line_close(&line);
         fake_gpio.twin = twin;
@@ -142,7 +142,7 @@ static void test_line_name_that_exists_twice_is_refused(void) {
     }
 }
 
-static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) {
+TEST(test_line_that_is_called_otherwise_than_expected_is_not_taken) {
     static const struct {
         iwl_estop_seen_t expected;
         int error;
@@ -167,7 +167,7 @@ static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) 
     }
 }
 
-static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
+TEST(test_line_whose_chip_was_renumbered_is_not_taken) {
     iwl_gpio_address_t address = by_offset;
     address.expected = (iwl_estop_seen_t){.chip = FAKE_GPIO_LABEL};
     iwl_gpio_line_close(&line);
@@ -179,7 +179,7 @@ static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
     TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_line_open(&line, &address));
 }
 
-static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
+TEST(test_line_is_seen_with_label_and_name_and_not_taken) {
     const iwl_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U; i++) {
         iwl_estop_seen_t seen = {.chip = "x", .line = "y"};
@@ -205,26 +205,9 @@ static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
 }
 
-static void test_line_that_is_closed_is_given_back(void) {
+TEST(test_line_that_is_closed_is_given_back) {
     iwl_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_open(&line, &by_name));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait);
-    RUN_TEST(test_line_by_chip_and_offset_is_that_line);
-    RUN_TEST(test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read);
-    RUN_TEST(test_edges_are_all_taken_and_counted);
-    RUN_TEST(test_edges_without_end_take_a_bounded_time);
-    RUN_TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none);
-    RUN_TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open);
-    RUN_TEST(test_line_name_that_exists_twice_is_refused);
-    RUN_TEST(test_line_that_is_called_otherwise_than_expected_is_not_taken);
-    RUN_TEST(test_line_whose_chip_was_renumbered_is_not_taken);
-    RUN_TEST(test_line_is_seen_with_label_and_name_and_not_taken);
-    RUN_TEST(test_line_that_is_closed_is_given_back);
-    return UNITY_END();
 }

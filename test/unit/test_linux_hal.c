@@ -3,9 +3,9 @@
 
 #include "iwheel_linux/linux_hal.h"
 
+#include "unit.h"
 #include <errno.h>
 #include <stdio.h>
-#include <unity.h>
 
 static iwl_hal_t hal;
 static bool was_quiet;
@@ -66,44 +66,42 @@ void setUp(void) {
     answer = 0;
 }
 
-void tearDown(void) {}
-
 static int look(void) {
     return iwl_hal_pressed(&hal);
 }
 
-static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {
+TEST(test_estop_is_read_whole_by_whoever_does_not_wait) {
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-static void test_estop_that_was_not_told_of_has_no_edges(void) {
+TEST(test_estop_that_was_not_told_of_has_no_edges) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     TEST_ASSERT_TRUE(was_quiet);
 }
 
-static void test_estop_that_was_told_of_is_read_whole(void) {
+TEST(test_estop_that_was_told_of_is_read_whole) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     iwl_hal_waited(&hal, (iwl_reported_t){false, true});
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-static void test_wait_counts_for_one_look(void) {
+TEST(test_wait_counts_for_one_look) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-static void test_last_answer_is_kept(void) {
+TEST(test_last_answer_is_kept) {
     answer = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
     TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
 }
 
-static void test_next_time_is_the_sooner_of_bus_and_estop(void) {
+TEST(test_next_time_is_the_sooner_of_bus_and_estop) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 200;
     estop_due_us = 100;
@@ -147,7 +145,7 @@ static int open_with(const char *first, const char *second) {
     return error;
 }
 
-static void test_one_line_under_two_names_is_no_second_contact(void) {
+TEST(test_one_line_under_two_names_is_no_second_contact) {
     if (iwl_gpio_estop_ops == NULL) {
         TEST_IGNORE_MESSAGE("without libgpiod");
     }
@@ -160,7 +158,7 @@ static void test_one_line_under_two_names_is_no_second_contact(void) {
     TEST_ASSERT_EQUAL_INT(0, open_with("D", "A"));
 }
 
-static void test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first(void) {
+TEST(test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first) {
     static const char too_long[] = "01234567890123456789012345678901";
     static iwl_hal_t other;
     const char *cause = NULL;
@@ -175,7 +173,7 @@ static void test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first(
     TEST_ASSERT_EQUAL_STRING("B", cause);
 }
 
-static void test_second_contact_is_read_whatever_the_first_says(void) {
+TEST(test_second_contact_is_read_whatever_the_first_says) {
     set_up_two();
     answer = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
@@ -192,7 +190,7 @@ static void test_second_contact_is_read_whatever_the_first_says(void) {
     TEST_ASSERT_EQUAL_INT(-1, look());
 }
 
-static void test_contacts_are_judged_at_the_time_of_the_round(void) {
+TEST(test_contacts_are_judged_at_the_time_of_the_round) {
     set_up_two();
     answer2 = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
@@ -201,7 +199,7 @@ static void test_contacts_are_judged_at_the_time_of_the_round(void) {
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hal.estop_last);
 }
 
-static void test_each_contact_is_watched_tended_and_told_of(void) {
+TEST(test_each_contact_is_watched_tended_and_told_of) {
     TEST_ASSERT_EQUAL_INT(10, iwl_hal_estop_fd(&hal));
     TEST_ASSERT_EQUAL_INT(-1, iwl_hal_estop2_fd(&hal));
     TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
@@ -218,7 +216,7 @@ static void test_each_contact_is_watched_tended_and_told_of(void) {
     TEST_ASSERT_EQUAL_INT(2, iwl_hal_estop_trouble(&hal, 1));
 }
 
-static void test_each_contact_is_closed(void) {
+TEST(test_each_contact_is_closed) {
     closed = 0;
     iwl_hal_close(&hal);
     TEST_ASSERT_EQUAL_UINT(1, closed);
@@ -227,7 +225,7 @@ static void test_each_contact_is_closed(void) {
     TEST_ASSERT_EQUAL_UINT(12, closed);
 }
 
-static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(void) {
+TEST(test_next_time_is_the_soonest_of_both_contacts_and_their_difference) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 5000000;
     estop_due_us = 4000000;
@@ -242,22 +240,4 @@ static void test_next_time_is_the_soonest_of_both_contacts_and_their_difference(
     TEST_ASSERT_EQUAL_UINT64(1100000, iwl_hal_next_us(&hal));
     bus->look_us = 1000000;
     TEST_ASSERT_EQUAL_UINT64(1000000, iwl_hal_next_us(&hal));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_estop_is_read_whole_by_whoever_does_not_wait);
-    RUN_TEST(test_estop_that_was_not_told_of_has_no_edges);
-    RUN_TEST(test_estop_that_was_told_of_is_read_whole);
-    RUN_TEST(test_wait_counts_for_one_look);
-    RUN_TEST(test_last_answer_is_kept);
-    RUN_TEST(test_next_time_is_the_sooner_of_bus_and_estop);
-    RUN_TEST(test_one_line_under_two_names_is_no_second_contact);
-    RUN_TEST(test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first);
-    RUN_TEST(test_second_contact_is_read_whatever_the_first_says);
-    RUN_TEST(test_contacts_are_judged_at_the_time_of_the_round);
-    RUN_TEST(test_each_contact_is_watched_tended_and_told_of);
-    RUN_TEST(test_each_contact_is_closed);
-    RUN_TEST(test_next_time_is_the_soonest_of_both_contacts_and_their_difference);
-    return UNITY_END();
 }

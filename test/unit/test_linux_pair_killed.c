@@ -2,7 +2,7 @@
 // A process that is killed while it sends pairs leaves no left setpoint alone: this kernel looks at no signal between two frames of one call.
 #include "socketcan_socket.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <signal.h>
 #include <sys/wait.h>
@@ -18,10 +18,6 @@ static const iw_can_frame_t pair[IW_SIDES] = {{.id = IW_ID_LEFT_SETPOINT, .dlc =
 
 void setUp(void);
 void tearDown(void);
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 /// Until it is killed. After each burst it waits until all of it was received, so that no pair leaves in half for want of room.
 static _Noreturn void send_pairs(int fd) {
@@ -73,7 +69,7 @@ static void live_and_die(long life_ns, unsigned count[IW_SIDES]) {
     TEST_ASSERT_TRUE_MESSAGE(WIFSIGNALED(status), "it ended by itself");
 }
 
-static void test_pair_of_a_killed_process_left_whole_or_not_at_all(void) {
+TEST(test_pair_of_a_killed_process_left_whole_or_not_at_all) {
     unsigned killed = 0;
     for (unsigned i = 0; i < KILLS; i++) {
         unsigned count[IW_SIDES] = {0, 0};
@@ -82,10 +78,4 @@ static void test_pair_of_a_killed_process_left_whole_or_not_at_all(void) {
         TEST_ASSERT_EQUAL_UINT_MESSAGE(count[IW_LEFT], count[IW_RIGHT], "a left setpoint was left alone");
     }
     TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, killed, "hardly any was killed while it was sending");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pair_of_a_killed_process_left_whole_or_not_at_all);
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 
 #include "iwheel_linux/backend.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -77,7 +77,7 @@ void tearDown(void) {
     iwl_bus_close(&store);
 }
 
-static void test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once(void) {
+TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
@@ -85,7 +85,7 @@ static void test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once(void) 
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow(void) {
+TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow) {
     for (unsigned i = 0; i < 10U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
@@ -98,7 +98,7 @@ static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_fol
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_nothing_is_sent_between_a_bus_off_and_its_being_told(void) {
+TEST(test_nothing_is_sent_between_a_bus_off_and_its_being_told) {
     for (unsigned i = 0; i < IWL_SOCKETCAN_BATCH; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
@@ -112,14 +112,14 @@ static void test_nothing_is_sent_between_a_bus_off_and_its_being_told(void) {
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-static void test_restart_tells_of_a_loss_that_was_not_heard(void) {
+TEST(test_restart_tells_of_a_loss_that_was_not_heard) {
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
+TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
     wait_ms(20);
@@ -137,7 +137,7 @@ static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_bus_next_us(&store));
 }
 
-static void test_bus_off_that_was_forged_is_told_once_and_checked_at_once(void) {
+TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, MSG_DONTROUTE);
     wait_ms(1);
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.looks);
@@ -145,7 +145,7 @@ static void test_bus_off_that_was_forged_is_told_once_and_checked_at_once(void) 
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_good_news_that_were_forged_are_not_believed(void) {
+TEST(test_good_news_that_were_forged_are_not_believed) {
     fake_interface.carrier = 0;
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, MSG_DONTROUTE);
@@ -155,7 +155,7 @@ static void test_good_news_that_were_forged_are_not_believed(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-static void test_passive_lasts_until_active_and_active_does_not_end_bus_off(void) {
+TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off) {
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, 0);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
@@ -173,7 +173,7 @@ static void test_passive_lasts_until_active_and_active_does_not_end_bus_off(void
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-static void test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again(void) {
+TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again) {
     iw_can_frame_t frame;
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
@@ -190,7 +190,7 @@ static void test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.opened); // The same socket.
 }
 
-static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old(void) {
+TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -203,7 +203,7 @@ static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_
     TEST_ASSERT_EQUAL_UINT(1, drain());
 }
 
-static void test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody(void) {
+TEST(test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -214,7 +214,7 @@ static void test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.others.count);
 }
 
-static void test_batch_half_taken_when_the_link_goes_down_is_forgotten(void) {
+TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten) {
     iw_can_frame_t frame;
     for (unsigned i = 0; i < 20U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
@@ -229,7 +229,7 @@ static void test_batch_half_taken_when_the_link_goes_down_is_forgotten(void) {
     TEST_ASSERT_EQUAL_UINT(0, drain());
 }
 
-static void test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once(void) {
+TEST(test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
     wait_ms(200); // It was up all along, as far as can be seen.
@@ -238,7 +238,7 @@ static void test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_onc
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-static void test_interface_that_was_deleted_and_made_again_gets_new_sockets(void) {
+TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets) {
     fake_interface.ours.error = ENODEV;
     fake_interface.presence = IWL_LINK_ABSENT;
     wait_ms(1);
@@ -253,14 +253,14 @@ static void test_interface_that_was_deleted_and_made_again_gets_new_sockets(void
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-static void test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets(void) {
+TEST(test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets) {
     fake_interface.ours.error = ENODEV;
     wait_ms(1);
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.opened);
 }
 
-static void test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise(void) {
+TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
@@ -276,7 +276,7 @@ static void test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_ot
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_netlink_that_does_not_answer_leaves_an_interface_that_is_up(void) {
+TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
     (void)state();
@@ -286,7 +286,7 @@ static void test_netlink_that_does_not_answer_leaves_an_interface_that_is_up(voi
     TEST_ASSERT_FALSE(link_now()->echo_proven);
 }
 
-static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period(void) {
+TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -300,7 +300,7 @@ static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its
     TEST_ASSERT_EQUAL_UINT(before + 1U, fake_interface.readings);
 }
 
-static void test_interface_that_stays_down_is_no_news(void) {
+TEST(test_interface_that_stays_down_is_no_news) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -326,7 +326,7 @@ static void assert_not_opened(int error) {
     fake_interface.events_dead = false;
 }
 
-static void test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open(void) {
+TEST(test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open) {
     iwl_bus_close(&store);
     const unsigned before = descriptors();
     no_can = true;
@@ -343,7 +343,7 @@ static void test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open(void)
     setUp();
 }
 
-static void test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing(void) {
+TEST(test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing) {
     iwl_bus_close(&store);
     fake_interface.presence = IWL_LINK_DOWN;
     fake_interface.netlink_fails = true;
@@ -352,7 +352,7 @@ static void test_interface_that_is_down_at_start_is_told_so_though_netlink_says_
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
 }
 
-static void test_interface_without_sockets_is_down_until_it_has_some(void) {
+TEST(test_interface_without_sockets_is_down_until_it_has_some) {
     iw_can_frame_t frame;
     iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
@@ -366,13 +366,13 @@ static void test_interface_without_sockets_is_down_until_it_has_some(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_full_queue_is_no_loss(void) {
+TEST(test_full_queue_is_no_loss) {
     fake_interface.send_result = 0;
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
+TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended) {
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
@@ -388,7 +388,7 @@ static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
 }
 
-static void test_purge_is_remembered_over_a_reading_that_brings_something_else(void) {
+TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else) {
     (void)iwl_bus_purge(&store);
     fake_interface.restart_result = 0;
     wait_ms(1);
@@ -400,7 +400,7 @@ static void test_purge_is_remembered_over_a_reading_that_brings_something_else(v
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, link_now()->purge);
 }
 
-static void test_load_counts_the_frames_of_ours_and_of_others(void) {
+TEST(test_load_counts_the_frames_of_ours_and_of_others) {
     wait_ms(1000);
     TEST_ASSERT_EQUAL_UINT32(0, link_now()->load_permille);
     for (unsigned i = 0; i < 20U; i++) {
@@ -421,7 +421,7 @@ static void test_load_counts_the_frames_of_ours_and_of_others(void) {
     TEST_ASSERT_EQUAL_UINT32(2U * ours, link_now()->load_permille);
 }
 
-static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
+TEST(test_purge_that_was_not_allowed_is_not_tried_again) {
     (void)iwl_bus_purge(&store);
     fake_interface.restart_result = EPERM;
     wait_ms(1);
@@ -430,7 +430,7 @@ static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
 }
 
-static void test_purge_where_the_echo_proves_nothing_leaves_the_link_alone(void) {
+TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone) {
     iwl_bus_close(&store);
     fake_interface_init();
     fake_interface.link.echo_proven = false;
@@ -439,7 +439,7 @@ static void test_purge_where_the_echo_proves_nothing_leaves_the_link_alone(void)
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.restarts);
 }
 
-static void test_flood_of_errors_takes_a_bounded_part_of_a_step(void) {
+TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step) {
     for (unsigned i = 0; i < 1000U; i++) {
         fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING, 0);
     }
@@ -449,7 +449,7 @@ static void test_flood_of_errors_takes_a_bounded_part_of_a_step(void) {
     TEST_ASSERT_GREATER_THAN_UINT(600, fake_interface.ours.count);
 }
 
-static void test_lost_frames_are_counted_and_the_carrier_is_looked_at(void) {
+TEST(test_lost_frames_are_counted_and_the_carrier_is_looked_at) {
     fake_interface.ours.lost = 7;
     fake_interface.carrier = 0; // The error frame that told was among them.
     wait_ms(1);
@@ -457,7 +457,7 @@ static void test_lost_frames_are_counted_and_the_carrier_is_looked_at(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-static void test_other_ids_come_after_ours_and_not_right_after_a_setpoint(void) {
+TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint) {
     iw_can_frame_t frame;
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
@@ -485,7 +485,7 @@ static void test_other_ids_come_after_ours_and_not_right_after_a_setpoint(void) 
     TEST_ASSERT_EQUAL_INT(1, receive(&frame));
 }
 
-static void test_echo_is_told_by_the_mark_of_the_message(void) {
+TEST(test_echo_is_told_by_the_mark_of_the_message) {
     iw_can_frame_t frame;
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_CONFIRM | MSG_DONTROUTE);
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_DONTROUTE);
@@ -496,7 +496,7 @@ static void test_echo_is_told_by_the_mark_of_the_message(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
 }
 
-static void test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again(void) {
+TEST(test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again) {
     TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
     fake_interface.ours.error = ENETDOWN;
     fake_interface.link.restart_ms = 99;
@@ -506,7 +506,7 @@ static void test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_ag
     TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
 }
 
-static void test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus(void) {
+TEST(test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus) {
     fake_interface.news = true;
     iwl_bus_waited(&store, false);
     wait_ms(1);
@@ -516,7 +516,7 @@ static void test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_b
     TEST_ASSERT_FALSE(fake_interface.news);
 }
 
-static void test_interface_that_is_back_is_found_whatever_the_wait_has_told(void) {
+TEST(test_interface_that_is_back_is_found_whatever_the_wait_has_told) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -526,44 +526,4 @@ static void test_interface_that_is_back_is_found_whatever_the_wait_has_told(void
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss, once.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once);
-    RUN_TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow);
-    RUN_TEST(test_nothing_is_sent_between_a_bus_off_and_its_being_told);
-    RUN_TEST(test_restart_tells_of_a_loss_that_was_not_heard);
-    RUN_TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back);
-    RUN_TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once);
-    RUN_TEST(test_good_news_that_were_forged_are_not_believed);
-    RUN_TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off);
-    RUN_TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again);
-    RUN_TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old);
-    RUN_TEST(test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody);
-    RUN_TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten);
-    RUN_TEST(test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once);
-    RUN_TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets);
-    RUN_TEST(test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets);
-    RUN_TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise);
-    RUN_TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up);
-    RUN_TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period);
-    RUN_TEST(test_interface_that_stays_down_is_no_news);
-    RUN_TEST(test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open);
-    RUN_TEST(test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing);
-    RUN_TEST(test_interface_without_sockets_is_down_until_it_has_some);
-    RUN_TEST(test_full_queue_is_no_loss);
-    RUN_TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended);
-    RUN_TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else);
-    RUN_TEST(test_load_counts_the_frames_of_ours_and_of_others);
-    RUN_TEST(test_purge_that_was_not_allowed_is_not_tried_again);
-    RUN_TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone);
-    RUN_TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step);
-    RUN_TEST(test_lost_frames_are_counted_and_the_carrier_is_looked_at);
-    RUN_TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint);
-    RUN_TEST(test_echo_is_told_by_the_mark_of_the_message);
-    RUN_TEST(test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again);
-    RUN_TEST(test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus);
-    RUN_TEST(test_interface_that_is_back_is_found_whatever_the_wait_has_told);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "mqtt_command.h"
 #include "mqtt_tell.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,8 +20,6 @@ void setUp(void) {
     memset(&judge, 0, sizeof judge);
     rules = (mqtt_rules_t){BOOT, 300, true, true, "iwheel/w1/reply/"};
 }
-
-void tearDown(void) {}
 
 static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t now_us) {
     const mqtt_command_t command = {.verb = verb, .payload = text, .length = strlen(text)};
@@ -41,7 +39,7 @@ static mqtt_verdict_t judge_it(const char *verb, uint64_t told_us, int seq, cons
     return judge_text(verb, text, now_us);
 }
 
-static void test_command_fresh_is_taken_as_the_gateways_request(void) {
+TEST(test_command_fresh_is_taken_as_the_gateways_request) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 2, ",\"reason\":\"a \\\"b\\\"\"", NOW_US));
@@ -52,7 +50,7 @@ static void test_command_fresh_is_taken_as_the_gateways_request(void) {
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"name\":\"mqtt far\",\"t_us\":50000000}", order.request);
 }
 
-static void test_command_age_is_judged_to_the_microsecond(void) {
+TEST(test_command_age_is_judged_to_the_microsecond) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US + 1000000U));
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 2, "", NOW_US + 1000001U));
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("estop", NOW_US, 3, "", NOW_US + 1000001U));
@@ -78,7 +76,7 @@ static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t corr
     return order.verdict;
 }
 
-static void test_command_response_topic_counts_among_this_machines_replies_only(void) {
+TEST(test_command_response_topic_counts_among_this_machines_replies_only) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 0));
     TEST_ASSERT_EQUAL_STRING("far", order.to);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, "iwheel/w1/reply/other", 0));
@@ -92,7 +90,7 @@ static void test_command_response_topic_counts_among_this_machines_replies_only(
     }
 }
 
-static void test_command_correlation_data_is_kept_up_to_its_limit(void) {
+TEST(test_command_correlation_data_is_kept_up_to_its_limit) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 3));
     TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);
     TEST_ASSERT_EQUAL_MEMORY("c\0d", order.correlation, 3);
@@ -100,18 +98,18 @@ static void test_command_correlation_data_is_kept_up_to_its_limit(void) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled(3, NULL, MQTT_CORRELATION_MAX + 1U));
 }
 
-static void test_command_cannot_make_its_own_life_longer(void) {
+TEST(test_command_cannot_make_its_own_life_longer) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 1, ",\"ttl_ms\":1000", NOW_US + 300001U));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
 }
 
-static void test_command_of_another_boot_is_dropped_before_its_age(void) {
+TEST(test_command_of_another_boot_is_dropped_before_its_age) {
     const char *text = "{\"from\":\"far\",\"boot\":\"0123456789abcdee\",\"t_us\":50000000,\"seq\":1}";
     TEST_ASSERT_EQUAL(MQTT_OTHER_BOOT, judge_text("stop", text, NOW_US));
 }
 
-static void test_command_seq_must_rise(void) {
+TEST(test_command_seq_must_rise) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 5, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 5, "", NOW_US + 1U));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 4, "", NOW_US + 1000000U));
@@ -119,7 +117,7 @@ static void test_command_seq_must_rise(void) {
 }
 
 /// Whoever writes another's name uses up its numbers, or all places: neither refuses a stop.
-static void test_stop_never_needs_a_seq_that_rises_or_a_place(void) {
+TEST(test_stop_never_needs_a_seq_that_rises_or_a_place) {
     char text[256];
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 1000, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 5, "", NOW_US));
@@ -133,7 +131,7 @@ static void test_stop_never_needs_a_seq_that_rises_or_a_place(void) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_text("stop", text, NOW_US + 1000001U));
 }
 
-static void test_command_reset_names_its_stop_and_is_as_young_as_a_drive(void) {
+TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, ",\"stop\":\"4\"", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("reset", NOW_US, 2, ",\"stop\":4", NOW_US + 300000U));
@@ -141,7 +139,7 @@ static void test_command_reset_names_its_stop_and_is_as_young_as_a_drive(void) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("reset", NOW_US, 3, ",\"stop\":4", NOW_US + 300001U));
 }
 
-static void test_command_key_is_kept_apart_and_a_deflected_stick_is_seen(void) {
+TEST(test_command_key_is_kept_apart_and_a_deflected_stick_is_seen) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":0,\"key\":\"abc\"", NOW_US));
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":0}", order.request);
     TEST_ASSERT_EQUAL_STRING("abc", order.key);
@@ -155,7 +153,7 @@ static void test_command_key_is_kept_apart_and_a_deflected_stick_is_seen(void) {
                              order.request);
 }
 
-static void test_command_seq_may_begin_anew_only_when_all_before_is_late(void) {
+TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US));
     for (uint64_t later_us = 0; later_us <= 3000000U; later_us += 1000U) {
         TEST_ASSERT_NOT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US + later_us));
@@ -163,7 +161,7 @@ static void test_command_seq_may_begin_anew_only_when_all_before_is_late(void) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US + 1000001U, 1, "", NOW_US + 1000001U));
 }
 
-static void test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count(void) {
+TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count) {
     char text[256];
     for (unsigned i = 0; i <= MQTT_SENDERS; i++) {
         (void)snprintf(text, sizeof text, "{\"from\":\"s%u\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}", i);
@@ -175,7 +173,7 @@ static void test_command_of_too_many_senders_is_dropped_never_one_of_those_that_
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("why", text, NOW_US + 1000001U));
 }
 
-static void test_command_retained_is_dropped_hello_too(void) {
+TEST(test_command_retained_is_dropped_hello_too) {
     const char *text = "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1}";
     static const char *const verbs[] = {"stop", "estop", "hello", "drive"};
     for (size_t i = 0; i < 4U; i++) {
@@ -186,12 +184,12 @@ static void test_command_retained_is_dropped_hello_too(void) {
     TEST_ASSERT_EQUAL_UINT64(4, judge.counts[MQTT_RETAINED]);
 }
 
-static void test_command_hello_needs_no_time(void) {
+TEST(test_command_hello_needs_no_time) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("hello", "{\"from\":\"far\",\"seq\":1}", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_text("stop", "{\"from\":\"far\",\"seq\":2}", NOW_US));
 }
 
-static void test_command_that_drives_needs_the_right_stop_never(void) {
+TEST(test_command_that_drives_needs_the_right_stop_never) {
     static const char *const verbs[] = {"arm", "drive", "twist", "reset"};
     rules.may_drive = false;
     rules.may_reset = false;
@@ -204,7 +202,7 @@ static void test_command_that_drives_needs_the_right_stop_never(void) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 12, "", NOW_US));
 }
 
-static void test_command_garbled_is_dropped(void) {
+TEST(test_command_garbled_is_dropped) {
     static const char *const texts[] = {
         "",
         "x",
@@ -231,7 +229,7 @@ static void test_command_garbled_is_dropped(void) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"takeover\":true", NOW_US));
 }
 
-static void test_command_too_long_is_not_looked_at(void) {
+TEST(test_command_too_long_is_not_looked_at) {
     static char text[MQTT_COMMAND_MAX + 2U];
     memset(text, ' ', sizeof text);
     memcpy(text, "{\"from\":\"far\",\"seq\":1}", 22);
@@ -245,7 +243,7 @@ static void test_command_too_long_is_not_looked_at(void) {
 
 // ---- topics and messages ------------------------------------------------------------------------------------------
 
-static void test_topics_are_of_this_machine_only(void) {
+TEST(test_topics_are_of_this_machine_only) {
     char topic[MQTT_TOPIC_SIZE];
     mqtt_topic("w1", "event", "stop", topic);
     TEST_ASSERT_EQUAL_STRING("iwheel/w1/event/stop", topic);
@@ -257,7 +255,7 @@ static void test_topics_are_of_this_machine_only(void) {
     TEST_ASSERT_NULL(mqtt_topic_verb("w1", "iwheel/w1/cmd"));
 }
 
-static void test_messages_are_the_gateways_with_ours_before(void) {
+TEST(test_messages_are_the_gateways_with_ours_before) {
     char text[256];
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
@@ -270,7 +268,7 @@ static void test_messages_are_the_gateways_with_ours_before(void) {
                                  text, length);
 }
 
-static void test_answer_quotes_time_and_seq_and_the_gateways_reply(void) {
+TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply) {
     char text[512];
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";
@@ -288,7 +286,7 @@ static void test_answer_quotes_time_and_seq_and_the_gateways_reply(void) {
                                  text, length);
 }
 
-static void test_message_that_does_not_fit_is_none(void) {
+TEST(test_message_that_does_not_fit_is_none) {
     char text[64];
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
     const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
@@ -299,7 +297,7 @@ static void test_message_that_does_not_fit_is_none(void) {
     TEST_ASSERT_EQUAL_size_t(0, mqtt_tell_event(BOOT, 1, 1, &event, (mqtt_buffer_t){text, sizeof text}));
 }
 
-static void test_missed_stop_is_told_without_its_frames(void) {
+TEST(test_missed_stop_is_told_without_its_frames) {
     char text[1024];
     const char *line = "{\"id\":1,\"ok\":true,\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":77,\"at_us\":66,"
                        "\"sentence\":\"gone\",\"frames_before\":[1,2,3]}";
@@ -312,7 +310,7 @@ static void test_missed_stop_is_told_without_its_frames(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"recording\":null}"));
 }
 
-static void test_info_without_a_gateway_invents_nothing(void) {
+TEST(test_info_without_a_gateway_invents_nothing) {
     char text[2048];
     mqtt_settings_t settings;
     const uint64_t counts[MQTT_VERDICTS] = {1, 2};
@@ -346,7 +344,7 @@ static unsigned errors_of(const char *text) {
     return report.errors;
 }
 
-static void test_settings_that_would_open_a_door_by_mistake_are_refused(void) {
+TEST(test_settings_that_would_open_a_door_by_mistake_are_refused) {
     TEST_ASSERT_EQUAL_UINT(0, errors_of("[machine]\nid = w1\n"));
     TEST_ASSERT_EQUAL_UINT(1, errors_of("[broker]\nhost = broker.example\n"));
     TEST_ASSERT_EQUAL_UINT(0, errors_of("[broker]\nhost = broker.example\nca = /x.pem\n"));
@@ -360,7 +358,7 @@ static void test_settings_that_would_open_a_door_by_mistake_are_refused(void) {
     TEST_ASSERT_EQUAL_UINT(1, errors_of("[machine]\nid = #\n"));
 }
 
-static void test_settings_shipped_are_the_defaults(void) {
+TEST(test_settings_shipped_are_the_defaults) {
     char shipped[16384];
     char *printed = NULL;
     size_t length = 0;
@@ -375,34 +373,4 @@ static void test_settings_shipped_are_the_defaults(void) {
     (void)fclose(out);
     TEST_ASSERT_EQUAL_STRING(printed, shipped);
     free(printed);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_command_fresh_is_taken_as_the_gateways_request);
-    RUN_TEST(test_command_age_is_judged_to_the_microsecond);
-    RUN_TEST(test_command_response_topic_counts_among_this_machines_replies_only);
-    RUN_TEST(test_command_correlation_data_is_kept_up_to_its_limit);
-    RUN_TEST(test_command_cannot_make_its_own_life_longer);
-    RUN_TEST(test_command_of_another_boot_is_dropped_before_its_age);
-    RUN_TEST(test_command_seq_must_rise);
-    RUN_TEST(test_stop_never_needs_a_seq_that_rises_or_a_place);
-    RUN_TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive);
-    RUN_TEST(test_command_key_is_kept_apart_and_a_deflected_stick_is_seen);
-    RUN_TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late);
-    RUN_TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count);
-    RUN_TEST(test_command_retained_is_dropped_hello_too);
-    RUN_TEST(test_command_hello_needs_no_time);
-    RUN_TEST(test_command_that_drives_needs_the_right_stop_never);
-    RUN_TEST(test_command_garbled_is_dropped);
-    RUN_TEST(test_command_too_long_is_not_looked_at);
-    RUN_TEST(test_topics_are_of_this_machine_only);
-    RUN_TEST(test_messages_are_the_gateways_with_ours_before);
-    RUN_TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply);
-    RUN_TEST(test_message_that_does_not_fit_is_none);
-    RUN_TEST(test_missed_stop_is_told_without_its_frames);
-    RUN_TEST(test_info_without_a_gateway_invents_nothing);
-    RUN_TEST(test_settings_that_would_open_a_door_by_mistake_are_refused);
-    RUN_TEST(test_settings_shipped_are_the_defaults);
-    return UNITY_END();
 }

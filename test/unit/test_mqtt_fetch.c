@@ -3,7 +3,7 @@
 // what is damaged.
 #include "fetch.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -23,8 +23,6 @@ void setUp(void) {
     boot = "aa";
     fetch_begin(&fetch, "w1", "me", PATIENCE_US, now_us);
 }
-
-void tearDown(void) {}
 
 static bool step(void) {
     return fetch_step(&fetch, now_us, &verb, asked);
@@ -60,7 +58,7 @@ static void begin_fetching(void) {
     TEST_ASSERT_EQUAL(FETCH_FETCHING, fetch.stage);
 }
 
-static void test_fetch_list_has_the_machines_recordings_and_no_other_names(void) {
+TEST(test_fetch_list_has_the_machines_recordings_and_no_other_names) {
     list();
     TEST_ASSERT_EQUAL_size_t(2, fetch.count);
     TEST_ASSERT_EQUAL_STRING("stop-000017-wheel_lost", fetch.list[1].name);
@@ -70,7 +68,7 @@ static void test_fetch_list_has_the_machines_recordings_and_no_other_names(void)
     TEST_ASSERT_FALSE(step());
 }
 
-static void test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece(void) {
+TEST(test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece) {
     begin_fetching();
     now_us += 1000U;
     must_ask("recording");
@@ -91,7 +89,7 @@ static void test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece(void
     TEST_ASSERT_EQUAL_UINT64(0, fetch.again);
 }
 
-static void test_fetch_lost_answer_is_asked_again_with_a_new_time(void) {
+TEST(test_fetch_lost_answer_is_asked_again_with_a_new_time) {
     begin_fetching();
     must_ask("recording");
     now_us += 1999999U;
@@ -105,7 +103,7 @@ static void test_fetch_lost_answer_is_asked_again_with_a_new_time(void) {
     TEST_ASSERT_EQUAL_UINT64(1, fetch.again);
 }
 
-static void test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one(void) {
+TEST(test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one) {
     begin_fetching();
     must_ask("recording");
     now_us += 2U * SECOND_US;
@@ -118,7 +116,7 @@ static void test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one(v
     TEST_ASSERT_EQUAL_INT64(0, fetch.piece.next);
 }
 
-static void test_fetch_bridge_that_began_anew_goes_on_where_it_was(void) {
+TEST(test_fetch_bridge_that_began_anew_goes_on_where_it_was) {
     begin_fetching();
     must_ask("recording");
     (void)answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262");
@@ -134,7 +132,7 @@ static void test_fetch_bridge_that_began_anew_goes_on_where_it_was(void) {
     TEST_ASSERT_EQUAL(FETCH_DONE, fetch.stage);
 }
 
-static void test_fetch_machine_that_was_away_may_come_back_within_the_patience(void) {
+TEST(test_fetch_machine_that_was_away_may_come_back_within_the_patience) {
     begin_fetching();
     (void)fetch_take(&fetch, "availability", "offline", 7, now_us);
     for (unsigned i = 0; i < 29U; i++) {
@@ -147,7 +145,7 @@ static void test_fetch_machine_that_was_away_may_come_back_within_the_patience(v
     TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262"));
 }
 
-static void test_fetch_machine_that_stays_away_is_given_up_with_the_reason(void) {
+TEST(test_fetch_machine_that_stays_away_is_given_up_with_the_reason) {
     begin_fetching();
     (void)fetch_take(&fetch, "availability", "offline", 7, now_us);
     now_us += PATIENCE_US;
@@ -157,7 +155,7 @@ static void test_fetch_machine_that_stays_away_is_given_up_with_the_reason(void)
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "w1 has not answered for 60 s and is offline"));
 }
 
-static void test_fetch_machine_that_nobody_knows_is_given_up_soon(void) {
+TEST(test_fetch_machine_that_nobody_knows_is_given_up_soon) {
     must_ask("hello");
     now_us += 6U * SECOND_US;
     TEST_ASSERT_FALSE(step());
@@ -165,7 +163,7 @@ static void test_fetch_machine_that_nobody_knows_is_given_up_soon(void) {
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "no machine w1 is known"));
 }
 
-static void test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so(void) {
+TEST(test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so) {
     begin_fetching();
     for (unsigned i = 0; i < 6U; i++) {
         TEST_ASSERT_EQUAL(FETCH_FETCHING, fetch.stage);
@@ -179,7 +177,7 @@ static void test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so(void
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "stop-000017-wheel_lost.jsonl of w1 is not as its checksum says"));
 }
 
-static void test_fetch_file_that_is_not_whole_is_never_done(void) {
+TEST(test_fetch_file_that_is_not_whole_is_never_done) {
     begin_fetching();
     for (unsigned i = 0; i < 6U; i++) {
         must_ask("recording");
@@ -188,7 +186,7 @@ static void test_fetch_file_that_is_not_whole_is_never_done(void) {
     TEST_ASSERT_EQUAL(FETCH_FAILED, fetch.stage);
 }
 
-static void test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass(void) {
+TEST(test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass) {
     begin_fetching();
     must_ask("recording");
     (void)answer("\"ok\":false,\"error\":\"bad_value\",\"message\":\"no\\u001b such name\"");
@@ -210,7 +208,7 @@ static void test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass(void
     TEST_ASSERT_EQUAL_INT(1, fetch.code);
 }
 
-static void test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so(void) {
+TEST(test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so) {
     begin_fetching();
     unsigned sent = 0;
     while (fetch.stage == FETCH_FETCHING) {
@@ -227,7 +225,7 @@ static void test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so(void) 
     TEST_ASSERT_LESS_THAN_UINT(300, sent);
 }
 
-static void test_fetch_one_is_chosen_by_name_or_number(void) {
+TEST(test_fetch_one_is_chosen_by_name_or_number) {
     list();
     fetch_choose(&fetch, "3", now_us);
     TEST_ASSERT_EQUAL_size_t(0, fetch.chosen);
@@ -240,7 +238,7 @@ static void test_fetch_one_is_chosen_by_name_or_number(void) {
     TEST_ASSERT_EQUAL_STRING("w1 has no recording 18; it has: iwheel-fleet recordings w1", fetch.why);
 }
 
-static void test_fetch_of_a_machine_without_recordings_says_why(void) {
+TEST(test_fetch_of_a_machine_without_recordings_says_why) {
     must_ask("hello");
     (void)answer("\"ok\":true");
     must_ask("recordings");
@@ -250,31 +248,11 @@ static void test_fetch_of_a_machine_without_recordings_says_why(void) {
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "w1 has no recording"));
 }
 
-static void test_fetch_garbage_changes_nothing(void) {
+TEST(test_fetch_garbage_changes_nothing) {
     static const char *const texts[] = {"", "{", "[]", "{\"seq\":1}", "{\"seq\":1,\"t_us\":\"x\",\"ok\":true}"};
     must_ask("hello");
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         TEST_ASSERT_EQUAL(FETCH_NOTHING, fetch_take(&fetch, "reply/me", texts[i], strlen(texts[i]), now_us));
         TEST_ASSERT_NOT_EQUAL(FETCH_NONE, fetch.asked);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_fetch_list_has_the_machines_recordings_and_no_other_names);
-    RUN_TEST(test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece);
-    RUN_TEST(test_fetch_lost_answer_is_asked_again_with_a_new_time);
-    RUN_TEST(test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one);
-    RUN_TEST(test_fetch_bridge_that_began_anew_goes_on_where_it_was);
-    RUN_TEST(test_fetch_machine_that_was_away_may_come_back_within_the_patience);
-    RUN_TEST(test_fetch_machine_that_stays_away_is_given_up_with_the_reason);
-    RUN_TEST(test_fetch_machine_that_nobody_knows_is_given_up_soon);
-    RUN_TEST(test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so);
-    RUN_TEST(test_fetch_file_that_is_not_whole_is_never_done);
-    RUN_TEST(test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass);
-    RUN_TEST(test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so);
-    RUN_TEST(test_fetch_one_is_chosen_by_name_or_number);
-    RUN_TEST(test_fetch_of_a_machine_without_recordings_says_why);
-    RUN_TEST(test_fetch_garbage_changes_nothing);
-    return UNITY_END();
 }

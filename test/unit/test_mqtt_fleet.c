@@ -2,7 +2,7 @@
 // The console's rows, from what machines and anybody else say at the broker.
 #include "fleet.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -39,7 +39,7 @@ static const char state[] =
     "\"offset_provenance\":\"estimated\",\"offset_contaminated\":true},\"ledger\":{\"radius\":{\"state\":"
     "\"contradicted\"},\"track\":{\"state\":\"confirmed\"}}}";
 
-static void test_fleet_machines_are_sorted_and_counted(void) {
+TEST(test_fleet_machines_are_sorted_and_counted) {
     take("iwheel/w2/availability", "online");
     take("iwheel/w10/availability", "offline");
     take("iwheel/w1/availability", "online");
@@ -50,7 +50,7 @@ static void test_fleet_machines_are_sorted_and_counted(void) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "3 machines, 2 online\n"));
 }
 
-static void test_fleet_row_tells_state_battery_zero_and_what_is_unknown(void) {
+TEST(test_fleet_row_tells_state_battery_zero_and_what_is_unknown) {
     take("iwheel/w1/availability", "online");
     take("iwheel/w1/state", state);
     const char *text = show(fleet_show);
@@ -60,7 +60,7 @@ static void test_fleet_row_tells_state_battery_zero_and_what_is_unknown(void) {
     TEST_ASSERT_NOT_NULL(strstr(shown, "\"heard_ms\":2000}"));
 }
 
-static void test_fleet_contradictions_are_counted_across_machines(void) {
+TEST(test_fleet_contradictions_are_counted_across_machines) {
     take("iwheel/w1/state", state);
     take("iwheel/w2/state", state);
     take("iwheel/w3/availability", "online");
@@ -68,7 +68,7 @@ static void test_fleet_contradictions_are_counted_across_machines(void) {
     TEST_ASSERT_NULL(strstr(shown, "track"));
 }
 
-static void test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal(void) {
+TEST(test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal) {
     take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"wheel_\\u001b[2Jlost\",\"wall_us\":1760000000000000,"
                                  "\"sentence\":\"left wheel\"}");
     const char *text = show(fleet_show);
@@ -81,7 +81,7 @@ static const char *row(void) {
     return show(fleet_tell);
 }
 
-static void test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most(void) {
+TEST(test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most) {
     take("iwheel/w1/info", "{\"last_stop\":null}");
     TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_from\":null"));
     take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":2000,\"sentence\":\"s\"}}");
@@ -101,13 +101,13 @@ static void test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_he
     TEST_ASSERT_EQUAL_UINT64(1, fleet.left_out);
 }
 
-static void test_fleet_table_says_who_told_the_last_stops(void) {
+TEST(test_fleet_table_says_who_told_the_last_stops) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of each machine's info"));
     fleet.stream = "n1";
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of the stream at n1"));
 }
 
-static void test_fleet_garbage_is_left_out_and_counted(void) {
+TEST(test_fleet_garbage_is_left_out_and_counted) {
     static const char *const topics[] = {"iwheel/", "iwheel//state", "iwheel/a b/state", "other/w1/state", "iwheel/w1"};
     for (size_t i = 0; i < sizeof topics / sizeof topics[0]; i++) {
         take(topics[i], state);
@@ -122,7 +122,7 @@ static void test_fleet_garbage_is_left_out_and_counted(void) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"state\":null"));
 }
 
-static void test_fleet_of_too_many_machines_is_counted_not_shown(void) {
+TEST(test_fleet_of_too_many_machines_is_counted_not_shown) {
     char topic[64];
     for (unsigned i = 0; i < FLEET_MACHINES + 5U; i++) {
         (void)snprintf(topic, sizeof topic, "iwheel/m%u/availability", i);
@@ -130,17 +130,4 @@ static void test_fleet_of_too_many_machines_is_counted_not_shown(void) {
     }
     TEST_ASSERT_EQUAL_size_t(FLEET_MACHINES, fleet.count);
     TEST_ASSERT_EQUAL_UINT64(5, fleet.left_out);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_fleet_machines_are_sorted_and_counted);
-    RUN_TEST(test_fleet_row_tells_state_battery_zero_and_what_is_unknown);
-    RUN_TEST(test_fleet_contradictions_are_counted_across_machines);
-    RUN_TEST(test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal);
-    RUN_TEST(test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most);
-    RUN_TEST(test_fleet_table_says_who_told_the_last_stops);
-    RUN_TEST(test_fleet_garbage_is_left_out_and_counted);
-    RUN_TEST(test_fleet_of_too_many_machines_is_counted_not_shown);
-    return UNITY_END();
 }

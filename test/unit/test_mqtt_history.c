@@ -2,7 +2,7 @@
 // What the stream has kept, told again: each event once, with what is missing, in the span that was asked for.
 #include "history.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -58,7 +58,7 @@ static void other(const char *name, const char *payload) {
     TEST_ASSERT_TRUE(history_take(&history, topic, payload, strlen(payload), EVENING_US + SECOND_US));
 }
 
-static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(void) {
+TEST(test_history_stop_is_told_in_one_line_with_its_time_and_sentence) {
     begin((history_config_t){0});
     stop("a", 1, 1, 61, 62);
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
@@ -67,7 +67,7 @@ static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(voi
         strstr(text(), "1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
 }
 
-static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge(void) {
+TEST(test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 2, 2, 2, 2);
@@ -81,7 +81,7 @@ static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_brid
     TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
 }
 
-static void test_history_gap_in_numbers_is_told_before_the_event_behind_it(void) {
+TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 2, 2, 2);
@@ -92,7 +92,7 @@ static void test_history_gap_in_numbers_is_told_before_the_event_behind_it(void)
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
 }
 
-static void test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one(void) {
+TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one) {
     begin((history_config_t){0});
     stop("a", 1, 7, 1, 1);
     stop("a", 2, 10, 2, 2);
@@ -103,7 +103,7 @@ static void test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_coun
     TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
 }
 
-static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop(void) {
+TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     other("fault",
@@ -113,7 +113,7 @@ static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_n
     TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 events before this one are not in the stream"));
 }
 
-static void test_history_event_that_comes_late_is_no_double_and_no_gap(void) {
+TEST(test_history_event_that_comes_late_is_no_double_and_no_gap) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 5, 2, 2);
@@ -143,7 +143,7 @@ static void info(const char *boot, int stop_number, int when_s, int last, int wa
     history_take_info(&history, "iwheel/w1/info", payload, strlen(payload));
 }
 
-static void test_history_gap_at_the_end_shows_by_info(void) {
+TEST(test_history_gap_at_the_end_shows_by_info) {
     begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     stop("a", 4, 4, 1, 1);
@@ -156,7 +156,7 @@ static void test_history_gap_at_the_end_shows_by_info(void) {
     TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
 }
 
-static void test_history_gap_of_a_machine_without_any_event_shows_by_info(void) {
+TEST(test_history_gap_of_a_machine_without_any_event_shows_by_info) {
     begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     history_end(&history);
@@ -168,7 +168,7 @@ static void test_history_gap_of_a_machine_without_any_event_shows_by_info(void) 
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.unheard, "its last stop was before the span");
 }
 
-static void test_history_end_without_a_gap_says_nothing(void) {
+TEST(test_history_end_without_a_gap_says_nothing) {
     begin((history_config_t){0});
     info("a", 4, 1, 6, 2, 0);
     stop("a", 4, 4, 1, 1);
@@ -177,7 +177,7 @@ static void test_history_end_without_a_gap_says_nothing(void) {
     TEST_ASSERT_EQUAL_size_t_MESSAGE(before, strlen(text()), "two events wait at the machine");
 }
 
-static void test_history_whose_end_is_not_checked_says_so(void) {
+TEST(test_history_whose_end_is_not_checked_says_so) {
     begin((history_config_t){0});
     history.has_info = false;
     history_end(&history);
@@ -185,7 +185,7 @@ static void test_history_whose_end_is_not_checked_says_so(void) {
     TEST_ASSERT_NOT_NULL(strstr(text(), "; its end is not checked"));
 }
 
-static void test_history_gap_has_its_cause(void) {
+TEST(test_history_gap_has_its_cause) {
     begin((history_config_t){0});
     info("a", 4, 1, 9, 0, 5);
     stop("a", 1, 1, 1, 1);
@@ -198,7 +198,7 @@ static void test_history_gap_has_its_cause(void) {
     TEST_ASSERT_NOT_NULL(strstr(text(), "dropped from its full spool, or confirmed by the broker and not stored"));
 }
 
-static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(void) {
+TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew) {
     begin((history_config_t){.all = true});
     stop("a", 1, 1, 1, 1);
     other("fault",
@@ -207,7 +207,7 @@ static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(
     TEST_ASSERT_NOT_NULL(strstr(told, "w1           fault  cause bus, present true\n"));
 }
 
-static void test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing(void) {
+TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing) {
     begin((history_config_t){0});
     stop("a", 1, 1, -100, -90);
     stop("a", 2, 2, 3599, 9000);
@@ -221,7 +221,7 @@ static void test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing(vo
         strstr(told, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
 }
 
-static void test_history_missed_stop_is_told_at_its_own_time_and_as_told_late(void) {
+TEST(test_history_missed_stop_is_told_at_its_own_time_and_as_told_late) {
     begin((history_config_t){0});
     other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
                   "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
@@ -229,7 +229,7 @@ static void test_history_missed_stop_is_told_at_its_own_time_and_as_told_late(vo
         strstr(text(), "2026-11-21 22:01:00 w1           stop   gone (told late: its bridge did not run)"));
 }
 
-static void test_history_json_nests_the_message_and_ends_with_the_sum(void) {
+TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {
     begin((history_config_t){.json = true});
     stop("a", 1, 1, 1, 2);
     stop("b", 4, 4, 2, 3);
@@ -242,7 +242,7 @@ static void test_history_json_nests_the_message_and_ends_with_the_sum(void) {
     TEST_ASSERT_NOT_NULL(strstr(told, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
 }
 
-static void test_history_garbage_is_counted_and_moves_no_terminal(void) {
+TEST(test_history_garbage_is_counted_and_moves_no_terminal) {
     begin((history_config_t){.all = true});
     other("stop", "{");
     other("stop", "[]");
@@ -256,7 +256,7 @@ static void test_history_garbage_is_counted_and_moves_no_terminal(void) {
     TEST_ASSERT_NULL(strchr(text(), '\033'));
 }
 
-static void test_history_ends_when_nobody_reads_it(void) {
+TEST(test_history_ends_when_nobody_reads_it) {
     begin((history_config_t){0});
     FILE *full = fopen("/dev/full", "w");
     TEST_ASSERT_NOT_NULL(full);
@@ -269,7 +269,7 @@ static void test_history_ends_when_nobody_reads_it(void) {
     (void)fclose(full);
 }
 
-static void test_times_are_read_as_people_write_them_and_nothing_else(void) {
+TEST(test_times_are_read_as_people_write_them_and_nothing_else) {
     int64_t us = 0;
     begin((history_config_t){0});
     static const char *const good[] = {"2026-11-21T22:00:00", "2026-11-21 22:00", "2026-11-21T22:00",
@@ -297,27 +297,4 @@ static void test_times_are_read_as_people_write_them_and_nothing_else(void) {
     TEST_ASSERT_FALSE(history_span("0h", &us));
     TEST_ASSERT_FALSE(history_span("-1h", &us));
     TEST_ASSERT_FALSE(history_span("h", &us));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_history_stop_is_told_in_one_line_with_its_time_and_sentence);
-    RUN_TEST(test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge);
-    RUN_TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it);
-    RUN_TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one);
-    RUN_TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop);
-    RUN_TEST(test_history_event_that_comes_late_is_no_double_and_no_gap);
-    RUN_TEST(test_history_gap_at_the_end_shows_by_info);
-    RUN_TEST(test_history_gap_of_a_machine_without_any_event_shows_by_info);
-    RUN_TEST(test_history_end_without_a_gap_says_nothing);
-    RUN_TEST(test_history_gap_has_its_cause);
-    RUN_TEST(test_history_whose_end_is_not_checked_says_so);
-    RUN_TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew);
-    RUN_TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing);
-    RUN_TEST(test_history_missed_stop_is_told_at_its_own_time_and_as_told_late);
-    RUN_TEST(test_history_json_nests_the_message_and_ends_with_the_sum);
-    RUN_TEST(test_history_garbage_is_counted_and_moves_no_terminal);
-    RUN_TEST(test_history_ends_when_nobody_reads_it);
-    RUN_TEST(test_times_are_read_as_people_write_them_and_nothing_else);
-    return UNITY_END();
 }

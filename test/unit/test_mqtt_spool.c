@@ -2,7 +2,7 @@
 // Events that wait for the broker: whole and in order whatever happens to file, process and disk.
 #include "spool.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -79,13 +79,13 @@ static void write_all(const char *bytes, size_t length) {
     (void)fclose(file);
 }
 
-static void test_spool_new_is_empty(void) {
+TEST(test_spool_new_is_empty) {
     expect(1, 0);
     reopen();
     expect(1, 0);
 }
 
-static void test_spool_events_outlive_the_process_in_order(void) {
+TEST(test_spool_events_outlive_the_process_in_order) {
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
@@ -97,7 +97,7 @@ static void test_spool_events_outlive_the_process_in_order(void) {
     TEST_ASSERT_EQUAL_UINT64(6, spool.mark);
 }
 
-static void test_spool_confirmed_events_do_not_come_back(void) {
+TEST(test_spool_confirmed_events_do_not_come_back) {
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
@@ -112,7 +112,7 @@ static void test_spool_confirmed_events_do_not_come_back(void) {
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.mark, "the mark stays");
 }
 
-static void test_spool_event_set_aside_stays_while_others_go(void) {
+TEST(test_spool_event_set_aside_stays_while_others_go) {
     mqtt_spool_event_t event;
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
@@ -142,7 +142,7 @@ static void test_spool_event_set_aside_stays_while_others_go(void) {
     expect(6, 6);
 }
 
-static void test_spool_full_drops_what_is_set_aside_first(void) {
+TEST(test_spool_full_drops_what_is_set_aside_first) {
     mqtt_spool_event_t event;
     unsigned last = 1;
     add(last);
@@ -156,7 +156,7 @@ static void test_spool_full_drops_what_is_set_aside_first(void) {
     TEST_ASSERT_EQUAL_UINT64(2, event.number);
 }
 
-static void test_spool_of_others_is_refused(void) {
+TEST(test_spool_of_others_is_refused) {
     char second[96];
     TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0777));
@@ -173,7 +173,7 @@ static void test_spool_of_others_is_refused(void) {
     TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
 }
 
-static void test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut(void) {
+TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut) {
     char bytes[1024];
     size_t ends[6] = {0};
     (void)mqtt_spool_close(&spool);
@@ -200,7 +200,7 @@ static void test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut(void) 
     }
 }
 
-static void test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it(void) {
+TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it) {
     char bytes[1024];
     for (unsigned i = 1; i <= 3; i++) {
         add(i);
@@ -223,7 +223,7 @@ static void test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it(v
     }
 }
 
-static void test_spool_half_written_new_file_is_of_no_account(void) {
+TEST(test_spool_half_written_new_file_is_of_no_account) {
     char fresh[96];
     add(1);
     (void)mqtt_spool_close(&spool);
@@ -237,7 +237,7 @@ static void test_spool_half_written_new_file_is_of_no_account(void) {
     TEST_ASSERT_NOT_EQUAL_INT(0, access(fresh, F_OK));
 }
 
-static void test_spool_number_that_no_event_can_have_is_damage(void) {
+TEST(test_spool_number_that_no_event_can_have_is_damage) {
     add(1);
     mqtt_spool_confirm(&spool, UINT64_MAX);
     reopen();
@@ -245,7 +245,7 @@ static void test_spool_number_that_no_event_can_have_is_damage(void) {
     expect(1, 2);
 }
 
-static void test_spool_full_drops_the_oldest_and_counts(void) {
+TEST(test_spool_full_drops_the_oldest_and_counts) {
     unsigned last = 0;
     while (spool.dropped < 10U) {
         last++;
@@ -259,7 +259,7 @@ static void test_spool_full_drops_the_oldest_and_counts(void) {
     TEST_ASSERT_EQUAL_UINT64(last, event.number);
 }
 
-static void test_spool_file_stays_bounded_however_many_come_and_go(void) {
+TEST(test_spool_file_stays_bounded_however_many_come_and_go) {
     char bytes[4U * SMALL];
     for (unsigned i = 1; i <= 5000; i++) {
         add(i);
@@ -272,7 +272,7 @@ static void test_spool_file_stays_bounded_however_many_come_and_go(void) {
     TEST_ASSERT_EQUAL_UINT64(5000, spool.last);
 }
 
-static void test_spool_event_too_long_is_counted(void) {
+TEST(test_spool_event_too_long_is_counted) {
     static char text[MQTT_SPOOL_EVENT_MAX];
     TEST_ASSERT_FALSE(mqtt_spool_add(&spool, "stop", text, sizeof text, 0));
     TEST_ASSERT_EQUAL_UINT64(1, spool.dropped);
@@ -280,7 +280,7 @@ static void test_spool_event_too_long_is_counted(void) {
     expect(1, 1);
 }
 
-static void test_spool_disk_full_at_every_byte_loses_nothing_and_recovers(void) {
+TEST(test_spool_disk_full_at_every_byte_loses_nothing_and_recovers) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
@@ -302,7 +302,7 @@ static void test_spool_disk_full_at_every_byte_loses_nothing_and_recovers(void) 
     }
 }
 
-static void test_spool_disk_full_and_killed_keeps_what_was_written_before(void) {
+TEST(test_spool_disk_full_and_killed_keeps_what_was_written_before) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
@@ -318,7 +318,7 @@ static void test_spool_disk_full_and_killed_keeps_what_was_written_before(void) 
     expect(1, (unsigned)spool.waiting);
 }
 
-static void test_spool_sync_brings_to_the_disk_without_waiting(void) {
+TEST(test_spool_sync_brings_to_the_disk_without_waiting) {
     add(1);
     TEST_ASSERT_TRUE(spool.unsynced);
     mqtt_spool_sync(&spool);
@@ -328,32 +328,10 @@ static void test_spool_sync_brings_to_the_disk_without_waiting(void) {
     expect(1, 1);
 }
 
-static void test_spool_of_another_process_is_kept_out(void) {
+TEST(test_spool_of_another_process_is_kept_out) {
     mqtt_spool_t other;
     TEST_ASSERT_FALSE(mqtt_spool_open(&other, folder, SMALL));
     TEST_ASSERT_EQUAL_INT(EWOULDBLOCK, errno);
     TEST_ASSERT_FALSE(mqtt_spool_open(&other, "/nowhere", SMALL));
     TEST_ASSERT_EQUAL_INT(ENOENT, errno);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_spool_new_is_empty);
-    RUN_TEST(test_spool_events_outlive_the_process_in_order);
-    RUN_TEST(test_spool_confirmed_events_do_not_come_back);
-    RUN_TEST(test_spool_event_set_aside_stays_while_others_go);
-    RUN_TEST(test_spool_full_drops_what_is_set_aside_first);
-    RUN_TEST(test_spool_of_others_is_refused);
-    RUN_TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut);
-    RUN_TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it);
-    RUN_TEST(test_spool_half_written_new_file_is_of_no_account);
-    RUN_TEST(test_spool_number_that_no_event_can_have_is_damage);
-    RUN_TEST(test_spool_full_drops_the_oldest_and_counts);
-    RUN_TEST(test_spool_file_stays_bounded_however_many_come_and_go);
-    RUN_TEST(test_spool_event_too_long_is_counted);
-    RUN_TEST(test_spool_disk_full_at_every_byte_loses_nothing_and_recovers);
-    RUN_TEST(test_spool_disk_full_and_killed_keeps_what_was_written_before);
-    RUN_TEST(test_spool_sync_brings_to_the_disk_without_waiting);
-    RUN_TEST(test_spool_of_another_process_is_kept_out);
-    return UNITY_END();
 }

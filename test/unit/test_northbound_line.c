@@ -2,7 +2,7 @@
 // Lines on a serial wire: one spelling of each, whatever else comes is refused, and the next newline ends all trouble.
 #include "iwheel_northbound/line.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -16,8 +16,6 @@ void setUp(void) {
     memset(&line, 0xA5, sizeof line);
     iwn_receiver_init(&receiver, buffer, sizeof buffer, false);
 }
-
-void tearDown(void) {}
 
 static iwn_line_t made(uint8_t channel, const char *json) {
     return (iwn_line_t){.channel = channel, .json = json, .length = strlen(json)};
@@ -50,13 +48,13 @@ static iwn_line_verdict_t put(const char *text, unsigned *out_verdicts) {
     return last;
 }
 
-static void test_line_crc_is_iso_hdlc_and_may_be_continued(void) {
+TEST(test_line_crc_is_iso_hdlc_and_may_be_continued) {
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(0, "123456789", 9));
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(iwn_line_crc(0, "1234", 4), "56789", 5));
     TEST_ASSERT_EQUAL_HEX32(0U, iwn_line_crc(0, "", 0));
 }
 
-static void test_line_is_written_as_documented(void) {
+TEST(test_line_is_written_as_documented) {
     const iwn_line_t to_board = made(0, "{\"cmd\":\"link\"}");
     size_t length = iwn_line_write(&to_board, bytes, sizeof bytes);
     TEST_ASSERT_EQUAL_STRING_LEN("0 {\"cmd\":\"link\"}*e2d27f9b\n", bytes, length);
@@ -66,7 +64,7 @@ static void test_line_is_written_as_documented(void) {
     TEST_ASSERT_EQUAL_STRING_LEN("3 1250000 {\"ok\":true}*e0f15d9c\n", bytes, length);
 }
 
-static void test_line_of_any_channel_and_stamp_comes_back_as_it_was(void) {
+TEST(test_line_of_any_channel_and_stamp_comes_back_as_it_was) {
     static const uint64_t stamps[] = {0, 9, 10, 4294967296U, UINT64_MAX};
     for (uint8_t channel = 0; channel <= IWN_LINE_CHANNELS; channel++) {
         for (unsigned i = 0; i < sizeof stamps / sizeof stamps[0]; i++) {
@@ -81,7 +79,7 @@ static void test_line_of_any_channel_and_stamp_comes_back_as_it_was(void) {
     }
 }
 
-static void test_line_that_does_not_fit_is_not_written_at_any_size(void) {
+TEST(test_line_that_does_not_fit_is_not_written_at_any_size) {
     const iwn_line_t sent = stamped(8, 77, "{\"ok\":true}");
     const size_t whole = iwn_line_write(&sent, bytes, sizeof bytes);
     for (size_t size = 0; size < whole; size++) {
@@ -94,7 +92,7 @@ static void test_line_that_does_not_fit_is_not_written_at_any_size(void) {
     TEST_ASSERT_EQUAL_UINT(0, iwn_line_write(&beyond, bytes, sizeof bytes));
 }
 
-static void test_line_with_any_bit_turned_is_refused(void) {
+TEST(test_line_with_any_bit_turned_is_refused) {
     const iwn_line_t sent = stamped(3, 1250000, "{\"ok\":true}");
     const size_t length = iwn_line_write(&sent, bytes, sizeof bytes) - 1U;
     for (size_t bit = 0; bit < length * 8U; bit++) {
@@ -105,7 +103,7 @@ static void test_line_with_any_bit_turned_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, iwn_line_read(bytes, length, true, &line));
 }
 
-static void test_line_cut_anywhere_or_doubled_is_refused(void) {
+TEST(test_line_cut_anywhere_or_doubled_is_refused) {
     const iwn_line_t sent = made(1, "{\"cmd\":\"stop\"}");
     const size_t length = iwn_line_write(&sent, bytes, sizeof bytes) - 1U;
     for (size_t cut = 0; cut < length; cut++) {
@@ -116,7 +114,7 @@ static void test_line_cut_anywhere_or_doubled_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_CORRUPT, iwn_line_read(bytes, 2U * length, false, &line));
 }
 
-static void test_line_with_a_right_crc_and_a_wrong_form_is_malformed(void) {
+TEST(test_line_with_a_right_crc_and_a_wrong_form_is_malformed) {
     static const char *const wrong[] = {"",      "1",     "1 ",   "1 {",   "9 {}", "1{}",   "01 {}", "-1 {}",
                                         "1  {}", "1 {} ", "1 []", "1 {}x", "a {}", "1\t{}", "1 7 {}"};
     for (unsigned i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
@@ -126,7 +124,7 @@ static void test_line_with_a_right_crc_and_a_wrong_form_is_malformed(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, iwn_line_read(bytes, checked("8 {}"), false, &line));
 }
 
-static void test_line_stamp_has_one_spelling(void) {
+TEST(test_line_stamp_has_one_spelling) {
     static const char *const wrong[] = {"1 {}",
                                         "1  {}",
                                         "1 01 {}",
@@ -145,7 +143,7 @@ static void test_line_stamp_has_one_spelling(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, iwn_line_read(bytes, checked("1 0 {}"), true, &line));
 }
 
-static void test_line_without_crc_or_with_upper_case_is_unchecked(void) {
+TEST(test_line_without_crc_or_with_upper_case_is_unchecked) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_UNCHECKED, iwn_line_read("0 {\"cmd\":\"link\"}", 16, false, &line));
     TEST_ASSERT_EQUAL_INT(IWN_LINE_UNCHECKED, iwn_line_read("0 {\"cmd\":\"link\"}*E2D27F9B", 25, false, &line));
     TEST_ASSERT_EQUAL_INT(IWN_LINE_UNCHECKED, iwn_line_read("0 {\"cmd\":\"link\"}*e2d27f9b\r", 26, false, &line));
@@ -153,21 +151,21 @@ static void test_line_without_crc_or_with_upper_case_is_unchecked(void) {
     TEST_ASSERT_EQUAL_STRING("unknown", iwn_line_verdict_name(IWN_LINE_VERDICTS));
 }
 
-static void test_receiver_gives_each_line_once_and_passes_over_empty_ones(void) {
+TEST(test_receiver_gives_each_line_once_and_passes_over_empty_ones) {
     unsigned verdicts = 0;
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("\n\n0 {\"cmd\":\"link\"}*e2d27f9b\n\n", &verdicts));
     TEST_ASSERT_EQUAL_UINT(1, verdicts);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"cmd\":\"link\"}", line.json, line.length);
 }
 
-static void test_receiver_recovers_at_the_newline_after_half_a_line(void) {
+TEST(test_receiver_recovers_at_the_newline_after_half_a_line) {
     unsigned verdicts = 0;
     TEST_ASSERT_EQUAL_INT(IWN_LINE_UNCHECKED, put("nk\"}*e2d\n", &verdicts));
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
     TEST_ASSERT_EQUAL_UINT(1, verdicts);
 }
 
-static void test_receiver_tells_one_long_line_once_and_recovers(void) {
+TEST(test_receiver_tells_one_long_line_once_and_recovers) {
     unsigned verdicts = 0;
     for (unsigned i = 0; i < 100U * sizeof buffer; i++) {
         TEST_ASSERT_EQUAL_INT(IWN_LINE_NOTHING, iwn_receiver_put(&receiver, 'x', &line));
@@ -177,7 +175,7 @@ static void test_receiver_tells_one_long_line_once_and_recovers(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
 }
 
-static void test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_more(void) {
+TEST(test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_more) {
     char room[26];
     unsigned verdicts = 0;
     iwn_receiver_init(&receiver, room, sizeof room, false);
@@ -186,7 +184,7 @@ static void test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_mo
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_BIG, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
 }
 
-static void test_receiver_throws_away_a_line_of_which_bytes_were_lost(void) {
+TEST(test_receiver_throws_away_a_line_of_which_bytes_were_lost) {
     unsigned verdicts = 0;
     (void)put("0 {\"cmd\":", &verdicts);
     iwn_receiver_spoil(&receiver);
@@ -196,7 +194,7 @@ static void test_receiver_throws_away_a_line_of_which_bytes_were_lost(void) {
 
 static const char drive[] = "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2}";
 
-static void test_quote_stands_before_the_fields_and_comes_off_again(void) {
+TEST(test_quote_stands_before_the_fields_and_comes_off_again) {
     const iwn_quote_t quote = {.boot = "0123456789abcdef", .seq = 7, .t_us = 1250000};
     char *json = bytes;
     iwn_quote_t taken;
@@ -210,7 +208,7 @@ static void test_quote_stands_before_the_fields_and_comes_off_again(void) {
     TEST_ASSERT_TRUE(taken.seq == 7U && taken.t_us == 1250000U);
 }
 
-static void test_quote_of_the_largest_numbers_needs_no_more_than_its_size(void) {
+TEST(test_quote_of_the_largest_numbers_needs_no_more_than_its_size) {
     const iwn_quote_t quote = {.boot = "ffffffffffffffff", .seq = UINT64_MAX, .t_us = UINT64_MAX};
     const size_t needed = sizeof drive - 1U + IWN_QUOTE_SIZE;
     char *json = bytes;
@@ -222,7 +220,7 @@ static void test_quote_of_the_largest_numbers_needs_no_more_than_its_size(void) 
     TEST_ASSERT_EQUAL_STRING_LEN(drive, json, length);
 }
 
-static void test_quote_in_another_spelling_is_none_and_changes_nothing(void) {
+TEST(test_quote_in_another_spelling_is_none_and_changes_nothing) {
     static const char *const wrong[] = {
         "{\"cmd\":\"drive\"}",
         "{\"boot\":\"0123456789ABCDEF\",\"seq\":1,\"t_us\":1,\"cmd\":\"drive\"}",
@@ -243,26 +241,4 @@ static void test_quote_in_another_spelling_is_none_and_changes_nothing(void) {
         TEST_ASSERT_TRUE(json == bytes && length == strlen(wrong[i]));
         TEST_ASSERT_EQUAL_STRING_LEN(wrong[i], bytes, length);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_line_crc_is_iso_hdlc_and_may_be_continued);
-    RUN_TEST(test_line_is_written_as_documented);
-    RUN_TEST(test_line_of_any_channel_and_stamp_comes_back_as_it_was);
-    RUN_TEST(test_line_that_does_not_fit_is_not_written_at_any_size);
-    RUN_TEST(test_line_with_any_bit_turned_is_refused);
-    RUN_TEST(test_line_cut_anywhere_or_doubled_is_refused);
-    RUN_TEST(test_line_with_a_right_crc_and_a_wrong_form_is_malformed);
-    RUN_TEST(test_line_stamp_has_one_spelling);
-    RUN_TEST(test_line_without_crc_or_with_upper_case_is_unchecked);
-    RUN_TEST(test_receiver_gives_each_line_once_and_passes_over_empty_ones);
-    RUN_TEST(test_receiver_recovers_at_the_newline_after_half_a_line);
-    RUN_TEST(test_receiver_tells_one_long_line_once_and_recovers);
-    RUN_TEST(test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_more);
-    RUN_TEST(test_receiver_throws_away_a_line_of_which_bytes_were_lost);
-    RUN_TEST(test_quote_stands_before_the_fields_and_comes_off_again);
-    RUN_TEST(test_quote_of_the_largest_numbers_needs_no_more_than_its_size);
-    RUN_TEST(test_quote_in_another_spelling_is_none_and_changes_nothing);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "sockets/log.h"
 #include "sockets/sock_client.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <string.h>
@@ -61,7 +61,7 @@ static size_t drain(char *text, size_t size) {
     return total;
 }
 
-static void test_client_byte_by_byte_makes_one_line_only_at_the_newline(void) {
+TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline) {
     const char *text = "{\"cmd\":\"stop\"}";
     for (const char *c = text; *c != '\0'; c++) {
         const char byte[2] = {*c, '\0'};
@@ -73,7 +73,7 @@ static void test_client_byte_by_byte_makes_one_line_only_at_the_newline(void) {
     expect_no_line();
 }
 
-static void test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits(void) {
+TEST(test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits) {
     say("one\n\ntwo\nhal");
     expect_line("one");
     expect_line("");
@@ -83,7 +83,7 @@ static void test_client_several_lines_in_one_read_come_in_order_and_half_a_line_
     expect_line("half");
 }
 
-static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
+TEST(test_client_half_a_line_at_the_end_is_never_a_line) {
     say("stop");
     (void)shutdown(peer, SHUT_WR);
     sock_client_read(&client);
@@ -91,7 +91,7 @@ static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
     expect_no_line();
 }
 
-static void test_client_line_of_4096_bytes_fits_and_4097_are_too_long(void) {
+TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX, (int)send(peer, big, IWN_LINE_MAX, 0));
     sock_client_read(&client);
     TEST_ASSERT_FALSE(sock_client_line_too_long(&client));
@@ -104,7 +104,7 @@ static void test_client_line_of_4096_bytes_fits_and_4097_are_too_long(void) {
     TEST_ASSERT_TRUE(sock_client_line_too_long(&client));
 }
 
-static void test_client_reply_goes_out_whole(void) {
+TEST(test_client_reply_goes_out_whole) {
     char text[64] = "";
     sock_client_reply(&client, "hello\n", 6);
     TEST_ASSERT_FALSE(sock_client_flushed(&client));
@@ -113,7 +113,7 @@ static void test_client_reply_goes_out_whole(void) {
     TEST_ASSERT_TRUE(sock_client_flushed(&client));
 }
 
-static void test_client_that_does_not_read_loses_events_and_is_told_how_many(void) {
+TEST(test_client_that_does_not_read_loses_events_and_is_told_how_many) {
     unsigned sent = 0;
     while (client.lost < 5U) { // Socket full, then our half full.
         sock_client_event(&client, big, 1000);
@@ -129,7 +129,7 @@ static void test_client_that_does_not_read_loses_events_and_is_told_how_many(voi
     TEST_ASSERT_EQUAL_UINT32(0, client.lost);
 }
 
-static void test_client_room_for_the_longest_reply_is_kept_free_of_events(void) {
+TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events) {
     while (client.lost == 0U) {
         sock_client_event(&client, big, 1000);
     }
@@ -139,7 +139,7 @@ static void test_client_room_for_the_longest_reply_is_kept_free_of_events(void) 
     TEST_ASSERT_TRUE(sock_client_is_broken(&client));
 }
 
-static void test_client_event_to_one_that_is_leaving_is_dropped(void) {
+TEST(test_client_event_to_one_that_is_leaving_is_dropped) {
     sock_client_finish(&client, 1000);
     sock_client_event(&client, "x\n", 2);
     TEST_ASSERT_TRUE(sock_client_flushed(&client));
@@ -148,7 +148,7 @@ static void test_client_event_to_one_that_is_leaving_is_dropped(void) {
     TEST_ASSERT_EQUAL_UINT64(1000U + SOCK_CLOSING_US, client.close_us);
 }
 
-static void test_client_gone_is_noticed_when_written_to(void) {
+TEST(test_client_gone_is_noticed_when_written_to) {
     (void)close(peer);
     sock_client_reply(&client, "x\n", 2);
     sock_client_flush(&client);
@@ -156,7 +156,7 @@ static void test_client_gone_is_noticed_when_written_to(void) {
     peer = -1;
 }
 
-static void test_log_line_is_plain_whatever_stands_in_it(void) {
+TEST(test_log_line_is_plain_whatever_stands_in_it) {
     char line[256] = "";
     int ends[2];
     sock_log_t log;
@@ -174,7 +174,7 @@ static void test_log_line_is_plain_whatever_stands_in_it(void) {
     TEST_ASSERT_EQUAL_STRING("iwheel-gateway: info: from ?[2J????\xC3\xA9\n", line);
 }
 
-static void test_client_request_right_after_calm_was_sent_now(void) {
+TEST(test_client_request_right_after_calm_was_sent_now) {
     say("{}\n");
     client.caught_up_us = 1000000;
     TEST_ASSERT_EQUAL_UINT64(1025000, sock_client_sent_us(&client, 1025000, 0));
@@ -182,7 +182,7 @@ static void test_client_request_right_after_calm_was_sent_now(void) {
     TEST_ASSERT_EQUAL_UINT64(1000000, sock_client_sent_us(&client, 1000001, 1000001));
 }
 
-static void test_client_with_a_line_left_is_not_caught_up(void) {
+TEST(test_client_with_a_line_left_is_not_caught_up) {
     say("{}\n{}\n");
     sock_client_note_caught_up(&client, 5);
     expect_line("{}");
@@ -193,13 +193,13 @@ static void test_client_with_a_line_left_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(7, client.caught_up_us);
 }
 
-static void test_client_caught_up_later_is_not_forgotten_for_an_earlier_time(void) {
+TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time) {
     sock_client_check_caught_up(&client, 9);
     sock_client_note_caught_up(&client, 8);
     TEST_ASSERT_EQUAL_UINT64(9, client.caught_up_us);
 }
 
-static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
+TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up) {
     TEST_ASSERT_EQUAL_INT(3, (int)send(peer, "{}\n", 3, MSG_NOSIGNAL));
     sock_client_check_caught_up(&client, 5);
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
@@ -209,7 +209,7 @@ static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(6, client.caught_up_us);
 }
 
-static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
+TEST(test_client_that_filled_the_buffer_is_not_caught_up) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
     }
@@ -218,7 +218,7 @@ static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
 }
 
-static void test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended(void) {
+TEST(test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended) {
     const size_t room = sizeof client.in;
     while (client.in_length < room) {
         const size_t part = (room - client.in_length < sizeof big) ? room - client.in_length : sizeof big;
@@ -233,25 +233,4 @@ static void test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ende
     client.phase = SOCK_CLOSING;
     sock_client_read(&client);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline);
-    RUN_TEST(test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits);
-    RUN_TEST(test_client_half_a_line_at_the_end_is_never_a_line);
-    RUN_TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long);
-    RUN_TEST(test_client_reply_goes_out_whole);
-    RUN_TEST(test_client_that_does_not_read_loses_events_and_is_told_how_many);
-    RUN_TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events);
-    RUN_TEST(test_client_event_to_one_that_is_leaving_is_dropped);
-    RUN_TEST(test_client_gone_is_noticed_when_written_to);
-    RUN_TEST(test_log_line_is_plain_whatever_stands_in_it);
-    RUN_TEST(test_client_request_right_after_calm_was_sent_now);
-    RUN_TEST(test_client_with_a_line_left_is_not_caught_up);
-    RUN_TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time);
-    RUN_TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up);
-    RUN_TEST(test_client_that_filled_the_buffer_is_not_caught_up);
-    RUN_TEST(test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended);
-    return UNITY_END();
 }

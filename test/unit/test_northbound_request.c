@@ -3,7 +3,7 @@
 
 #include "iwheel_northbound/request.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -16,8 +16,6 @@ void setUp(void) {
     memset(&request, 0xA5, sizeof request);
     memset(&refusal, 0xA5, sizeof refusal);
 }
-
-void tearDown(void) {}
 
 static bool parse(const char *line) {
     return iwn_request_read(line, strlen(line), &work, &request, &refusal);
@@ -38,7 +36,7 @@ static void refused(iwn_error_t error, const char *line) {
     }
 }
 
-static void test_request_each_command_with_its_fields_is_accepted(void) {
+TEST(test_request_each_command_with_its_fields_is_accepted) {
     accepted("{\"cmd\":\"hello\"}", IWN_CMD_HELLO);
     accepted("{\"cmd\":\"status\",\"id\":1}", IWN_CMD_STATUS);
     accepted("{\"cmd\":\"watch\",\"topics\":[]}", IWN_CMD_WATCH);
@@ -54,7 +52,7 @@ static void test_request_each_command_with_its_fields_is_accepted(void) {
     accepted(" \t{ \"cmd\" : \"why\" } \r", IWN_CMD_WHY);
 }
 
-static void test_request_drive_takes_numbers_as_sent(void) {
+TEST(test_request_drive_takes_numbers_as_sent) {
     accepted("{\"cmd\":\"drive\",\"left_mm_s\":-32768,\"right_mm_s\":4294967496,\"left_mA\":-7,\"right_mA\":8}",
              IWN_CMD_DRIVE);
     TEST_ASSERT_EQUAL_INT64(-32768, request.left_mm_s);
@@ -66,7 +64,7 @@ static void test_request_drive_takes_numbers_as_sent(void) {
     TEST_ASSERT_FALSE(request.has_current);
 }
 
-static void test_request_id_is_repeated_whatever_else_is_wrong(void) {
+TEST(test_request_id_is_repeated_whatever_else_is_wrong) {
     accepted("{\"id\":-9007199254740993,\"cmd\":\"why\"}", IWN_CMD_WHY);
     TEST_ASSERT_EQUAL_INT(IWN_ID_NUMBER, request.id.kind);
     TEST_ASSERT_EQUAL_INT64(-9007199254740993, request.id.number);
@@ -81,7 +79,7 @@ static void test_request_id_is_repeated_whatever_else_is_wrong(void) {
     TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, request.id.kind);
 }
 
-static void test_request_id_of_another_kind_is_refused(void) {
+TEST(test_request_id_of_another_kind_is_refused) {
     refused(IWN_BAD_VALUE, "{\"id\":1.5,\"cmd\":\"why\"}");
     refused(IWN_BAD_VALUE, "{\"id\":null,\"cmd\":\"why\"}");
     refused(IWN_BAD_VALUE, "{\"id\":[1],\"cmd\":\"why\"}");
@@ -91,7 +89,7 @@ static void test_request_id_of_another_kind_is_refused(void) {
             "{\"id\":\"aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa\",\"cmd\":\"why\"}");
 }
 
-static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(void) {
+TEST(test_request_confirm_takes_an_item_and_a_value_as_text_or_integer) {
     accepted("{\"cmd\":\"confirm\",\"item\":\"wheel_radius\",\"value\":192}", IWN_CMD_CONFIRM);
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_WHEEL_RADIUS, request.item);
     TEST_ASSERT_EQUAL_STRING("192", request.value);
@@ -121,7 +119,7 @@ static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(vo
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"tare\",\"item\":\"dlc\"}");
 }
 
-static void test_request_not_one_object_is_bad_json(void) {
+TEST(test_request_not_one_object_is_bad_json) {
     static const char *const lines[] = {
         "",
         " ",
@@ -159,7 +157,7 @@ static void test_request_not_one_object_is_bad_json(void) {
     }
 }
 
-static void test_request_nul_byte_anywhere_is_bad_json(void) {
+TEST(test_request_nul_byte_anywhere_is_bad_json) {
     static const char line[] = "{\"cmd\":\"stop\"}\0";
     TEST_ASSERT_FALSE(iwn_request_read(line, sizeof line - 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
@@ -168,7 +166,7 @@ static void test_request_nul_byte_anywhere_is_bad_json(void) {
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
 }
 
-static void test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest(void) {
+TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest) {
     char line[IWN_LINE_MAX];
     size_t length = (size_t)snprintf(line, sizeof line, "{\"cmd\":\"arm\",\"name\":");
     memset(&line[length], '[', 3000);
@@ -180,7 +178,7 @@ static void test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_te
     accepted("{\"cmd\":\"arm\",\"name\":\"\\\"[[[[[[[[[[[[{{{{{{\"}", IWN_CMD_ARM);
 }
 
-static void test_request_line_of_4096_bytes_is_taken_and_one_more_is_not(void) {
+TEST(test_request_line_of_4096_bytes_is_taken_and_one_more_is_not) {
     char line[IWN_LINE_MAX + 1U];
     memset(line, ' ', sizeof line);
     memcpy(line, "{\"cmd\":\"why\"}", 13);
@@ -189,7 +187,7 @@ static void test_request_line_of_4096_bytes_is_taken_and_one_more_is_not(void) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, refusal.error);
 }
 
-static void test_request_worst_lines_are_read_to_their_end(void) {
+TEST(test_request_worst_lines_are_read_to_their_end) {
     static const char *const units[] = {"{},", "[],", "\"\",", "1,", "1.5,", "{\"a\":1},", "[1],", "\"\\u20ac\","};
     char line[IWN_LINE_MAX];
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
@@ -212,7 +210,7 @@ static void test_request_worst_lines_are_read_to_their_end(void) {
     TEST_ASSERT_EQUAL_STRING("unknown_field", iwn_error_name(refusal.error));
 }
 
-static void test_request_integer_of_another_type_is_a_bad_value(void) {
+TEST(test_request_integer_of_another_type_is_a_bad_value) {
     static const char *const values[] = {"1.5", "1.0", "1e2", "true", "false", "null", "\"1\"", "[]", "{}"};
     char line[128];
     for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
@@ -224,7 +222,7 @@ static void test_request_integer_of_another_type_is_a_bad_value(void) {
     }
 }
 
-static void test_request_missing_field_is_named(void) {
+TEST(test_request_missing_field_is_named) {
     refused(IWN_MISSING_FIELD, "{}");
     refused(IWN_MISSING_FIELD, "{\"id\":1}");
     refused(IWN_MISSING_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1}");
@@ -235,7 +233,28 @@ static void test_request_missing_field_is_named(void) {
     refused(IWN_MISSING_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"right_mA\":5}");
 }
 
-static void test_request_field_of_another_command_is_unknown(void) {
+/// The refusal of the line has this name and says this.
+static void refused_with(iwn_error_t error, const char *says, const char *line) {
+    refused(error, line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, says), refusal.message);
+}
+
+TEST(test_request_first_fault_in_the_line_is_named) {
+    refused_with(IWN_UNKNOWN_FIELD, "\"zz\"", "{\"cmd\":\"drive\",\"zz\":1,\"mm\":2,\"aa\":3}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"cmd\":\"drive\",\"aa\":1,\"mm\":2,\"zz\":3}");
+    refused_with(IWN_BAD_VALUE, "right_mm_s must", "{\"right_mm_s\":\"\",\"left_mm_s\":[],\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":[],\"right_mm_s\":\"\",\"cmd\":\"drive\"}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"zz\"", "{\"zz\":1,\"left_mm_s\":null,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":null,\"zz\":1,\"cmd\":\"drive\"}");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"aa\":1,\"left_mm_s\":null,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "left_mm_s must", "{\"left_mm_s\":null,\"aa\":1,\"cmd\":\"drive\"}");
+    refused_with(IWN_BAD_VALUE, "id must", "{\"aa\":1,\"cmd\":\"fly\",\"id\":null}");
+    refused_with(IWN_UNKNOWN_CMD, "cmd must", "{\"aa\":1,\"cmd\":\"fly\"}");
+    refused_with(IWN_BAD_JSON, "end of file", "{\"aa\":1,\"cmd\":\"fly\",\"id\":null} 7");
+    refused_with(IWN_UNKNOWN_FIELD, "\"aa\"", "{\"aa\":1,\"cmd\":\"drive\"}");
+}
+
+TEST(test_request_field_of_another_command_is_unknown) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"left_mm_s\":1}");
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"v_mm_s\":1}");
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"hello\",\"name\":\"x\"}");
@@ -244,7 +263,7 @@ static void test_request_field_of_another_command_is_unknown(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"\xE2\x82\xAC\":1}");
 }
 
-static void test_request_command_must_be_a_known_text(void) {
+TEST(test_request_command_must_be_a_known_text) {
     refused(IWN_UNKNOWN_CMD, "{\"cmd\":\"\"}");
     refused(IWN_UNKNOWN_CMD, "{\"cmd\":\"Stop\"}");
     refused(IWN_UNKNOWN_CMD, "{\"cmd\":\"stop \"}");
@@ -252,7 +271,7 @@ static void test_request_command_must_be_a_known_text(void) {
     refused(IWN_BAD_VALUE, "{\"cmd\":null}");
 }
 
-static void test_request_watch_topics_become_bits_and_unknown_ones_refuse_all(void) {
+TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all) {
     accepted("{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\",\"state\"],\"rate_hz\":25}", IWN_CMD_WATCH);
     TEST_ASSERT_EQUAL_HEX8((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FRAME), request.topics);
     TEST_ASSERT_EQUAL_INT64(25, request.rate_hz);
@@ -267,7 +286,7 @@ static void test_request_watch_topics_become_bits_and_unknown_ones_refuse_all(vo
     refused(IWN_OUT_OF_RANGE, "{\"cmd\":\"watch\",\"topics\":[],\"rate_hz\":-1}");
 }
 
-static void test_request_texts_have_a_length_and_no_control_characters(void) {
+TEST(test_request_texts_have_a_length_and_no_control_characters) {
     char line[512];
     char text[IWN_REASON_MAX + 2U];
     memset(text, 'x', sizeof text);
@@ -293,7 +312,7 @@ static void test_request_texts_have_a_length_and_no_control_characters(void) {
     refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"takeover\":null}");
 }
 
-static void test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling(void) {
+TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling) {
     static const char *const forms[] = {
         "{\"cmd\":\"arm\",\"name\":\"a%sb\"}",
         "{\"cmd\":\"estop\",\"reason\":\"a%sb\"}",
@@ -320,7 +339,7 @@ static void test_request_texts_with_what_moves_a_terminal_are_refused_in_every_f
     }
 }
 
-static void test_request_config_reads_stages_or_commits(void) {
+TEST(test_request_config_reads_stages_or_commits) {
     accepted("{\"cmd\":\"config\"}", IWN_CMD_CONFIG);
     TEST_ASSERT_EQUAL_STRING("", request.key);
     TEST_ASSERT_FALSE(request.has_commit);
@@ -337,7 +356,7 @@ static void test_request_config_reads_stages_or_commits(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"config\",\"item\":\"track\"}");
 }
 
-static void test_request_time_and_stop_are_taken_as_sent(void) {
+TEST(test_request_time_and_stop_are_taken_as_sent) {
     accepted("{\"cmd\":\"arm\",\"t_us\":9223372036854775807}", IWN_CMD_ARM);
     TEST_ASSERT_TRUE(request.has_t_us);
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, request.t_us);
@@ -361,7 +380,7 @@ static void test_request_time_and_stop_are_taken_as_sent(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"t_us\":7}");
 }
 
-static void test_request_drive_takes_a_key_of_32_bytes(void) {
+TEST(test_request_drive_takes_a_key_of_32_bytes) {
     accepted("{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":\"0123456789abcdef0123456789abcdef\"}",
              IWN_CMD_DRIVE);
     TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", request.lease_key);
@@ -377,7 +396,7 @@ static void test_request_drive_takes_a_key_of_32_bytes(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"key\":\"0\"}");
 }
 
-static void test_request_tare_takes_a_side_or_both(void) {
+TEST(test_request_tare_takes_a_side_or_both) {
     accepted("{\"cmd\":\"tare\"}", IWN_CMD_TARE);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, request.sides);
     accepted("{\"cmd\":\"tare\",\"side\":\"left\"}", IWN_CMD_TARE);
@@ -386,30 +405,4 @@ static void test_request_tare_takes_a_side_or_both(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, request.sides);
     refused(IWN_BAD_VALUE, "{\"cmd\":\"tare\",\"side\":\"both\"}");
     refused(IWN_BAD_VALUE, "{\"cmd\":\"tare\",\"side\":3}");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_request_each_command_with_its_fields_is_accepted);
-    RUN_TEST(test_request_drive_takes_numbers_as_sent);
-    RUN_TEST(test_request_id_is_repeated_whatever_else_is_wrong);
-    RUN_TEST(test_request_id_of_another_kind_is_refused);
-    RUN_TEST(test_request_confirm_takes_an_item_and_a_value_as_text_or_integer);
-    RUN_TEST(test_request_not_one_object_is_bad_json);
-    RUN_TEST(test_request_nul_byte_anywhere_is_bad_json);
-    RUN_TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest);
-    RUN_TEST(test_request_line_of_4096_bytes_is_taken_and_one_more_is_not);
-    RUN_TEST(test_request_worst_lines_are_read_to_their_end);
-    RUN_TEST(test_request_integer_of_another_type_is_a_bad_value);
-    RUN_TEST(test_request_missing_field_is_named);
-    RUN_TEST(test_request_field_of_another_command_is_unknown);
-    RUN_TEST(test_request_command_must_be_a_known_text);
-    RUN_TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all);
-    RUN_TEST(test_request_texts_have_a_length_and_no_control_characters);
-    RUN_TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling);
-    RUN_TEST(test_request_config_reads_stages_or_commits);
-    RUN_TEST(test_request_time_and_stop_are_taken_as_sent);
-    RUN_TEST(test_request_drive_takes_a_key_of_32_bytes);
-    RUN_TEST(test_request_tare_takes_a_side_or_both);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What is said of the wheels where there is no daemon: a machine without a clock of the day, without names of processes.
 #include "gateway_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 #include "iwheel_northbound/tell.h"
 
@@ -49,7 +49,7 @@ static void status(void) {
     finish();
 }
 
-static void test_status_of_a_machine_without_a_clock_of_the_day_says_null(void) {
+TEST(test_status_of_a_machine_without_a_clock_of_the_day_says_null) {
     status();
     assert_says("\"wall_us\":null");
     assert_says("\"version\":\"1.2.3\"");
@@ -58,7 +58,7 @@ static void test_status_of_a_machine_without_a_clock_of_the_day_says_null(void) 
     assert_says("\"warnings\":[]");
 }
 
-static void test_status_before_a_wheel_was_heard_has_no_value_of_it(void) {
+TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it) {
     status();
     assert_says("\"left\":{\"heard\":false,\"at_rest\":null,\"speed_rpm\":null,\"speed_mm_s\":null");
     assert_says("\"battery_dV\":null");
@@ -66,7 +66,7 @@ static void test_status_before_a_wheel_was_heard_has_no_value_of_it(void) {
     assert_says("\"offset_age_ms\":null");
 }
 
-static void test_holder_without_name_or_process_is_told_by_its_number(void) {
+TEST(test_holder_without_name_or_process_is_told_by_its_number) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     around.holder = (iwn_holder_t){.client = HOLDER};
@@ -76,7 +76,7 @@ static void test_holder_without_name_or_process_is_told_by_its_number(void) {
     assert_says("\"commanded_mm_s\":300");
 }
 
-static void test_estop_tells_its_second_contact_only_if_it_has_one(void) {
+TEST(test_estop_tells_its_second_contact_only_if_it_has_one) {
     status();
     assert_says("\"estop\":{\"line\":\"PA0\",\"state\":\"released\",\"simulated\":false");
     around.estop.line2 = "PA1";
@@ -87,7 +87,7 @@ static void test_estop_tells_its_second_contact_only_if_it_has_one(void) {
     around.estop = (iwn_estop_t){.line = "PA0", .present = true};
 }
 
-static void test_warnings_are_told_in_their_order(void) {
+TEST(test_warnings_are_told_in_their_order) {
     around.warning[0] = "one";
     around.warning[1] = "two";
     around.warnings = 2;
@@ -95,7 +95,7 @@ static void test_warnings_are_told_in_their_order(void) {
     assert_says("\"warnings\":[\"one\",\"two\"]");
 }
 
-static void test_stop_without_a_clock_of_the_day_has_its_age(void) {
+TEST(test_stop_without_a_clock_of_the_day_has_its_age) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     gateway_rig_press(&rig, true);
@@ -109,7 +109,7 @@ static void test_stop_without_a_clock_of_the_day_has_its_age(void) {
     assert_says("\"age_ms\":499");
 }
 
-static void test_stop_that_never_was_has_nothing_but_its_number(void) {
+TEST(test_stop_that_never_was_has_nothing_but_its_number) {
     const iwn_stop_note_t none = {.wall_us = IWN_WALL_UNKNOWN};
     iwn_tell_stop(&none, rig.now_us, &json);
     finish();
@@ -117,7 +117,7 @@ static void test_stop_that_never_was_has_nothing_but_its_number(void) {
     assert_says("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
 }
 
-static void test_lease_tells_whether_it_was_gained_moved_or_lost(void) {
+TEST(test_lease_tells_whether_it_was_gained_moved_or_lost) {
     const struct {
         iw_client_t holder;
         iw_client_t former;
@@ -134,7 +134,7 @@ static void test_lease_tells_whether_it_was_gained_moved_or_lost(void) {
     }
 }
 
-static void test_reply_that_does_not_fit_is_none(void) {
+TEST(test_reply_that_does_not_fit_is_none) {
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 5};
     const iwn_refusal_t refusal = {.error = IWN_BUSY, .message = "somebody else drives"};
     char line[128];
@@ -144,18 +144,4 @@ static void test_reply_that_does_not_fit_is_none(void) {
     for (size_t size = 0; size < length; size++) {
         TEST_ASSERT_EQUAL_size_t(0, iwn_tell_refusal(line, size, &id, &refusal));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_status_of_a_machine_without_a_clock_of_the_day_says_null);
-    RUN_TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it);
-    RUN_TEST(test_holder_without_name_or_process_is_told_by_its_number);
-    RUN_TEST(test_estop_tells_its_second_contact_only_if_it_has_one);
-    RUN_TEST(test_warnings_are_told_in_their_order);
-    RUN_TEST(test_stop_without_a_clock_of_the_day_has_its_age);
-    RUN_TEST(test_stop_that_never_was_has_nothing_but_its_number);
-    RUN_TEST(test_lease_tells_whether_it_was_gained_moved_or_lost);
-    RUN_TEST(test_reply_that_does_not_fit_is_none);
-    return UNITY_END();
 }

@@ -4,12 +4,9 @@
 #include "iwheel_northbound/text.h"
 #include "iwheel_northbound/why.h"
 #include "iwheel_northbound/words.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static const iwn_why_context_t context = {"\"joystick\" (client 3, pid 9)", "kerb", "unix:/e", "unix:/b"};
 
@@ -31,7 +28,7 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
     return text;
 }
 
-static void test_why_names_cause_numbers_time_and_cure(void) {
+TEST(test_why_names_cause_numbers_time_and_cure) {
     TEST_ASSERT_EQUAL_STRING(
         "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
         "check the wheel's power and cable, then: iwheelctl reset",
@@ -51,7 +48,7 @@ static void test_why_names_cause_numbers_time_and_cure(void) {
                                 "left wheel does not follow its command: the machine left its path by 61 mm"));
 }
 
-static void test_why_says_of_each_stop_whether_it_ramped(void) {
+TEST(test_why_says_of_each_stop_whether_it_ramped) {
     iw_stop_t stop;
     char text[IWN_SENTENCE_SIZE];
     memset(&stop, 0, sizeof stop);
@@ -70,7 +67,7 @@ static void test_why_says_of_each_stop_whether_it_ramped(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "; zero at once at"));
 }
 
-static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
+TEST(test_why_after_a_crash_does_not_say_what_nobody_knows) {
     iw_stop_t stop;
     char text[IWN_SENTENCE_SIZE];
     memset(&stop, 0, sizeof stop);
@@ -83,7 +80,7 @@ static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
                              text);
 }
 
-static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
+TEST(test_why_has_a_sentence_and_a_name_for_every_cause) {
     for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause < IW_CAUSES; cause++) {
         const char *text = sentence((iw_cause_t)cause, IW_SIDES_LEFT, 1);
         TEST_ASSERT_TRUE(strlen(text) > 60U);
@@ -96,7 +93,7 @@ static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
     TEST_ASSERT_EQUAL_STRING("unknown", iwn_cause_name((iw_cause_t)IW_CAUSES));
 }
 
-static void test_why_without_a_stop_says_so(void) {
+TEST(test_why_without_a_stop_says_so) {
     char text[IWN_SENTENCE_SIZE];
     iw_stop_t stop;
     memset(&stop, 0, sizeof stop);
@@ -104,7 +101,7 @@ static void test_why_without_a_stop_says_so(void) {
     TEST_ASSERT_EQUAL_STRING("no stop since the gateway started", text);
 }
 
-static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
+TEST(test_names_of_all_refusals_are_errors_of_the_closed_list) {
     for (unsigned refusal = IW_REFUSE_OUT_OF_RANGE; refusal < IW_REFUSALS; refusal++) {
         const iwn_error_t error = iwn_error_of((iw_refusal_t)refusal);
         TEST_ASSERT_TRUE(error > IWN_OK && error < IWN_INTERNAL);
@@ -123,7 +120,7 @@ static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
     TEST_ASSERT_EQUAL_STRING("none", iwn_estop_name(0, false));
 }
 
-static void test_why_shows_three_decimals_of_any_time(void) {
+TEST(test_why_shows_three_decimals_of_any_time) {
     static const struct {
         iw_time_us_t at_us;
         const char *shown;
@@ -140,7 +137,7 @@ static void test_why_shows_three_decimals_of_any_time(void) {
     }
 }
 
-static void test_why_that_does_not_fit_is_cut_and_ends(void) {
+TEST(test_why_that_does_not_fit_is_cut_and_ends) {
     char text[24];
     const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_CLIENT_STOP};
     memset(text, 'x', sizeof text);
@@ -149,7 +146,7 @@ static void test_why_that_does_not_fit_is_cut_and_ends(void) {
     TEST_ASSERT_EQUAL_HEX8('x', text[20]);
 }
 
-static void test_text_is_put_together_and_ends_at_any_size(void) {
+TEST(test_text_is_put_together_and_ends_at_any_size) {
     char buffer[16];
     for (size_t size = 1; size < sizeof buffer; size++) {
         memset(buffer, 'x', sizeof buffer);
@@ -165,7 +162,7 @@ static void test_text_is_put_together_and_ends_at_any_size(void) {
     }
 }
 
-static void test_text_of_every_code_point_reads_as_it_was_written(void) {
+TEST(test_text_of_every_code_point_reads_as_it_was_written) {
     for (uint32_t code_point = 1; code_point <= 0x10FFFFU; code_point++) {
         char bytes[5] = "";
         size_t read;
@@ -197,7 +194,7 @@ static const char *not_at_rest(void) {
     return refusal.message;
 }
 
-static void test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros(void) {
+TEST(test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros) {
     static const char turning[] = "the wheels turn or are told to: left ";
     TEST_ASSERT_EQUAL_STRING("the wheels are not at standstill for 200 ms yet; wait, then try again", not_at_rest());
     for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -214,20 +211,4 @@ static void test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros(v
         TEST_ASSERT_NOT_NULL(strstr(not_at_rest(), turning));
         seen.applied.wheel[side].speed_mm_s = 0;
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_why_names_cause_numbers_time_and_cure);
-    RUN_TEST(test_why_says_of_each_stop_whether_it_ramped);
-    RUN_TEST(test_why_after_a_crash_does_not_say_what_nobody_knows);
-    RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
-    RUN_TEST(test_why_without_a_stop_says_so);
-    RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
-    RUN_TEST(test_why_shows_three_decimals_of_any_time);
-    RUN_TEST(test_why_that_does_not_fit_is_cut_and_ends);
-    RUN_TEST(test_text_is_put_together_and_ends_at_any_size);
-    RUN_TEST(test_text_of_every_code_point_reads_as_it_was_written);
-    RUN_TEST(test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros);
-    return UNITY_END();
 }

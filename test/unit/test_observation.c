@@ -4,7 +4,7 @@
 #include "iwheel/gateway.h"
 #include "iwheel/observation.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -39,8 +39,6 @@ void setUp(void) {
     fixture_config(&config);
     begin_at(FIXTURE_START_US);
 }
-
-void tearDown(void) {}
 
 static void look(void) {
     iw_observation_step(&observation, &gateway, &seen);
@@ -106,7 +104,7 @@ static void assert_after_misses(int64_t moved, iw_assumption_state_t state, int3
     assert_ratio(state, figure);
 }
 
-static void test_evidence_a_ratio_within_twelve_percent_fits(void) {
+TEST(test_evidence_a_ratio_within_twelve_percent_fits) {
     assert_after_one(1000, IW_CONFIRMED);
     assert_after_one(1120, IW_CONFIRMED);
     assert_after_one(880, IW_CONFIRMED);
@@ -114,7 +112,7 @@ static void test_evidence_a_ratio_within_twelve_percent_fits(void) {
     assert_after_one(879, IW_ASSUMED);
 }
 
-static void test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stretches(void) {
+TEST(test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stretches) {
     assert_after_misses(1250, IW_ASSUMED, 0);
     assert_after_misses(750, IW_ASSUMED, 0);
     assert_after_misses(1251, IW_CONTRADICTED, 1251);
@@ -122,7 +120,7 @@ static void test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stre
     assert_after_misses(-1000, IW_CONTRADICTED, -1000);
 }
 
-static void test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest(void) {
+TEST(test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest) {
     assert_after_misses(INT32_MAX / 2 + 1000, IW_CONTRADICTED, INT32_MAX / 2 + 1000);
     assert_after_misses(INT32_MAX / 2 + 1001, IW_CONTRADICTED, INT32_MAX);
     assert_after_misses(-(INT32_MAX / 2) + 1000, IW_CONTRADICTED, -(INT32_MAX / 2) + 1000);
@@ -130,7 +128,7 @@ static void test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest(void)
     assert_after_misses(100000000000, IW_CONTRADICTED, INT32_MAX);
 }
 
-static void test_evidence_a_ratio_between_counts_neither_for_nor_against(void) {
+TEST(test_evidence_a_ratio_between_counts_neither_for_nor_against) {
     begin_stretch(RPM);
     stretch(MISS);
     stretch(BETWEEN);
@@ -140,7 +138,7 @@ static void test_evidence_a_ratio_between_counts_neither_for_nor_against(void) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-static void test_evidence_a_fit_between_misses_begins_their_count_anew(void) {
+TEST(test_evidence_a_fit_between_misses_begins_their_count_anew) {
     begin_stretch(RPM);
     stretch(MISS);
     stretch(MISS);
@@ -152,7 +150,7 @@ static void test_evidence_a_fit_between_misses_begins_their_count_anew(void) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-static void test_evidence_a_verdict_keeps_its_figure(void) {
+TEST(test_evidence_a_verdict_keeps_its_figure) {
     begin_stretch(RPM);
     stretch(1000);
     stretch(1010);
@@ -162,14 +160,14 @@ static void test_evidence_a_verdict_keeps_its_figure(void) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-static void test_evidence_backwards_the_ticks_must_fall(void) {
+TEST(test_evidence_backwards_the_ticks_must_fall) {
     begin_stretch(-RPM);
     speeds(-RPM, FRAMES);
     status_of(IW_LEFT, -1050);
     assert_ratio(IW_CONFIRMED, 1050);
 }
 
-static void test_evidence_a_stretch_is_one_whole_rotor_turn_at_least(void) {
+TEST(test_evidence_a_stretch_is_one_whole_rotor_turn_at_least) {
     begin_stretch(10);
     speeds(10, 59);
     speed_of(IW_LEFT, 10, FRAME_US - 2U);
@@ -181,7 +179,7 @@ static void test_evidence_a_stretch_is_one_whole_rotor_turn_at_least(void) {
     assert_ratio(IW_CONFIRMED, 1000);
 }
 
-static void test_evidence_turns_between_two_frames_are_their_mean(void) {
+TEST(test_evidence_turns_between_two_frames_are_their_mean) {
     begin_stretch(RPM);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 3 * RPM : RPM, FRAME_US);
@@ -200,12 +198,12 @@ static void assert_with_gear(uint16_t turns, uint16_t per, bool of_rotor, int64_
     assert_ratio(IW_CONFIRMED, 1000);
 }
 
-static void test_evidence_rpm_of_the_wheel_count_with_the_gear_those_of_the_rotor_without(void) {
+TEST(test_evidence_rpm_of_the_wheel_count_with_the_gear_those_of_the_rotor_without) {
     assert_with_gear(5, 2, false, 2500);
     assert_with_gear(5, 2, true, 1000);
 }
 
-static void test_evidence_each_wheel_has_its_own_stretch(void) {
+TEST(test_evidence_each_wheel_has_its_own_stretch) {
     begin_stretch(RPM);
     speed_of(IW_RIGHT, RPM, 1000);
     status_of(IW_RIGHT, 0);
@@ -253,7 +251,7 @@ static void assert_breaks(void (*event)(void)) {
     }
 }
 
-static void test_evidence_a_break_begins_the_stretch_anew(void) {
+TEST(test_evidence_a_break_begins_the_stretch_anew) {
     assert_breaks(gap);
     assert_breaks(slow_frame);
     assert_breaks(turn_back);
@@ -261,7 +259,7 @@ static void test_evidence_a_break_begins_the_stretch_anew(void) {
     assert_breaks(reboot_untold);
 }
 
-static void test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_nothing(void) {
+TEST(test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_nothing) {
     begin_stretch(RPM);
     speeds(RPM, FRAMES);
     reboot();
@@ -269,7 +267,7 @@ static void test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_n
     assert_ratio(IW_ASSUMED, 0);
 }
 
-static void test_evidence_wheels_below_ten_rpm_say_nothing(void) {
+TEST(test_evidence_wheels_below_ten_rpm_say_nothing) {
     begin_stretch(9);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 11 : 9, FRAME_US);
@@ -278,7 +276,7 @@ static void test_evidence_wheels_below_ten_rpm_say_nothing(void) {
     assert_ratio(IW_ASSUMED, 0);
 }
 
-static void test_evidence_looking_again_adds_nothing(void) {
+TEST(test_evidence_looking_again_adds_nothing) {
     begin_stretch(12);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 9 : 12, FRAME_US);
@@ -298,7 +296,7 @@ static void assert_endless(int64_t turned, iw_assumption_state_t state) {
     TEST_ASSERT_EQUAL_INT(state, seen.assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
-static void test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begins_anew(void) {
+TEST(test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begins_anew) {
     assert_endless(IW_OBSERVATION_TURNED_MAX, IW_CONFIRMED);
     assert_endless(IW_OBSERVATION_TURNED_MAX + 1, IW_ASSUMED);
     stretch(1000);
@@ -333,7 +331,7 @@ static void assert_drive(int16_t applied_mm_s, int32_t measured_mm_s, bool confi
     }
 }
 
-static void test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told(void) {
+TEST(test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told) {
     assert_drive(1000, 1171, true);
     assert_drive(1000, 1172, false);
     assert_drive(1000, 829, true);
@@ -343,7 +341,7 @@ static void test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told(
     assert_drive(-1000, 1000, false);
 }
 
-static void test_evidence_one_rpm_is_that_of_the_wheels_radius(void) {
+TEST(test_evidence_one_rpm_is_that_of_the_wheels_radius) {
     assert_drive(1000, 1172, false);
     seen.wheel[IW_LEFT].um_s_per_rpm = 21000;
     look();
@@ -352,7 +350,7 @@ static void test_evidence_one_rpm_is_that_of_the_wheels_radius(void) {
     assert_type(IW_CONFIRMED, 1172);
 }
 
-static void test_evidence_a_wheel_told_less_than_150_mm_s_says_nothing_of_the_type(void) {
+TEST(test_evidence_a_wheel_told_less_than_150_mm_s_says_nothing_of_the_type) {
     assert_drive(150, 150, true);
     assert_drive(-150, -150, true);
     assert_drive(149, 149, false);
@@ -369,12 +367,12 @@ static void assert_not_before_a_second(iw_side_t side) {
     assert_type(IW_CONFIRMED, 1050);
 }
 
-static void test_evidence_either_wheel_confirms_the_type_after_a_second(void) {
+TEST(test_evidence_either_wheel_confirms_the_type_after_a_second) {
     assert_not_before_a_second(IW_LEFT);
     assert_not_before_a_second(IW_RIGHT);
 }
 
-static void test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type(void) {
+TEST(test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type) {
     assert_drive(200, 300, false);
     seen.wheel[IW_LEFT].speed_mm_s = 200;
     seen.state = IW_STATE_STOPPING;
@@ -390,7 +388,7 @@ static void test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type(vo
     assert_type(IW_ASSUMED, 0);
 }
 
-static void test_evidence_another_speed_told_begins_the_second_anew(void) {
+TEST(test_evidence_another_speed_told_begins_the_second_anew) {
     config.setpoint_type_set = false;
     begin_at(FIXTURE_START_US);
     for (int16_t mm_s = 200; mm_s < 300; mm_s = (int16_t)(mm_s + 10)) {
@@ -419,21 +417,21 @@ static void assert_pose(iw_assumption_state_t state, int32_t figure) {
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, state, figure);
 }
 
-static void test_evidence_a_pose_in_small_steps_is_the_right_way_round(void) {
+TEST(test_evidence_a_pose_in_small_steps_is_the_right_way_round) {
     walk(1, 0, 24);
     assert_pose(IW_ASSUMED, 0);
     walk(1, 25, 25);
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-static void test_evidence_a_pose_in_large_steps_is_the_wrong_way_round(void) {
+TEST(test_evidence_a_pose_in_large_steps_is_the_wrong_way_round) {
     walk(256, 0, 24);
     assert_pose(IW_ASSUMED, 0);
     walk(256, 25, 25);
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-static void test_evidence_a_pose_that_says_neither_leaves_nothing_behind(void) {
+TEST(test_evidence_a_pose_that_says_neither_leaves_nothing_behind) {
     walk(257, 0, 25);
     for (int i = 1; i <= 25; i++) {
         assert_pose(IW_ASSUMED, 0);
@@ -442,7 +440,7 @@ static void test_evidence_a_pose_that_says_neither_leaves_nothing_behind(void) {
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-static void test_evidence_after_a_verdict_the_pose_is_looked_at_anew(void) {
+TEST(test_evidence_after_a_verdict_the_pose_is_looked_at_anew) {
     walk(1, 0, 25);
     for (int i = 1; i <= 25; i++) {
         assert_pose(IW_CONFIRMED, 256000);
@@ -458,7 +456,7 @@ static void shuttle(int low, int lower) {
     }
 }
 
-static void test_evidence_of_the_pose_must_be_eightfold(void) {
+TEST(test_evidence_of_the_pose_must_be_eightfold) {
     shuttle(248, 249);
     assert_pose(IW_CONFIRMED, 8000);
     seen.at_us += 1U; // A gap: the way back is no step.
@@ -466,14 +464,14 @@ static void test_evidence_of_the_pose_must_be_eightfold(void) {
     assert_pose(IW_CONTRADICTED, 125);
 }
 
-static void test_evidence_a_pose_wraps_the_shorter_way(void) {
+TEST(test_evidence_a_pose_wraps_the_shorter_way) {
     for (int i = 0; i <= 25; i++) {
         pose(32767 - 10 + i, 0, 0, POSE_US);
     }
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, seen.assumed[IW_ASSUMPTION_POSE_BYTE_ORDER].state);
 }
 
-static void test_evidence_a_pose_that_stands_still_is_no_step(void) {
+TEST(test_evidence_a_pose_that_stands_still_is_no_step) {
     walk(1, 0, 24);
     pose(24, 48, 72, POSE_US);
     look();
@@ -482,7 +480,7 @@ static void test_evidence_a_pose_that_stands_still_is_no_step(void) {
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-static void test_evidence_a_pose_after_a_gap_is_no_step(void) {
+TEST(test_evidence_a_pose_after_a_gap_is_no_step) {
     walk(1, 0, 24);
     pose(25, 50, 75, POSE_US + 1U);
     assert_pose(IW_ASSUMED, 0);
@@ -490,14 +488,14 @@ static void test_evidence_a_pose_after_a_gap_is_no_step(void) {
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-static void test_evidence_the_first_pose_is_no_step_even_right_after_the_clock_began(void) {
+TEST(test_evidence_the_first_pose_is_no_step_even_right_after_the_clock_began) {
     begin_at(0);
     pose(1, 0, 0, 100U);
     walk(1, 2, 25);
     assert_pose(IW_ASSUMED, 0);
 }
 
-static void test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps(void) {
+TEST(test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps) {
     for (int i = 0; i <= 10; i++) {
         pose(i % 2 * INT16_MIN, i % 2 * INT16_MIN, i % 2 * INT16_MIN, POSE_US);
         assert_pose(IW_ASSUMED, 0);
@@ -506,7 +504,7 @@ static void test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps(void) {
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-static void test_evidence_of_the_pose_may_add_up_to_its_limit(void) {
+TEST(test_evidence_of_the_pose_may_add_up_to_its_limit) {
     pose(0, 0, 0, POSE_US);
     observation.moved = IW_OBSERVATION_POSE_FAR - 257;
     pose(1, 0, 0, POSE_US);
@@ -516,42 +514,4 @@ static void test_evidence_of_the_pose_may_add_up_to_its_limit(void) {
     observation.moved = IW_OBSERVATION_POSE_FAR - 256;
     pose(1, 0, 0, POSE_US);
     assert_pose(IW_CONTRADICTED, 0);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_evidence_a_ratio_within_twelve_percent_fits);
-    RUN_TEST(test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stretches);
-    RUN_TEST(test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest);
-    RUN_TEST(test_evidence_a_ratio_between_counts_neither_for_nor_against);
-    RUN_TEST(test_evidence_a_fit_between_misses_begins_their_count_anew);
-    RUN_TEST(test_evidence_a_verdict_keeps_its_figure);
-    RUN_TEST(test_evidence_backwards_the_ticks_must_fall);
-    RUN_TEST(test_evidence_a_stretch_is_one_whole_rotor_turn_at_least);
-    RUN_TEST(test_evidence_turns_between_two_frames_are_their_mean);
-    RUN_TEST(test_evidence_rpm_of_the_wheel_count_with_the_gear_those_of_the_rotor_without);
-    RUN_TEST(test_evidence_each_wheel_has_its_own_stretch);
-    RUN_TEST(test_evidence_a_break_begins_the_stretch_anew);
-    RUN_TEST(test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_nothing);
-    RUN_TEST(test_evidence_wheels_below_ten_rpm_say_nothing);
-    RUN_TEST(test_evidence_looking_again_adds_nothing);
-    RUN_TEST(test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begins_anew);
-    RUN_TEST(test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told);
-    RUN_TEST(test_evidence_one_rpm_is_that_of_the_wheels_radius);
-    RUN_TEST(test_evidence_a_wheel_told_less_than_150_mm_s_says_nothing_of_the_type);
-    RUN_TEST(test_evidence_either_wheel_confirms_the_type_after_a_second);
-    RUN_TEST(test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type);
-    RUN_TEST(test_evidence_another_speed_told_begins_the_second_anew);
-    RUN_TEST(test_evidence_a_pose_in_small_steps_is_the_right_way_round);
-    RUN_TEST(test_evidence_a_pose_in_large_steps_is_the_wrong_way_round);
-    RUN_TEST(test_evidence_a_pose_that_says_neither_leaves_nothing_behind);
-    RUN_TEST(test_evidence_after_a_verdict_the_pose_is_looked_at_anew);
-    RUN_TEST(test_evidence_of_the_pose_must_be_eightfold);
-    RUN_TEST(test_evidence_a_pose_wraps_the_shorter_way);
-    RUN_TEST(test_evidence_a_pose_that_stands_still_is_no_step);
-    RUN_TEST(test_evidence_a_pose_after_a_gap_is_no_step);
-    RUN_TEST(test_evidence_the_first_pose_is_no_step_even_right_after_the_clock_began);
-    RUN_TEST(test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps);
-    RUN_TEST(test_evidence_of_the_pose_may_add_up_to_its_limit);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // What the wheels' own motion tells: the core and the simulated pair in virtual time, with wheels that are not as assumed.
 #include "world_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 static world_rig_t rig;
 
@@ -10,8 +10,6 @@ void setUp(void) {
     fixture_config(&rig.config);
     world_rig_begin(&rig, 0);
 }
-
-void tearDown(void) {}
 
 static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state) {
     const iw_assumption_entry_t *entry = iw_assumption_entry(&rig.gateway.assumptions, item);
@@ -25,14 +23,14 @@ static int32_t figure(iw_assumption_item_t item) {
     return iw_assumption_entry(&rig.gateway.assumptions, item)->figure;
 }
 
-static void test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type(void) {
+TEST(test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type) {
     world_rig_run(&rig, 60000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-static void test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs(void) {
+TEST(test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs) {
     world_rig_drive(&rig, 400, -400, 6000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
     TEST_ASSERT_INT32_WITHIN(60, 1000, figure(IW_ASSUMPTION_GEAR_RATIO));
@@ -46,7 +44,7 @@ static void test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs(void
     assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED);
 }
 
-static void test_evidence_wheels_from_crawling_wheels_is_not_taken(void) {
+TEST(test_evidence_wheels_from_crawling_wheels_is_not_taken) {
     world_rig_drive(&rig, 120, 120, 20000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
@@ -59,14 +57,14 @@ static void set_gear(uint16_t turns, bool rpm_of_rotor) {
     }
 }
 
-static void test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio(void) {
+TEST(test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio) {
     set_gear(3, false);
     world_rig_drive(&rig, 300, 300, 16000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONTRADICTED);
     TEST_ASSERT_INT32_WITHIN(200, 3000, figure(IW_ASSUMPTION_GEAR_RATIO));
 }
 
-static void test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are(void) {
+TEST(test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are) {
     rig.config.gear_turns = 3;
     world_rig_begin(&rig, 0);
     set_gear(3, false);
@@ -79,7 +77,7 @@ static void test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_ar
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
 }
 
-static void test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio(void) {
+TEST(test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio) {
     rig.config.gear_turns = 2;
     rig.config.follow_mm_s = 500;
     world_rig_begin(&rig, 0);
@@ -89,7 +87,7 @@ static void test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradic
     TEST_ASSERT_INT32_WITHIN(60, 500, figure(IW_ASSUMPTION_GEAR_RATIO));
 }
 
-static void test_evidence_wheels_one_odd_stretch_contradicts_no_ratio(void) {
+TEST(test_evidence_wheels_one_odd_stretch_contradicts_no_ratio) {
     world_rig_drive(&rig, 400, 400, 4000);
     const iw_assumption_entry_t before = *iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO);
     rig.gateway.wheel[IW_LEFT].ticks += 70;
@@ -97,7 +95,7 @@ static void test_evidence_wheels_one_odd_stretch_contradicts_no_ratio(void) {
     TEST_ASSERT_EQUAL_INT(before.state, iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
-static void test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio(void) {
+TEST(test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio) {
     for (unsigned times = 0; times < 5U; times++) {
         rig.gateway.wheel[IW_LEFT].ticks += 70;
         world_rig_drive(&rig, 400, 400, 12000);
@@ -105,7 +103,7 @@ static void test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_r
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
 }
 
-static void test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing(void) {
+TEST(test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing) {
     world_rig_drive(&rig, 300, 300, 100);
     for (unsigned times = 0; times < 40U; times++) {
         const int32_t mm_s = (times % 2U == 0U) ? 330 : 300;
@@ -114,7 +112,7 @@ static void test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_cha
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-static void test_evidence_wheels_a_reboot_or_a_gap_begins_anew(void) {
+TEST(test_evidence_wheels_a_reboot_or_a_gap_begins_anew) {
     world_rig_drive(&rig, 400, 400, 3000);
     for (unsigned times = 0; times < 4U; times++) {
         sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
@@ -131,14 +129,14 @@ static void test_evidence_wheels_a_reboot_or_a_gap_begins_anew(void) {
     TEST_ASSERT_EQUAL_UINT32(4, rig.gateway.wheel[IW_LEFT].reboots);
 }
 
-static void test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order(void) {
+TEST(test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order) {
     rig.world.pair.pose_reversed = true;
     world_rig_drive(&rig, 300, 350, 4000);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONTRADICTED);
     TEST_ASSERT_LESS_THAN_INT32(200, figure(IW_ASSUMPTION_POSE_BYTE_ORDER));
 }
 
-static void test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing(void) {
+TEST(test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing) {
     world_rig_drive(&rig, 300, 350, 2000);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
     sim_world_reboot(&rig.world, rig.now_us, IW_RIGHT);
@@ -146,14 +144,14 @@ static void test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing(void
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
 }
 
-static void test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed(void) {
+TEST(test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed) {
     rig.world.pair.wheel[IW_LEFT].motion.blocked = true;
     rig.world.pair.wheel[IW_RIGHT].motion.blocked = true;
     world_rig_drive(&rig, 300, 300, 4000);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-static void test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit(void) {
+TEST(test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit) {
     iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_OPERATOR, 0);
     iw_assumption_contradict(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER, IW_SOURCE_OPERATOR, 0);
     world_rig_drive(&rig, 400, 400, 5000);
@@ -161,23 +159,4 @@ static void test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit(voi
                           iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->source);
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED,
                           iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER)->state);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type);
-    RUN_TEST(test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs);
-    RUN_TEST(test_evidence_wheels_from_crawling_wheels_is_not_taken);
-    RUN_TEST(test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio);
-    RUN_TEST(test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are);
-    RUN_TEST(test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio);
-    RUN_TEST(test_evidence_wheels_one_odd_stretch_contradicts_no_ratio);
-    RUN_TEST(test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio);
-    RUN_TEST(test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing);
-    RUN_TEST(test_evidence_wheels_a_reboot_or_a_gap_begins_anew);
-    RUN_TEST(test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order);
-    RUN_TEST(test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing);
-    RUN_TEST(test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed);
-    RUN_TEST(test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit);
-    return UNITY_END();
 }

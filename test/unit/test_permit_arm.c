@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Who is armed, and who is refused with which reason?
 #include "permit_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static permit_rig_t rig;
 
 void setUp(void) {
     permit_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 static void assert_arm_refused(iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_INT(expected, permit_rig_arm(&rig, HOLDER));
@@ -22,7 +20,7 @@ static void assert_arm_refused(iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-static void test_permit_begins_listening_in_silence(void) {
+TEST(test_permit_begins_listening_in_silence) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
@@ -32,7 +30,7 @@ static void test_permit_begins_listening_in_silence(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_time_that_begins_at_zero_reminds_of_nothing(void) {
+TEST(test_permit_time_that_begins_at_zero_reminds_of_nothing) {
     rig.now_us = 0;
     iw_permit_init(&rig.permit, &rig.config, 0, false);
     permit_rig_step(&rig);
@@ -40,7 +38,7 @@ static void test_permit_time_that_begins_at_zero_reminds_of_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven(void) {
+TEST(test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -55,12 +53,12 @@ static void test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven(void) 
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-static void test_permit_arm_does_not_need_an_operator_to_have_reset_anything(void) {
+TEST(test_permit_arm_does_not_need_an_operator_to_have_reset_anything) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_arm_without_echo_in_time_is_send_stalled(void) {
+TEST(test_permit_arm_without_echo_in_time_is_send_stalled) {
     (void)permit_rig_arm(&rig, HOLDER);
     permit_rig_wait(&rig, MS(50) - 1U);
     TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
@@ -74,7 +72,7 @@ static void test_permit_arm_without_echo_in_time_is_send_stalled(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not(void) {
+TEST(test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not) {
     (void)permit_rig_arm(&rig, HOLDER);
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(50));
@@ -87,7 +85,7 @@ static void test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not(void) 
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
 }
 
-static void test_permit_arm_again_after_a_failure_clears_the_old_reason(void) {
+TEST(test_permit_arm_again_after_a_failure_clears_the_old_reason) {
     (void)permit_rig_arm(&rig, HOLDER);
     permit_rig_wait(&rig, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
@@ -98,7 +96,7 @@ static void test_permit_arm_again_after_a_failure_clears_the_old_reason(void) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 
-static void test_permit_arm_without_type_or_role_is_refused(void) {
+TEST(test_permit_arm_without_type_or_role_is_refused) {
     rig.config.setpoint_type_set = false;
     assert_arm_refused(IW_REFUSE_TYPE_NOT_SET);
     setUp();
@@ -109,7 +107,7 @@ static void test_permit_arm_without_type_or_role_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_arm_without_a_track_is_refused(void) {
+TEST(test_permit_arm_without_a_track_is_refused) {
     rig.config.track_mm = 0;
     assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
     rig.config.setpoint_type_set = false; // What nobody can measure comes first.
@@ -120,12 +118,12 @@ static void test_permit_arm_without_a_track_is_refused(void) {
     assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
 }
 
-static void test_permit_arm_with_listen_only_is_refused(void) {
+TEST(test_permit_arm_with_listen_only_is_refused) {
     rig.config.listen_only = true;
     assert_arm_refused(IW_REFUSE_LISTEN_ONLY);
 }
 
-static void test_permit_arm_is_judged_by_the_view_of_the_last_step(void) {
+TEST(test_permit_arm_is_judged_by_the_view_of_the_last_step) {
     static const struct {
         size_t flag;
         iw_refusal_t refusal;
@@ -142,13 +140,13 @@ static void test_permit_arm_is_judged_by_the_view_of_the_last_step(void) {
     }
 }
 
-static void test_permit_arm_needs_no_settled_wheels(void) {
+TEST(test_permit_arm_needs_no_settled_wheels) {
     rig.view.settled = false;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_arm_with_a_cause_present_is_refused(void) {
+TEST(test_permit_arm_with_a_cause_present_is_refused) {
     static const struct {
         iw_cause_t cause;
         iw_refusal_t refusal;
@@ -167,7 +165,7 @@ static void test_permit_arm_with_a_cause_present_is_refused(void) {
     }
 }
 
-static void test_permit_arm_within_a_second_of_an_event_is_refused(void) {
+TEST(test_permit_arm_within_a_second_of_an_event_is_refused) {
     static const struct {
         iw_cause_t cause;
         iw_refusal_t refusal;
@@ -187,7 +185,7 @@ static void test_permit_arm_within_a_second_of_an_event_is_refused(void) {
     }
 }
 
-static void test_permit_arm_while_latched_is_refused(void) {
+TEST(test_permit_arm_while_latched_is_refused) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_SOFTWARE);
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, permit_rig_arm(&rig, HOLDER));
@@ -199,7 +197,7 @@ static void test_permit_arm_while_latched_is_refused(void) {
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
-static void test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command(void) {
+TEST(test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, true));
     permit_rig_wait(&rig, MS(500) - 1U);
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
@@ -209,25 +207,25 @@ static void test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command(void
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_arm_after_a_remembered_drive_is_a_stale_command(void) {
+TEST(test_permit_arm_after_a_remembered_drive_is_a_stale_command) {
     iw_permit_remember(&rig.permit, rig.now_us, OTHER);
     permit_rig_wait(&rig, MS(499));
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stale_client);
 }
 
-static void test_permit_arm_after_a_zero_drive_is_accepted(void) {
+TEST(test_permit_arm_after_a_zero_drive_is_accepted) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, false));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_drive_while_arming_is_refused_and_does_not_move(void) {
+TEST(test_permit_drive_while_arming_is_refused_and_does_not_move) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
 }
 
-static void test_permit_arm_while_another_client_is_arming_is_busy(void) {
+TEST(test_permit_arm_while_another_client_is_arming_is_busy) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, permit_rig_arm(&rig, OTHER));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, permit_rig_takeover(&rig, OTHER));
@@ -235,7 +233,7 @@ static void test_permit_arm_while_another_client_is_arming_is_busy(void) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-static void test_permit_arm_repeated_does_not_prolong_arming(void) {
+TEST(test_permit_arm_repeated_does_not_prolong_arming) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     permit_rig_wait(&rig, MS(49));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
@@ -243,7 +241,7 @@ static void test_permit_arm_repeated_does_not_prolong_arming(void) {
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
-static void test_permit_arming_is_ended_by_whatever_would_have_refused_it(void) {
+TEST(test_permit_arming_is_ended_by_whatever_would_have_refused_it) {
     static const struct {
         iw_cause_t cause;
         iw_refusal_t refusal;
@@ -266,7 +264,7 @@ static void test_permit_arming_is_ended_by_whatever_would_have_refused_it(void) 
     }
 }
 
-static void test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect(void) {
+TEST(test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
@@ -286,7 +284,7 @@ static void test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect(vo
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_arm_in_stopping_waits_for_zero_and_rest(void) {
+TEST(test_permit_arm_in_stopping_waits_for_zero_and_rest) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     permit_rig_wait(&rig, MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_arm(&rig, OTHER));
@@ -304,7 +302,7 @@ static void test_permit_arm_in_stopping_waits_for_zero_and_rest(void) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 
-static void test_permit_arming_in_stopping_never_sends_anything_but_zero(void) {
+TEST(test_permit_arming_in_stopping_never_sends_anything_but_zero) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(600));
     (void)permit_rig_arm(&rig, OTHER);
@@ -312,7 +310,7 @@ static void test_permit_arming_in_stopping_never_sends_anything_but_zero(void) {
                      iw_permit_demand(&rig.permit) == IW_DEMAND_BRAKE);
 }
 
-static void test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold(void) {
+TEST(test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     const iw_time_us_t zero_us = rig.now_us;
     rig.view.settled = true;
@@ -329,7 +327,7 @@ static void test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold(void
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_arming_in_stopping_latches_on_a_cause(void) {
+TEST(test_permit_arming_in_stopping_latches_on_a_cause) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(600));
     (void)permit_rig_arm(&rig, OTHER);
@@ -337,36 +335,4 @@ static void test_permit_arming_in_stopping_latches_on_a_cause(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, rig.permit.arm_refusal);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_begins_listening_in_silence);
-    RUN_TEST(test_permit_time_that_begins_at_zero_reminds_of_nothing);
-    RUN_TEST(test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven);
-    RUN_TEST(test_permit_arm_does_not_need_an_operator_to_have_reset_anything);
-    RUN_TEST(test_permit_arm_without_echo_in_time_is_send_stalled);
-    RUN_TEST(test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not);
-    RUN_TEST(test_permit_arm_again_after_a_failure_clears_the_old_reason);
-    RUN_TEST(test_permit_arm_without_type_or_role_is_refused);
-    RUN_TEST(test_permit_arm_without_a_track_is_refused);
-    RUN_TEST(test_permit_arm_with_listen_only_is_refused);
-    RUN_TEST(test_permit_arm_is_judged_by_the_view_of_the_last_step);
-    RUN_TEST(test_permit_arm_needs_no_settled_wheels);
-    RUN_TEST(test_permit_arm_with_a_cause_present_is_refused);
-    RUN_TEST(test_permit_arm_within_a_second_of_an_event_is_refused);
-    RUN_TEST(test_permit_arm_while_latched_is_refused);
-    RUN_TEST(test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command);
-    RUN_TEST(test_permit_arm_after_a_remembered_drive_is_a_stale_command);
-    RUN_TEST(test_permit_arm_after_a_zero_drive_is_accepted);
-    RUN_TEST(test_permit_drive_while_arming_is_refused_and_does_not_move);
-    RUN_TEST(test_permit_arm_while_another_client_is_arming_is_busy);
-    RUN_TEST(test_permit_arm_repeated_does_not_prolong_arming);
-    RUN_TEST(test_permit_arming_is_ended_by_whatever_would_have_refused_it);
-    RUN_TEST(test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect);
-    RUN_TEST(test_permit_arm_in_stopping_waits_for_zero_and_rest);
-    RUN_TEST(test_permit_arming_in_stopping_never_sends_anything_but_zero);
-    RUN_TEST(test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold);
-    RUN_TEST(test_permit_arming_in_stopping_latches_on_a_cause);
-    return UNITY_END();
 }

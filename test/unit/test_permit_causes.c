@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Every cause in every situation: what it does, what it leaves behind, what it refuses.
 #include "permit_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static permit_rig_t rig;
 
 void setUp(void) {
     permit_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 /// What a cause does.
 typedef enum { NOTHING, LATCH, LATCH_SILENT, RAMP, CUT, END_ARMING } effect_t;
@@ -92,7 +90,7 @@ static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t
     TEST_ASSERT_TRUE(effect == NOTHING || rig.permit.holder == IW_CLIENT_NONE);
 }
 
-static void test_permit_every_cause_in_every_situation_takes_effect_at_once(void) {
+TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once) {
     for (size_t i = 0; i < ROWS; i++) {
         for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
             permit_rig_begin(&rig, (permit_situation_t)situation);
@@ -106,7 +104,7 @@ static void test_permit_every_cause_in_every_situation_takes_effect_at_once(void
     }
 }
 
-static void test_permit_cause_told_in_every_step_counts_as_one_stop(void) {
+TEST(test_permit_cause_told_in_every_step_counts_as_one_stop) {
     for (size_t i = 0; i < ROWS; i++) {
         permit_rig_begin(&rig, PERMIT_ARMED);
         permit_rig_raise(&rig, rows[i].cause);
@@ -120,7 +118,7 @@ static void test_permit_cause_told_in_every_step_counts_as_one_stop(void) {
     }
 }
 
-static void test_permit_first_cause_of_a_latch_stays_the_cause(void) {
+TEST(test_permit_first_cause_of_a_latch_stays_the_cause) {
     for (size_t i = 0; i < ROWS; i++) {
         permit_rig_begin(&rig, PERMIT_ARMED);
         permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
@@ -131,7 +129,7 @@ static void test_permit_first_cause_of_a_latch_stays_the_cause(void) {
     }
 }
 
-static void test_permit_latch_after_a_stop_is_a_new_stop(void) {
+TEST(test_permit_latch_after_a_stop_is_a_new_stop) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     const uint32_t number = rig.permit.stop.number;
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
@@ -140,7 +138,7 @@ static void test_permit_latch_after_a_stop_is_a_new_stop(void) {
     TEST_ASSERT_EQUAL_UINT32(number + 1U, rig.permit.stop.number);
 }
 
-static void test_permit_latched_while_listening_sends_nothing_however_long(void) {
+TEST(test_permit_latched_while_listening_sends_nothing_however_long) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     for (uint32_t n = 0; n < 20; n++) {
         permit_rig_wait(&rig, MS(700));
@@ -151,7 +149,7 @@ static void test_permit_latched_while_listening_sends_nothing_however_long(void)
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-static void test_permit_late_loop_leaves_no_ramp_tail(void) {
+TEST(test_permit_late_loop_leaves_no_ramp_tail) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
@@ -161,7 +159,7 @@ static void test_permit_late_loop_leaves_no_ramp_tail(void) {
     }
 }
 
-static void test_permit_stop_after_a_cut_one_ramps_again(void) {
+TEST(test_permit_stop_after_a_cut_one_ramps_again) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     rig.view.output_zero = true;
@@ -175,7 +173,7 @@ static void test_permit_stop_after_a_cut_one_ramps_again(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
 }
 
-static void test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows(void) {
+TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
@@ -183,7 +181,7 @@ static void test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
 }
 
-static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
+TEST(test_permit_cause_of_no_wheel_is_told_as_such) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX, IW_REACT_BY_CAUSE};
     iw_permit_raise(&rig.permit, &lost, rig.now_us);
@@ -192,7 +190,7 @@ static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
 }
 
-static void test_permit_present_tells_levels_while_told_and_events_for_a_second(void) {
+TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second) {
     static const iw_cause_t levels[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_DISAGREES, IW_CAUSE_BUS_DOWN,
                                         IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_LOST};
     static const iw_cause_t events[] = {IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED,
@@ -218,7 +216,7 @@ static void test_permit_present_tells_levels_while_told_and_events_for_a_second(
     }
 }
 
-static void test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told(void) {
+TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     permit_rig_wait(&rig, MS(1000));
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
@@ -232,14 +230,14 @@ static void test_permit_step_that_cannot_judge_keeps_what_was_present_beside_wha
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
 }
 
-static void test_permit_present_does_not_tell_what_does_not_latch(void) {
+TEST(test_permit_present_does_not_tell_what_does_not_latch) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
     TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
 }
 
-static void test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told(void) {
+TEST(test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     TEST_ASSERT_TRUE(rig.permit.quiet);
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
@@ -248,22 +246,4 @@ static void test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_
     TEST_ASSERT_FALSE(rig.permit.quiet);
     permit_rig_wait(&rig, 1U);
     TEST_ASSERT_TRUE(rig.permit.quiet);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once);
-    RUN_TEST(test_permit_cause_told_in_every_step_counts_as_one_stop);
-    RUN_TEST(test_permit_first_cause_of_a_latch_stays_the_cause);
-    RUN_TEST(test_permit_latch_after_a_stop_is_a_new_stop);
-    RUN_TEST(test_permit_latched_while_listening_sends_nothing_however_long);
-    RUN_TEST(test_permit_late_loop_leaves_no_ramp_tail);
-    RUN_TEST(test_permit_stop_after_a_cut_one_ramps_again);
-    RUN_TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows);
-    RUN_TEST(test_permit_cause_of_no_wheel_is_told_as_such);
-    RUN_TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second);
-    RUN_TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told);
-    RUN_TEST(test_permit_present_does_not_tell_what_does_not_latch);
-    RUN_TEST(test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The diagram in permit.h, walked: every event in every phase takes the arrow that is drawn, and where none is drawn it stays.
 #include "permit_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 
@@ -117,10 +117,6 @@ static const struct {
 };
 
 static permit_rig_t rig;
-
-void setUp(void) {}
-
-void tearDown(void) {}
 
 static void arm_and_confirm(void) {
     (void)permit_rig_arm(&rig, HOLDER);
@@ -274,7 +270,7 @@ static iw_phase_t led_to(unsigned beginning, event_t event) {
     return (beginning == REARMING_EARLY) ? IW_PHASE_REARMING : (iw_phase_t)beginning;
 }
 
-static void test_permit_in_every_phase_every_event_leads_where_the_diagram_says(void) {
+TEST(test_permit_in_every_phase_every_event_leads_where_the_diagram_says) {
     unsigned moved = 0;
     for (unsigned beginning = 0; beginning < BEGINNINGS; beginning++) {
         for (unsigned event = 0; event < EVENTS; event++) {
@@ -291,7 +287,7 @@ static void test_permit_in_every_phase_every_event_leads_where_the_diagram_says(
                                    "an arrow is there twice, or leads nowhere");
 }
 
-static void test_permit_is_told_as_four_states_and_sends_as_its_phase_demands(void) {
+TEST(test_permit_is_told_as_four_states_and_sends_as_its_phase_demands) {
     static const struct {
         iw_state_t state;
         iw_demand_t demand;
@@ -315,7 +311,7 @@ static void test_permit_is_told_as_four_states_and_sends_as_its_phase_demands(vo
     }
 }
 
-static void test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so(void) {
+TEST(test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so) {
     unsigned latching = 0;
     for (unsigned cause = IW_CAUSE_NONE + 1U; cause < IW_CAUSES; cause++) {
         char what[32];
@@ -330,12 +326,4 @@ static void test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so(vo
     }
     TEST_ASSERT_EQUAL_UINT(12, latching);
     TEST_ASSERT_FALSE(iw_cause_latches(IW_CAUSE_NONE));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_in_every_phase_every_event_leads_where_the_diagram_says);
-    RUN_TEST(test_permit_is_told_as_four_states_and_sends_as_its_phase_demands);
-    RUN_TEST(test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How zeros are held, how a latch is left, how a gateway begins after a crash, and when it must be called.
 #include "permit_rig.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static permit_rig_t rig;
@@ -9,8 +9,6 @@ static permit_rig_t rig;
 void setUp(void) {
     permit_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 /// Latched while armed; now the wheels stand and the cause is long gone.
 static void latch_and_calm(iw_cause_t cause) {
@@ -33,7 +31,7 @@ static void assert_holding_until(iw_time_us_t after_us, iw_state_t then) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
 }
 
-static void test_permit_hold_begins_when_the_output_is_zero(void) {
+TEST(test_permit_hold_begins_when_the_output_is_zero) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     rig.view.settled = true;
     permit_rig_wait(&rig, MS(3000));
@@ -44,14 +42,14 @@ static void test_permit_hold_begins_when_the_output_is_zero(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-static void test_permit_hold_follows_the_configuration(void) {
+TEST(test_permit_hold_follows_the_configuration) {
     rig.config.zero_hold_ms = 1100;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     rig.view.settled = true;
     assert_holding_until(MS(1100), IW_STATE_LISTENING);
 }
 
-static void test_permit_hold_waits_for_settled_wheels(void) {
+TEST(test_permit_hold_waits_for_settled_wheels) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(4000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
@@ -61,7 +59,7 @@ static void test_permit_hold_waits_for_settled_wheels(void) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-static void test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels(void) {
+TEST(test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     assert_holding_until(MS(60000), IW_STATE_LISTENING);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
@@ -73,7 +71,7 @@ static void test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels(void
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-static void test_permit_longest_hold_follows_the_configuration(void) {
+TEST(test_permit_longest_hold_follows_the_configuration) {
     rig.config.hold_max_s = 10;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     assert_holding_until(MS(10000), IW_STATE_LISTENING);
@@ -84,7 +82,7 @@ static void test_permit_longest_hold_follows_the_configuration(void) {
 }
 
 /// Zeros between another master's setpoints only make the wheels jerk.
-static void test_permit_second_master_is_fought_for_ten_seconds(void) {
+TEST(test_permit_second_master_is_fought_for_ten_seconds) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(3000));
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
@@ -99,7 +97,7 @@ static void test_permit_second_master_is_fought_for_ten_seconds(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_second_master_of_before_the_hold_does_not_shorten_it(void) {
+TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
     permit_rig_wait(&rig, MS(2000)); // Long gone.
@@ -113,7 +111,7 @@ static void test_permit_second_master_of_before_the_hold_does_not_shorten_it(voi
     assert_holding_until(MS(60000), IW_STATE_LISTENING);
 }
 
-static void test_permit_end_of_zeros_is_told_five_seconds_before(void) {
+TEST(test_permit_end_of_zeros_is_told_five_seconds_before) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(55000) - 1U);
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
@@ -132,7 +130,7 @@ static void test_permit_end_of_zeros_is_told_five_seconds_before(void) {
 }
 
 /// Asked between two steps, and late: the next step ends what time is enough for.
-static void test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first(void) {
+TEST(test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     rig.view.settled = true;
     permit_rig_step(&rig);
@@ -143,7 +141,7 @@ static void test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(59999)));
 }
 
-static void test_permit_hold_of_a_cut_stop_begins_at_once(void) {
+TEST(test_permit_hold_of_a_cut_stop_begins_at_once) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     rig.view.settled = true;
@@ -151,7 +149,7 @@ static void test_permit_hold_of_a_cut_stop_begins_at_once(void) {
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
-static void test_permit_latched_holds_zeros_as_stopping_does(void) {
+TEST(test_permit_latched_holds_zeros_as_stopping_does) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     rig.view.settled = true;
@@ -164,7 +162,7 @@ static void test_permit_latched_holds_zeros_as_stopping_does(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-static void test_permit_latch_during_the_hold_begins_a_new_hold(void) {
+TEST(test_permit_latch_during_the_hold_begins_a_new_hold) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     rig.view.settled = true;
     permit_rig_wait(&rig, MS(1400));
@@ -172,7 +170,7 @@ static void test_permit_latch_during_the_hold_begins_a_new_hold(void) {
     assert_holding_until(MS(1500), IW_STATE_LATCHED);
 }
 
-static void test_permit_reset_leaves_the_latch_in_silence(void) {
+TEST(test_permit_reset_leaves_the_latch_in_silence) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
@@ -182,7 +180,7 @@ static void test_permit_reset_leaves_the_latch_in_silence(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
 }
 
-static void test_permit_reset_while_latched_from_listening_works_as_well(void) {
+TEST(test_permit_reset_while_latched_from_listening_works_as_well) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
@@ -191,7 +189,7 @@ static void test_permit_reset_while_latched_from_listening_works_as_well(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_reset_repeated_or_elsewhere_changes_nothing(void) {
+TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing) {
     for (int situation = 0; situation < PERMIT_LATCHED; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
         const iw_permit_t before = rig.permit;
@@ -202,7 +200,7 @@ static void test_permit_reset_repeated_or_elsewhere_changes_nothing(void) {
     }
 }
 
-static void test_permit_reset_held_counts_once(void) {
+TEST(test_permit_reset_held_counts_once) {
     latch_and_calm(IW_CAUSE_ESTOP_SOFTWARE);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
@@ -212,7 +210,7 @@ static void test_permit_reset_held_counts_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_reset_with_a_level_present_names_it(void) {
+TEST(test_permit_reset_with_a_level_present_names_it) {
     static const struct {
         iw_cause_t cause;
         iw_refusal_t refusal;
@@ -231,7 +229,7 @@ static void test_permit_reset_with_a_level_present_names_it(void) {
     }
 }
 
-static void test_permit_reset_within_a_second_of_an_event_is_refused(void) {
+TEST(test_permit_reset_within_a_second_of_an_event_is_refused) {
     static const iw_cause_t events[] = {IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_FEEDBACK_SIGN,
                                         IW_CAUSE_OVERSPEED,     IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
                                         IW_CAUSE_ESTOP_SOFTWARE};
@@ -248,7 +246,7 @@ static void test_permit_reset_within_a_second_of_an_event_is_refused(void) {
     }
 }
 
-static void test_permit_reset_needs_wheels_heard_and_at_rest(void) {
+TEST(test_permit_reset_needs_wheels_heard_and_at_rest) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     rig.view.heard = false;
     permit_rig_step(&rig);
@@ -263,7 +261,7 @@ static void test_permit_reset_needs_wheels_heard_and_at_rest(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
 }
 
-static void test_permit_reset_while_somebody_still_commands_is_refused(void) {
+TEST(test_permit_reset_while_somebody_still_commands_is_refused) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, permit_rig_drive(&rig, OTHER, true));
     permit_rig_wait(&rig, MS(500) - 1U);
@@ -274,7 +272,7 @@ static void test_permit_reset_while_somebody_still_commands_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
 }
 
-static void test_permit_after_reset_the_old_holder_holds_nothing(void) {
+TEST(test_permit_after_reset_the_old_holder_holds_nothing) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     (void)permit_rig_reset(&rig);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
@@ -282,7 +280,7 @@ static void test_permit_after_reset_the_old_holder_holds_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_stop_after_a_reset_is_told_as_not_latched(void) {
+TEST(test_permit_stop_after_a_reset_is_told_as_not_latched) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_TRUE(rig.permit.stop.latched);
     (void)permit_rig_reset(&rig);
@@ -294,7 +292,7 @@ static void test_permit_stop_after_a_reset_is_told_as_not_latched(void) {
     TEST_ASSERT_FALSE(rig.permit.stop.latched);
 }
 
-static void test_permit_restarted_sends_zeros_before_listening(void) {
+TEST(test_permit_restarted_sends_zeros_before_listening) {
     permit_rig_init_restarted(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -304,7 +302,7 @@ static void test_permit_restarted_sends_zeros_before_listening(void) {
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
-static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
+TEST(test_permit_restarted_without_any_wheel_ends_as_well) {
     permit_rig_init_restarted(&rig);
     rig.view.heard = false;
     rig.view.at_rest = false;
@@ -323,7 +321,7 @@ static void hear_foreign(uint8_t sides) {
     iw_permit_raise(&rig.permit, &foreign, rig.now_us);
 }
 
-static void test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint(void) {
+TEST(test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint) {
     static const uint8_t sides[] = {IW_SIDES_LEFT, IW_SIDES_RIGHT};
     for (size_t i = 0; i < 2; i++) {
         permit_rig_init_restarted(&rig);
@@ -339,7 +337,7 @@ static void test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint(void) 
     }
 }
 
-static void test_permit_restarted_latches_on_estop(void) {
+TEST(test_permit_restarted_latches_on_estop) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_INTERNAL};
     for (size_t i = 0; i < 3; i++) {
         permit_rig_init_restarted(&rig);
@@ -349,7 +347,7 @@ static void test_permit_restarted_latches_on_estop(void) {
     }
 }
 
-static void test_permit_restarted_cannot_be_armed_before_the_hold_is_over(void) {
+TEST(test_permit_restarted_cannot_be_armed_before_the_hold_is_over) {
     permit_rig_init_restarted(&rig);
     permit_rig_wait(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, permit_rig_arm(&rig, HOLDER));
@@ -364,7 +362,7 @@ static void assert_restarted_silent(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
 }
 
-static void test_permit_restarted_without_leave_to_send_stays_silent(void) {
+TEST(test_permit_restarted_without_leave_to_send_stays_silent) {
     rig.config.listen_only = true;
     assert_restarted_silent();
     setUp();
@@ -376,7 +374,7 @@ static void test_permit_restarted_without_leave_to_send_stays_silent(void) {
 }
 
 /// No stop depends on it: an update may bring the need of a track to a machine in motion.
-static void test_permit_restarted_without_a_track_sends_zeros_all_the_same(void) {
+TEST(test_permit_restarted_without_a_track_sends_zeros_all_the_same) {
     for (int hold = 0; hold < 2; hold++) {
         setUp();
         rig.config.track_mm = 0;
@@ -439,7 +437,7 @@ static void random_input(fixture_random_t *random) {
     }
 }
 
-static void test_permit_next_us_is_right_in_twenty_thousand_random_situations(void) {
+TEST(test_permit_next_us_is_right_in_twenty_thousand_random_situations) {
     fixture_random_t random;
     fixture_random_init(&random, 6);
     uint32_t seen[4] = {0, 0, 0, 0};
@@ -456,39 +454,4 @@ static void test_permit_next_us_is_right_in_twenty_thousand_random_situations(vo
     for (size_t state = 0; state < 4; state++) {
         TEST_ASSERT_TRUE_MESSAGE(seen[state] > 500, "a state was hardly visited");
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_hold_begins_when_the_output_is_zero);
-    RUN_TEST(test_permit_hold_follows_the_configuration);
-    RUN_TEST(test_permit_hold_waits_for_settled_wheels);
-    RUN_TEST(test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels);
-    RUN_TEST(test_permit_longest_hold_follows_the_configuration);
-    RUN_TEST(test_permit_second_master_is_fought_for_ten_seconds);
-    RUN_TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it);
-    RUN_TEST(test_permit_end_of_zeros_is_told_five_seconds_before);
-    RUN_TEST(test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first);
-    RUN_TEST(test_permit_hold_of_a_cut_stop_begins_at_once);
-    RUN_TEST(test_permit_latched_holds_zeros_as_stopping_does);
-    RUN_TEST(test_permit_latch_during_the_hold_begins_a_new_hold);
-    RUN_TEST(test_permit_reset_leaves_the_latch_in_silence);
-    RUN_TEST(test_permit_reset_while_latched_from_listening_works_as_well);
-    RUN_TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing);
-    RUN_TEST(test_permit_reset_held_counts_once);
-    RUN_TEST(test_permit_reset_with_a_level_present_names_it);
-    RUN_TEST(test_permit_reset_within_a_second_of_an_event_is_refused);
-    RUN_TEST(test_permit_reset_needs_wheels_heard_and_at_rest);
-    RUN_TEST(test_permit_reset_while_somebody_still_commands_is_refused);
-    RUN_TEST(test_permit_after_reset_the_old_holder_holds_nothing);
-    RUN_TEST(test_permit_stop_after_a_reset_is_told_as_not_latched);
-    RUN_TEST(test_permit_restarted_sends_zeros_before_listening);
-    RUN_TEST(test_permit_restarted_without_any_wheel_ends_as_well);
-    RUN_TEST(test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint);
-    RUN_TEST(test_permit_restarted_latches_on_estop);
-    RUN_TEST(test_permit_restarted_cannot_be_armed_before_the_hold_is_over);
-    RUN_TEST(test_permit_restarted_without_leave_to_send_stays_silent);
-    RUN_TEST(test_permit_restarted_without_a_track_sends_zeros_all_the_same);
-    RUN_TEST(test_permit_next_us_is_right_in_twenty_thousand_random_situations);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // after_stop = hold: zeros after a stop or a latch end by release, arm, another master or the end of the gateway, and by nothing else.
 #include "permit_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static permit_rig_t rig;
 
@@ -11,8 +11,6 @@ void setUp(void) {
     permit_rig_init(&rig);
     rig.config.hold = true;
 }
-
-void tearDown(void) {}
 
 static void assert_held_for_a_day(iw_state_t state) {
     permit_rig_wait(&rig, DAY_US);
@@ -41,7 +39,7 @@ static void release(void) {
     permit_rig_step(&rig);
 }
 
-static void test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels(void) {
+TEST(test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
     assert_held_for_a_day(IW_STATE_STOPPING);
@@ -49,12 +47,12 @@ static void test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_whe
     assert_held_for_a_day(IW_STATE_STOPPING);
 }
 
-static void test_permit_keep_latched_zeros_have_no_end(void) {
+TEST(test_permit_keep_latched_zeros_have_no_end) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     assert_held_for_a_day(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_begins_when_the_ramp_has_ended(void) {
+TEST(test_permit_keep_begins_when_the_ramp_has_ended) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
@@ -63,7 +61,7 @@ static void test_permit_keep_begins_when_the_ramp_has_ended(void) {
     TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
 }
 
-static void test_permit_keep_is_not_there_unless_configured(void) {
+TEST(test_permit_keep_is_not_there_unless_configured) {
     rig.config.hold = false;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
@@ -71,7 +69,7 @@ static void test_permit_keep_is_not_there_unless_configured(void) {
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }
 
-static void test_permit_keep_ends_by_release(void) {
+TEST(test_permit_keep_ends_by_release) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     assert_held_for_a_day(IW_STATE_STOPPING);
@@ -85,7 +83,7 @@ static void test_permit_keep_ends_by_release(void) {
 }
 
 /// As without a hold: first the wheels' own second is over, and they stand.
-static void test_permit_keep_released_early_ends_as_without_it(void) {
+TEST(test_permit_keep_released_early_ends_as_without_it) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     release();
@@ -103,7 +101,7 @@ static void test_permit_keep_released_early_ends_as_without_it(void) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-static void test_permit_keep_released_late_gives_a_wheel_that_turns_its_time(void) {
+TEST(test_permit_keep_released_late_gives_a_wheel_that_turns_its_time) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(120000));
     release();
@@ -118,7 +116,7 @@ static void test_permit_keep_released_late_gives_a_wheel_that_turns_its_time(voi
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-static void test_permit_keep_release_is_refused_while_somebody_drives_or_arms(void) {
+TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms) {
     static const permit_situation_t refused[] = {PERMIT_ARMING, PERMIT_ARMED, PERMIT_STOPPING};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         permit_rig_begin(&rig, refused[i]);
@@ -133,7 +131,7 @@ static void test_permit_keep_release_is_refused_while_somebody_drives_or_arms(vo
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
 }
 
-static void test_permit_keep_release_in_silence_changes_nothing(void) {
+TEST(test_permit_keep_release_in_silence_changes_nothing) {
     release();
     assert_silent(IW_STATE_LISTENING);
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
@@ -143,7 +141,7 @@ static void test_permit_keep_release_in_silence_changes_nothing(void) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_latch_out_of_silence_is_silent(void) {
+TEST(test_permit_keep_latch_out_of_silence_is_silent) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(2000));
@@ -153,7 +151,7 @@ static void test_permit_keep_latch_out_of_silence_is_silent(void) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_reset_ends_the_latch_and_not_the_hold(void) {
+TEST(test_permit_keep_reset_ends_the_latch_and_not_the_hold) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -167,7 +165,7 @@ static void test_permit_keep_reset_ends_the_latch_and_not_the_hold(void) {
 }
 
 /// Whoever released the zeros of a stop did not know of the button that is pressed since.
-static void test_permit_keep_latch_after_release_is_held_again(void) {
+TEST(test_permit_keep_latch_after_release_is_held_again) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     release();
@@ -181,7 +179,7 @@ static void test_permit_keep_latch_after_release_is_held_again(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-static void test_permit_keep_latch_after_release_is_not_held_unless_configured(void) {
+TEST(test_permit_keep_latch_after_release_is_not_held_unless_configured) {
     rig.config.hold = false;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     release();
@@ -191,7 +189,7 @@ static void test_permit_keep_latch_after_release_is_not_held_unless_configured(v
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }
 
-static void test_permit_keep_no_other_request_ends_it(void) {
+TEST(test_permit_keep_no_other_request_ends_it) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -203,7 +201,7 @@ static void test_permit_keep_no_other_request_ends_it(void) {
     assert_held_for_a_day(IW_STATE_STOPPING);
 }
 
-static void test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails(void) {
+TEST(test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -219,7 +217,7 @@ static void test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails(void) {
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }
 
-static void test_permit_keep_ends_with_the_gateway(void) {
+TEST(test_permit_keep_ends_with_the_gateway) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
     calm();
@@ -236,7 +234,7 @@ static void test_permit_keep_ends_with_the_gateway(void) {
 }
 
 /// Of a gateway that did not end after all.
-static void test_permit_keep_comes_back_with_arm_after_the_gateways_end(void) {
+TEST(test_permit_keep_comes_back_with_arm_after_the_gateways_end) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
@@ -248,7 +246,7 @@ static void test_permit_keep_comes_back_with_arm_after_the_gateways_end(void) {
     assert_held_for_a_day(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_gives_way_to_a_second_master(void) {
+TEST(test_permit_keep_gives_way_to_a_second_master) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -266,7 +264,7 @@ static void test_permit_keep_gives_way_to_a_second_master(void) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_lasts_through_every_other_fault(void) {
+TEST(test_permit_keep_lasts_through_every_other_fault) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,     IW_CAUSE_BUS_DOWN,   IW_CAUSE_SEND_STALLED,
                                         IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_OVERSPEED};
     for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {
@@ -291,7 +289,7 @@ static void hear_strangers(unsigned frames) {
     }
 }
 
-static void test_permit_keep_is_resumed_by_a_restart(void) {
+TEST(test_permit_keep_is_resumed_by_a_restart) {
     begin_restarted();
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
     hear_strangers(4); // What the dead process had left in its controller.
@@ -300,7 +298,7 @@ static void test_permit_keep_is_resumed_by_a_restart(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-static void test_permit_keep_resumed_gives_way_to_a_second_master(void) {
+TEST(test_permit_keep_resumed_gives_way_to_a_second_master) {
     begin_restarted();
     hear_strangers(5);
     assert_silent(IW_STATE_LISTENING);
@@ -312,7 +310,7 @@ static void test_permit_keep_resumed_gives_way_to_a_second_master(void) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-static void test_permit_keep_resumed_can_be_released_at_once(void) {
+TEST(test_permit_keep_resumed_can_be_released_at_once) {
     begin_restarted();
     release();
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -320,7 +318,7 @@ static void test_permit_keep_resumed_can_be_released_at_once(void) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-static void test_permit_keep_latched_by_one_wheel_offline_ramps_first(void) {
+TEST(test_permit_keep_latched_by_one_wheel_offline_ramps_first) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 50, IW_REACT_RAMP};
     iw_permit_raise(&rig.permit, &lost, rig.now_us);
@@ -328,32 +326,4 @@ static void test_permit_keep_latched_by_one_wheel_offline_ramps_first(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     rig.view.output_zero = true;
     assert_held_for_a_day(IW_STATE_LATCHED);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels);
-    RUN_TEST(test_permit_keep_latched_zeros_have_no_end);
-    RUN_TEST(test_permit_keep_begins_when_the_ramp_has_ended);
-    RUN_TEST(test_permit_keep_is_not_there_unless_configured);
-    RUN_TEST(test_permit_keep_ends_by_release);
-    RUN_TEST(test_permit_keep_released_early_ends_as_without_it);
-    RUN_TEST(test_permit_keep_released_late_gives_a_wheel_that_turns_its_time);
-    RUN_TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms);
-    RUN_TEST(test_permit_keep_release_in_silence_changes_nothing);
-    RUN_TEST(test_permit_keep_latch_out_of_silence_is_silent);
-    RUN_TEST(test_permit_keep_reset_ends_the_latch_and_not_the_hold);
-    RUN_TEST(test_permit_keep_latch_after_release_is_held_again);
-    RUN_TEST(test_permit_keep_latch_after_release_is_not_held_unless_configured);
-    RUN_TEST(test_permit_keep_no_other_request_ends_it);
-    RUN_TEST(test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails);
-    RUN_TEST(test_permit_keep_ends_with_the_gateway);
-    RUN_TEST(test_permit_keep_comes_back_with_arm_after_the_gateways_end);
-    RUN_TEST(test_permit_keep_gives_way_to_a_second_master);
-    RUN_TEST(test_permit_keep_lasts_through_every_other_fault);
-    RUN_TEST(test_permit_keep_is_resumed_by_a_restart);
-    RUN_TEST(test_permit_keep_resumed_gives_way_to_a_second_master);
-    RUN_TEST(test_permit_keep_resumed_can_be_released_at_once);
-    RUN_TEST(test_permit_keep_latched_by_one_wheel_offline_ramps_first);
-    return UNITY_END();
 }

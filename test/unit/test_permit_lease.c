@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The lease: what feeds it, when it ends, who takes it over.
 #include "permit_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 static permit_rig_t rig;
 
 void setUp(void) {
     permit_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 /// Armed just now, at rest, no drive yet.
 static void arm(void) {
@@ -30,7 +28,7 @@ static void assert_lost_after(iw_time_us_t for_us, iw_cause_t cause) {
     TEST_ASSERT_FALSE(rig.permit.stop.latched);
 }
 
-static void test_permit_lease_after_arm_lasts_a_second(void) {
+TEST(test_permit_lease_after_arm_lasts_a_second) {
     arm();
     assert_lost_after(MS(1000), IW_CAUSE_LEASE_LOST);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
@@ -43,7 +41,7 @@ static void test_permit_lease_after_arm_lasts_a_second(void) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-static void test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time(void) {
+TEST(test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time) {
     arm();
     permit_rig_wait(&rig, MS(4294967) + 295U);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.permit.stop.cause);
@@ -53,14 +51,14 @@ static void test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time(vo
     TEST_ASSERT_EQUAL_UINT32(4294967, rig.permit.stop.detail);
 }
 
-static void test_permit_lease_is_shortened_by_the_first_drive(void) {
+TEST(test_permit_lease_is_shortened_by_the_first_drive) {
     arm();
     permit_rig_wait(&rig, MS(10));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, true));
     assert_lost_after(MS(200), IW_CAUSE_LEASE_LOST);
 }
 
-static void test_permit_lease_follows_the_configuration(void) {
+TEST(test_permit_lease_follows_the_configuration) {
     static const uint16_t leases_ms[] = {20, 100, 500};
     for (size_t i = 0; i < 3; i++) {
         rig.config.lease_ms = leases_ms[i];
@@ -71,7 +69,7 @@ static void test_permit_lease_follows_the_configuration(void) {
     }
 }
 
-static void test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one(void) {
+TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one) {
     arm();
     for (uint32_t n = 0; n < 100; n++) {
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, (n & 1U) != 0U));
@@ -82,7 +80,7 @@ static void test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one(void
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_lease_is_fed_by_nothing_else(void) {
+TEST(test_permit_lease_is_fed_by_nothing_else) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     permit_rig_wait(&rig, MS(150));
@@ -97,7 +95,7 @@ static void test_permit_lease_is_fed_by_nothing_else(void) {
     assert_lost_after(MS(50), IW_CAUSE_LEASE_LOST);
 }
 
-static void test_permit_drive_at_or_after_the_end_does_not_revive_the_lease(void) {
+TEST(test_permit_drive_at_or_after_the_end_does_not_revive_the_lease) {
     static const uint32_t late_us[] = {0, 1, 1000, 1000000};
     for (size_t i = 0; i < 4; i++) {
         arm();
@@ -112,7 +110,7 @@ static void test_permit_drive_at_or_after_the_end_does_not_revive_the_lease(void
     }
 }
 
-static void test_permit_drive_just_before_the_end_keeps_the_lease(void) {
+TEST(test_permit_drive_just_before_the_end_keeps_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     rig.now_us += MS(200) - 1U;
@@ -121,7 +119,7 @@ static void test_permit_drive_just_before_the_end_keeps_the_lease(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_drive_is_refused_in_every_state_but_armed(void) {
+TEST(test_permit_drive_is_refused_in_every_state_but_armed) {
     static const struct {
         permit_situation_t situation;
         iw_refusal_t refusal;
@@ -137,7 +135,7 @@ static void test_permit_drive_is_refused_in_every_state_but_armed(void) {
     }
 }
 
-static void test_permit_drive_refusals_name_what_the_client_can_mend(void) {
+TEST(test_permit_drive_refusals_name_what_the_client_can_mend) {
     rig.config.listen_only = true;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LISTEN_ONLY, permit_rig_drive(&rig, HOLDER, true));
     setUp();
@@ -150,7 +148,7 @@ static void test_permit_drive_refusals_name_what_the_client_can_mend(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, true));
 }
 
-static void test_permit_refused_drive_changes_nothing_but_the_memory_of_it(void) {
+TEST(test_permit_refused_drive_changes_nothing_but_the_memory_of_it) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     iw_permit_t before = rig.permit;
     (void)permit_rig_drive(&rig, OTHER, false);
@@ -161,13 +159,13 @@ static void test_permit_refused_drive_changes_nothing_but_the_memory_of_it(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
 }
 
-static void test_permit_arm_of_another_client_is_busy(void) {
+TEST(test_permit_arm_of_another_client_is_busy) {
     arm();
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, permit_rig_arm(&rig, OTHER));
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-static void test_permit_takeover_at_rest_moves_the_lease(void) {
+TEST(test_permit_takeover_at_rest_moves_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, false);
     permit_rig_wait(&rig, MS(100));
@@ -179,7 +177,7 @@ static void test_permit_takeover_at_rest_moves_the_lease(void) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
 }
 
-static void test_permit_takeover_makes_only_later_commands_fresh(void) {
+TEST(test_permit_takeover_makes_only_later_commands_fresh) {
     arm();
     permit_rig_wait(&rig, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
@@ -187,14 +185,14 @@ static void test_permit_takeover_makes_only_later_commands_fresh(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_drive(&rig.permit, rig.now_us, OTHER, true));
 }
 
-static void test_permit_takeover_while_armed_does_not_wait_for_room_to_send(void) {
+TEST(test_permit_takeover_while_armed_does_not_wait_for_room_to_send) {
     arm();
     rig.view.can_send = false; // A pair of ours is on its way, as in every other step.
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
 }
 
-static void test_permit_takeover_in_motion_is_refused(void) {
+TEST(test_permit_takeover_in_motion_is_refused) {
     arm();
     rig.view.at_rest = false;
     permit_rig_step(&rig);
@@ -206,20 +204,20 @@ static void test_permit_takeover_in_motion_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-static void test_permit_takeover_from_a_holder_who_wants_to_move_is_stale(void) {
+TEST(test_permit_takeover_from_a_holder_who_wants_to_move_is_stale) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_takeover(&rig, OTHER));
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-static void test_permit_takeover_of_nothing_is_an_ordinary_arm(void) {
+TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
     TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion(void) {
+TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, false);
     rig.now_us += MS(200);
@@ -228,7 +226,7 @@ static void test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_mot
     TEST_ASSERT_TRUE(rig.permit.holder != HOLDER);
 }
 
-static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
+TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
@@ -241,14 +239,14 @@ static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-static void test_permit_drive_after_another_stop_is_blocked_for_nobody(void) {
+TEST(test_permit_drive_after_another_stop_is_blocked_for_nobody) {
     for (iw_client_t client = 1; client < 9U; client++) {
         permit_rig_begin(&rig, PERMIT_STOPPING);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, client, true));
     }
 }
 
-static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
+TEST(test_permit_disconnect_of_anybody_else_changes_nothing) {
     for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
         const iw_permit_t before = rig.permit;
@@ -257,7 +255,7 @@ static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
     }
 }
 
-static void test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after(void) {
+TEST(test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after) {
     static const iw_time_us_t after_us[] = {0, MS(1), MS(1000), MS(1600), MS(12000), MS(62000)};
     const iw_event_t estop = {IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, (uint32_t)OTHER, IW_REACT_BY_CAUSE};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
@@ -272,7 +270,7 @@ static void test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after(v
     }
 }
 
-static void test_permit_disconnect_of_the_former_holder_changes_nothing(void) {
+TEST(test_permit_disconnect_of_the_former_holder_changes_nothing) {
     static const permit_situation_t after[] = {PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
     for (size_t i = 0; i < 3; i++) {
         permit_rig_begin(&rig, after[i]);
@@ -286,7 +284,7 @@ static void test_permit_disconnect_of_the_former_holder_changes_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_stop_needs_no_lease_and_ramps(void) {
+TEST(test_permit_stop_needs_no_lease_and_ramps) {
     static const iw_cause_t causes[] = {IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN};
     for (size_t i = 0; i < 2; i++) {
         permit_rig_begin(&rig, PERMIT_ARMED);
@@ -303,7 +301,7 @@ static void test_permit_stop_needs_no_lease_and_ramps(void) {
     }
 }
 
-static void test_permit_stop_elsewhere_changes_nothing(void) {
+TEST(test_permit_stop_elsewhere_changes_nothing) {
     static const permit_situation_t situations[] = {PERMIT_LISTENING, PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
     for (size_t i = 0; i < 4; i++) {
         permit_rig_begin(&rig, situations[i]);
@@ -313,41 +311,9 @@ static void test_permit_stop_elsewhere_changes_nothing(void) {
     }
 }
 
-static void test_permit_moving_again_after_stop_needs_arm_and_pause(void) {
+TEST(test_permit_moving_again_after_stop_needs_arm_and_pause) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_arm(&rig, HOLDER));
     permit_rig_wait(&rig, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_lease_after_arm_lasts_a_second);
-    RUN_TEST(test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time);
-    RUN_TEST(test_permit_lease_is_shortened_by_the_first_drive);
-    RUN_TEST(test_permit_lease_follows_the_configuration);
-    RUN_TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one);
-    RUN_TEST(test_permit_lease_is_fed_by_nothing_else);
-    RUN_TEST(test_permit_drive_at_or_after_the_end_does_not_revive_the_lease);
-    RUN_TEST(test_permit_drive_just_before_the_end_keeps_the_lease);
-    RUN_TEST(test_permit_drive_is_refused_in_every_state_but_armed);
-    RUN_TEST(test_permit_drive_refusals_name_what_the_client_can_mend);
-    RUN_TEST(test_permit_refused_drive_changes_nothing_but_the_memory_of_it);
-    RUN_TEST(test_permit_arm_of_another_client_is_busy);
-    RUN_TEST(test_permit_takeover_at_rest_moves_the_lease);
-    RUN_TEST(test_permit_takeover_makes_only_later_commands_fresh);
-    RUN_TEST(test_permit_takeover_while_armed_does_not_wait_for_room_to_send);
-    RUN_TEST(test_permit_takeover_in_motion_is_refused);
-    RUN_TEST(test_permit_takeover_from_a_holder_who_wants_to_move_is_stale);
-    RUN_TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm);
-    RUN_TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion);
-    RUN_TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once);
-    RUN_TEST(test_permit_drive_after_another_stop_is_blocked_for_nobody);
-    RUN_TEST(test_permit_disconnect_of_anybody_else_changes_nothing);
-    RUN_TEST(test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after);
-    RUN_TEST(test_permit_disconnect_of_the_former_holder_changes_nothing);
-    RUN_TEST(test_permit_stop_needs_no_lease_and_ramps);
-    RUN_TEST(test_permit_stop_elsewhere_changes_nothing);
-    RUN_TEST(test_permit_moving_again_after_stop_needs_arm_and_pause);
-    return UNITY_END();
 }

@@ -2,15 +2,13 @@
 // What the pair and one wheel offline ask of the permission: a ramp or zero at once, the third time latches, the client is refused by name.
 #include "permit_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 static permit_rig_t rig;
 
 void setUp(void) {
     permit_rig_init(&rig);
 }
-
-void tearDown(void) {}
 
 static void raise(iw_cause_t cause, uint8_t sides, iw_react_t react) {
     const iw_event_t event = {cause, sides, 61, (uint8_t)react};
@@ -34,7 +32,7 @@ static void arm_again(void) {
     rig.view.output_zero = false;
 }
 
-static void test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latch(void) {
+TEST(test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latch) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
@@ -49,7 +47,7 @@ static void test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latc
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
-static void test_permit_diverging_pair_in_a_stop_changes_only_the_reaction(void) {
+TEST(test_permit_diverging_pair_in_a_stop_changes_only_the_reaction) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     const iw_stop_t before = rig.permit.stop;
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_RIGHT, IW_REACT_RAMP);
@@ -62,7 +60,7 @@ static void test_permit_diverging_pair_in_a_stop_changes_only_the_reaction(void)
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
 }
 
-static void test_permit_client_of_a_diverging_pair_is_refused_with_it_until_the_hold_ends(void) {
+TEST(test_permit_client_of_a_diverging_pair_is_refused_with_it_until_the_hold_ends) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_PAIR_DIVERGES, permit_rig_drive(&rig, HOLDER, false));
@@ -75,7 +73,7 @@ static void test_permit_client_of_a_diverging_pair_is_refused_with_it_until_the_
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, false));
 }
 
-static void test_permit_third_divergence_within_a_minute_latches(void) {
+TEST(test_permit_third_divergence_within_a_minute_latches) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
     arm_again();
@@ -94,7 +92,7 @@ static void test_permit_third_divergence_within_a_minute_latches(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
 }
 
-static void test_permit_third_divergence_after_a_minute_does_not_latch(void) {
+TEST(test_permit_third_divergence_after_a_minute_does_not_latch) {
     for (unsigned beyond = 0; beyond < 2U; beyond++) {
         permit_rig_begin(&rig, PERMIT_ARMED);
         const iw_time_us_t first_us = rig.now_us;
@@ -108,7 +106,7 @@ static void test_permit_third_divergence_after_a_minute_does_not_latch(void) {
     }
 }
 
-static void test_permit_stops_of_other_causes_are_no_divergence(void) {
+TEST(test_permit_stops_of_other_causes_are_no_divergence) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     for (unsigned i = 0; i < 4U; i++) {
         permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
@@ -117,7 +115,7 @@ static void test_permit_stops_of_other_causes_are_no_divergence(void) {
     }
 }
 
-static void test_permit_one_wheel_offline_latches_with_the_ramp(void) {
+TEST(test_permit_one_wheel_offline_latches_with_the_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
@@ -129,7 +127,7 @@ static void test_permit_one_wheel_offline_latches_with_the_ramp(void) {
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
-static void test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline(void) {
+TEST(test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,    IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,
                                         IW_CAUSE_SECOND_MASTER, IW_CAUSE_SEND_STALLED,   IW_CAUSE_WHEEL_REBOOTED,
                                         IW_CAUSE_FEEDBACK_SIGN, IW_CAUSE_OVERSPEED,      IW_CAUSE_LOOP_HUNG,
@@ -150,7 +148,7 @@ static void test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline(v
 }
 
 /// What an earlier stop did must not turn this ramp into zero at once.
-static void test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp(void) {
+TEST(test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
@@ -161,7 +159,7 @@ static void test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp(voi
 }
 
 /// The clock of a board begins at zero: that is no divergence.
-static void test_permit_first_divergences_after_power_on_do_not_latch(void) {
+TEST(test_permit_first_divergences_after_power_on_do_not_latch) {
     iw_permit_init(&rig.permit, &rig.config, 0, false);
     for (unsigned i = 0; i < 2U; i++) {
         rig.permit.phase = IW_PHASE_ARMED;
@@ -171,12 +169,12 @@ static void test_permit_first_divergences_after_power_on_do_not_latch(void) {
     }
 }
 
-static void test_permit_zeros_for_a_process_that_died_are_told_as_at_once(void) {
+TEST(test_permit_zeros_for_a_process_that_died_are_told_as_at_once) {
     permit_rig_init_restarted(&rig);
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
-static void test_permit_hold_after_the_latched_ramp_begins_at_its_end(void) {
+TEST(test_permit_hold_after_the_latched_ramp_begins_at_its_end) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     rig.view.settled = true;
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
@@ -193,7 +191,7 @@ static void test_permit_hold_after_the_latched_ramp_begins_at_its_end(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
 }
 
-static void test_permit_hold_of_a_latch_without_ramp_begins_at_once(void) {
+TEST(test_permit_hold_of_a_latch_without_ramp_begins_at_once) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     rig.view.settled = true;
     rig.view.output_zero = false; // Nothing could be sent yet: the bus is down.
@@ -202,7 +200,7 @@ static void test_permit_hold_of_a_latch_without_ramp_begins_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, demand());
 }
 
-static void test_permit_reset_waits_for_the_end_of_the_latched_ramp(void) {
+TEST(test_permit_reset_waits_for_the_end_of_the_latched_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
     rig.view.output_zero = false;
@@ -213,23 +211,4 @@ static void test_permit_reset_waits_for_the_end_of_the_latched_ramp(void) {
     rig.view.output_zero = true;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latch);
-    RUN_TEST(test_permit_diverging_pair_in_a_stop_changes_only_the_reaction);
-    RUN_TEST(test_permit_client_of_a_diverging_pair_is_refused_with_it_until_the_hold_ends);
-    RUN_TEST(test_permit_third_divergence_within_a_minute_latches);
-    RUN_TEST(test_permit_third_divergence_after_a_minute_does_not_latch);
-    RUN_TEST(test_permit_stops_of_other_causes_are_no_divergence);
-    RUN_TEST(test_permit_one_wheel_offline_latches_with_the_ramp);
-    RUN_TEST(test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline);
-    RUN_TEST(test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp);
-    RUN_TEST(test_permit_first_divergences_after_power_on_do_not_latch);
-    RUN_TEST(test_permit_zeros_for_a_process_that_died_are_told_as_at_once);
-    RUN_TEST(test_permit_hold_after_the_latched_ramp_begins_at_its_end);
-    RUN_TEST(test_permit_hold_of_a_latch_without_ramp_begins_at_once);
-    RUN_TEST(test_permit_reset_waits_for_the_end_of_the_latched_ramp);
-    return UNITY_END();
 }

@@ -3,13 +3,10 @@
 
 #include "iwheel_northbound/text.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
-
-void setUp(void) {}
-void tearDown(void) {}
 
 /// The first and last of each range that moves a terminal, between their neighbours that do not.
 static const struct {
@@ -49,7 +46,7 @@ static size_t encode(uint32_t code_point, char out[5]) {
     return length;
 }
 
-static void test_plain_each_code_point_at_the_edges_is_judged_and_read(void) {
+TEST(test_plain_each_code_point_at_the_edges_is_judged_and_read) {
     for (size_t i = 0; i < ROWS; i++) {
         char text[5];
         size_t bytes = 0;
@@ -61,7 +58,7 @@ static void test_plain_each_code_point_at_the_edges_is_judged_and_read(void) {
     }
 }
 
-static void test_plain_copy_replaces_each_character_once(void) {
+TEST(test_plain_copy_replaces_each_character_once) {
     for (size_t i = 1; i < ROWS; i++) {
         char character[5];
         char text[16];
@@ -93,7 +90,7 @@ static const char *const broken[] = {
     "\xFE",
 };
 
-static void test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time(void) {
+TEST(test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time) {
     for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
         size_t bytes = 0;
         char copy[16];
@@ -106,7 +103,7 @@ static void test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time(vo
     }
 }
 
-static void test_plain_copy_never_cuts_a_character(void) {
+TEST(test_plain_copy_never_cuts_a_character) {
     char copy[8];
     iwn_plain_copy("12345\xE2\x82\xAC", copy, 8);
     TEST_ASSERT_EQUAL_STRING("12345", copy);
@@ -128,7 +125,7 @@ static void assert_json(const char *line, const char *wanted, size_t piece_size)
     TEST_ASSERT_EQUAL_STRING(wanted, whole);
 }
 
-static void test_plain_json_shows_by_number_what_moves_a_terminal_in_pieces_of_any_size(void) {
+TEST(test_plain_json_shows_by_number_what_moves_a_terminal_in_pieces_of_any_size) {
     for (size_t size = 12; size <= 64; size++) {
         assert_json("{\"a\":\"b\xC2\x9B"
                     "2J\x7F\xE2\x80\xAE\xE2\x82\xAC\"}",
@@ -136,14 +133,4 @@ static void test_plain_json_shows_by_number_what_moves_a_terminal_in_pieces_of_a
         assert_json("{\r\"a\"\t:1}", "{ \"a\" :1}", size);
         assert_json("\xE2\x80\xA8\xE2\x80\xA9\xD8\x9C\xE2\x81\xA6\x9B", "\\u2028\\u2029\\u061C\\u2066\\uFFFD", size);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_plain_each_code_point_at_the_edges_is_judged_and_read);
-    RUN_TEST(test_plain_copy_replaces_each_character_once);
-    RUN_TEST(test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time);
-    RUN_TEST(test_plain_copy_never_cuts_a_character);
-    RUN_TEST(test_plain_json_shows_by_number_what_moves_a_terminal_in_pieces_of_any_size);
-    return UNITY_END();
 }

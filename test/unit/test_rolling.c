@@ -2,7 +2,7 @@
 // Wheels that turn although nothing is sent to them: when that begins, when it ends, and when it is a fault.
 #include "fixture.h"
 #include "iwheel/private/rolling.h"
-#include "unity.h"
+#include "unit.h"
 
 static iw_rolling_t rolling;
 static iw_time_us_t now_us;
@@ -13,8 +13,6 @@ void setUp(void) {
     now_us = FIXTURE_START_US;
 }
 
-void tearDown(void) {}
-
 static void run(bool turns, uint32_t for_ms) {
     for (uint32_t ms = 0; ms < for_ms; ms++) {
         now_us += 1000U;
@@ -22,7 +20,7 @@ static void run(bool turns, uint32_t for_ms) {
     }
 }
 
-static void test_rolling_begins_after_300_ms_and_ends_after_300_ms(void) {
+TEST(test_rolling_begins_after_300_ms_and_ends_after_300_ms) {
     run(false, 1000);
     run(true, 300);
     TEST_ASSERT_FALSE(rolling.rolling);
@@ -36,7 +34,7 @@ static void test_rolling_begins_after_300_ms_and_ends_after_300_ms(void) {
     TEST_ASSERT_FALSE(rolling.is_fault);
 }
 
-static void test_rolling_pushes_shorter_than_300_ms_do_not_add_up(void) {
+TEST(test_rolling_pushes_shorter_than_300_ms_do_not_add_up) {
     for (uint32_t i = 0; i < 20U; i++) {
         run(true, 290);
         run(false, 1);
@@ -51,7 +49,7 @@ static void test_rolling_pushes_shorter_than_300_ms_do_not_add_up(void) {
 }
 
 /// Nor is it where the clock has just begun, as a board's does.
-static void test_rolling_without_setpoints_before_is_no_fault(void) {
+TEST(test_rolling_without_setpoints_before_is_no_fault) {
     static const iw_time_us_t begin_us[] = {0, FIXTURE_START_US};
     for (size_t i = 0; i < 2U; i++) {
         setUp();
@@ -63,7 +61,7 @@ static void test_rolling_without_setpoints_before_is_no_fault(void) {
     }
 }
 
-static void test_rolling_that_begins_within_10_s_of_a_setpoint_is_a_fault(void) {
+TEST(test_rolling_that_begins_within_10_s_of_a_setpoint_is_a_fault) {
     static const struct {
         uint32_t after_ms;
         bool fault;
@@ -78,13 +76,4 @@ static void test_rolling_that_begins_within_10_s_of_a_setpoint_is_a_fault(void) 
         run(false, 301);
         TEST_ASSERT_FALSE(rolling.is_fault);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rolling_begins_after_300_ms_and_ends_after_300_ms);
-    RUN_TEST(test_rolling_pushes_shorter_than_300_ms_do_not_add_up);
-    RUN_TEST(test_rolling_without_setpoints_before_is_no_fault);
-    RUN_TEST(test_rolling_that_begins_within_10_s_of_a_setpoint_is_a_fault);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // How old a command or request from ROS is: writers of this machine by its clock, others by what their samples teach.
 #include "ages.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -36,8 +36,6 @@ void setUp(void) {
     begin(true, false);
 }
 
-void tearDown(void) {}
-
 /// A command of this writer, sent so long ago by its clock.
 static ros_age_t command_of(uint64_t source, int64_t ago_us) {
     return ros_ages_command(&ages, source, wall_us - ago_us, now(), &age_us);
@@ -59,12 +57,12 @@ static ros_age_t other_sends(int64_t for_us) {
 
 // ---- this machine -----------------------------------------------------------------------------------------------------
 
-static void test_ages_first_sample_of_a_minute_ago_is_late(void) {
+TEST(test_ages_first_sample_of_a_minute_ago_is_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(7, 60 * SECOND));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_request(&ages, wall_us - 60 * SECOND, now(), &age_us));
 }
 
-static void test_ages_first_sample_is_judged_to_the_microsecond(void) {
+TEST(test_ages_first_sample_is_judged_to_the_microsecond) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(1, ROS_OLD_US));
     TEST_ASSERT_EQUAL_INT64(ROS_OLD_US, age_us);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(2, ROS_OLD_US + 1));
@@ -76,26 +74,26 @@ static void test_ages_first_sample_is_judged_to_the_microsecond(void) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_AHEAD, ros_ages_request(&ages, wall_us + ROS_AHEAD_US + 1, now(), &age_us));
 }
 
-static void test_ages_sample_without_a_time_is_late(void) {
+TEST(test_ages_sample_without_a_time_is_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_command(&ages, 7, 0, now(), &age_us));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_request(&ages, 0, now(), &age_us));
 }
 
-static void test_ages_overtaken_sample_is_refused(void) {
+TEST(test_ages_overtaken_sample_is_refused) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 1000));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_OVERTAKEN, command_of(7, 1001));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 1000));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(8, 2000));
 }
 
-static void test_ages_stream_that_is_held_back_evenly_is_late(void) {
+TEST(test_ages_stream_that_is_held_back_evenly_is_late) {
     for (unsigned i = 0; i < 100U; i++) {
         pass(EVERY);
         TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(7, ROS_OLD_US + EVERY));
     }
 }
 
-static void test_ages_clock_set_back_makes_nothing_old_young(void) {
+TEST(test_ages_clock_set_back_makes_nothing_old_young) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 1000));
     const int64_t held_us = wall_us;
     pass(60 * SECOND);
@@ -109,7 +107,7 @@ static void test_ages_clock_set_back_makes_nothing_old_young(void) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(8, 0));
 }
 
-static void test_ages_clock_set_back_twice_is_doubted_until_the_later_end(void) {
+TEST(test_ages_clock_set_back_twice_is_doubted_until_the_later_end) {
     wall_us -= 60 * SECOND;
     (void)command_of(7, 0);
     wall_us -= SECOND;
@@ -119,7 +117,7 @@ static void test_ages_clock_set_back_twice_is_doubted_until_the_later_end(void) 
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, ros_ages_request(&ages, wall_us, now(), &age_us));
 }
 
-static void test_ages_after_a_clock_set_back_a_stream_is_known_again(void) {
+TEST(test_ages_after_a_clock_set_back_a_stream_is_known_again) {
     wall_us -= 60 * SECOND;
     ros_age_t age = ROS_AGE_FRESH;
     for (int64_t t = 0; t <= ROS_LEARN_US; t += EVERY) {
@@ -128,7 +126,7 @@ static void test_ages_after_a_clock_set_back_a_stream_is_known_again(void) {
     }
 }
 
-static void test_ages_clock_set_forward_only_refuses(void) {
+TEST(test_ages_clock_set_forward_only_refuses) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 0));
     const int64_t sent_us = wall_us;
     wall_us += 60 * SECOND;
@@ -136,7 +134,7 @@ static void test_ages_clock_set_forward_only_refuses(void) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 0));
 }
 
-static void test_ages_clock_that_is_slewed_is_not_doubted(void) {
+TEST(test_ages_clock_that_is_slewed_is_not_doubted) {
     for (unsigned i = 0; i < 2000U; i++) {
         pass(EVERY);
         wall_us -= EVERY / 2000; // 500 ppm.
@@ -146,7 +144,7 @@ static void test_ages_clock_that_is_slewed_is_not_doubted(void) {
 
 // ---- other machines ---------------------------------------------------------------------------------------------------
 
-static void test_ages_other_writer_is_known_after_a_second(void) {
+TEST(test_ages_other_writer_is_known_after_a_second) {
     begin(false, false);
     for (int64_t t = 0; t <= 3 * SECOND; t += EVERY) {
         TEST_ASSERT_EQUAL_INT((t < ROS_LEARN_US) ? ROS_AGE_UNKNOWN : ROS_AGE_FRESH, other(1000));
@@ -154,7 +152,7 @@ static void test_ages_other_writer_is_known_after_a_second(void) {
     }
 }
 
-static void test_ages_held_back_burst_teaches_nothing(void) {
+TEST(test_ages_held_back_burst_teaches_nothing) {
     for (unsigned count = 2; count <= 100U; count++) {
         begin(false, false);
         for (unsigned i = 0; i < count; i++) {
@@ -168,7 +166,7 @@ static void test_ages_held_back_burst_teaches_nothing(void) {
     }
 }
 
-static void test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is(void) {
+TEST(test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is) {
     for (unsigned count = 2; count <= 100U; count++) {
         begin(false, false);
         TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
@@ -181,7 +179,7 @@ static void test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is(void
     }
 }
 
-static void test_ages_known_writer_late_by_the_limit_passes_and_by_more_not(void) {
+TEST(test_ages_known_writer_late_by_the_limit_passes_and_by_more_not) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
     pass(300000);
@@ -193,7 +191,7 @@ static void test_ages_known_writer_late_by_the_limit_passes_and_by_more_not(void
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_command(&ages, 9, sent_us - 1, now(), &age_us));
 }
 
-static void test_ages_gap_by_either_clock_begins_anew(void) {
+TEST(test_ages_gap_by_either_clock_begins_anew) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
     pass(ROS_GAP_US);
@@ -207,7 +205,7 @@ static void test_ages_gap_by_either_clock_begins_anew(void) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(2 * SECOND)); // Its clock was set back.
 }
 
-static void test_ages_clock_that_runs_otherwise_is_never_known(void) {
+TEST(test_ages_clock_that_runs_otherwise_is_never_known) {
     static const int per_cent[] = {88, 112};
     for (unsigned i = 0; i < 2U; i++) {
         begin(false, false);
@@ -218,7 +216,7 @@ static void test_ages_clock_that_runs_otherwise_is_never_known(void) {
     }
 }
 
-static void test_ages_clocks_that_drift_apart_for_a_day_pass(void) {
+TEST(test_ages_clocks_that_drift_apart_for_a_day_pass) {
     begin(false, false);
     for (int64_t t = 0; t < 86400 * SECOND; t += SECOND) {
         const ros_age_t age = ros_ages_command(&ages, 9, t - t / 20000, now(), &age_us); // 50 ppm slow.
@@ -227,7 +225,7 @@ static void test_ages_clocks_that_drift_apart_for_a_day_pass(void) {
     }
 }
 
-static void test_ages_faster_way_later_becomes_the_measure(void) {
+TEST(test_ages_faster_way_later_becomes_the_measure) {
     begin(false, false);
     for (int64_t t = 0; t < 2 * SECOND; t += EVERY) {
         (void)other(90000);
@@ -238,7 +236,7 @@ static void test_ages_faster_way_later_becomes_the_measure(void) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, other(1000 + ROS_LATE_US + 100));
 }
 
-static void test_ages_request_of_another_machine_needs_synchronised_clocks(void) {
+TEST(test_ages_request_of_another_machine_needs_synchronised_clocks) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, ros_ages_request(&ages, wall_us, now(), &age_us));
     begin(false, true);
@@ -246,7 +244,7 @@ static void test_ages_request_of_another_machine_needs_synchronised_clocks(void)
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_request(&ages, wall_us - ROS_OLD_US - 1, now(), &age_us));
 }
 
-static void test_ages_command_with_synchronised_clocks_needs_both(void) {
+TEST(test_ages_command_with_synchronised_clocks_needs_both) {
     begin(false, true);
     for (int64_t t = 0; t <= ROS_LEARN_US; t += EVERY) {
         TEST_ASSERT_EQUAL_INT((t < ROS_LEARN_US) ? ROS_AGE_UNKNOWN : ROS_AGE_FRESH, command_of(9, 1000));
@@ -259,7 +257,7 @@ static void test_ages_command_with_synchronised_clocks_needs_both(void) {
     }
 }
 
-static void test_ages_more_writers_than_places_forget_the_longest_silent(void) {
+TEST(test_ages_more_writers_than_places_forget_the_longest_silent) {
     begin(false, false);
     for (uint64_t source = 1; source <= ROS_SOURCES; source++) {
         for (int64_t t = 0; t <= ROS_LEARN_US; t += ROS_LEARN_US) {
@@ -273,30 +271,4 @@ static void test_ages_more_writers_than_places_forget_the_longest_silent(void) {
     (void)command_of(ROS_SOURCES + 1U, 0); // In the place of 2.
     TEST_ASSERT_EQUAL_UINT64(1, ages.sources[0].source);
     TEST_ASSERT_EQUAL_UINT64(ROS_SOURCES + 1U, ages.sources[1].source);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_ages_first_sample_of_a_minute_ago_is_late);
-    RUN_TEST(test_ages_first_sample_is_judged_to_the_microsecond);
-    RUN_TEST(test_ages_sample_without_a_time_is_late);
-    RUN_TEST(test_ages_overtaken_sample_is_refused);
-    RUN_TEST(test_ages_stream_that_is_held_back_evenly_is_late);
-    RUN_TEST(test_ages_clock_set_back_makes_nothing_old_young);
-    RUN_TEST(test_ages_clock_set_back_twice_is_doubted_until_the_later_end);
-    RUN_TEST(test_ages_after_a_clock_set_back_a_stream_is_known_again);
-    RUN_TEST(test_ages_clock_set_forward_only_refuses);
-    RUN_TEST(test_ages_clock_that_is_slewed_is_not_doubted);
-    RUN_TEST(test_ages_other_writer_is_known_after_a_second);
-    RUN_TEST(test_ages_held_back_burst_teaches_nothing);
-    RUN_TEST(test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is);
-    RUN_TEST(test_ages_known_writer_late_by_the_limit_passes_and_by_more_not);
-    RUN_TEST(test_ages_gap_by_either_clock_begins_anew);
-    RUN_TEST(test_ages_clock_that_runs_otherwise_is_never_known);
-    RUN_TEST(test_ages_clocks_that_drift_apart_for_a_day_pass);
-    RUN_TEST(test_ages_faster_way_later_becomes_the_measure);
-    RUN_TEST(test_ages_request_of_another_machine_needs_synchronised_clocks);
-    RUN_TEST(test_ages_command_with_synchronised_clocks_needs_both);
-    RUN_TEST(test_ages_more_writers_than_places_forget_the_longest_silent);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // Which commands from ROS pass: numbers, and when the bridge may arm by itself.
 #include "commands.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <math.h>
 
@@ -14,8 +14,6 @@ void setUp(void) {
     ros_auto_init(&automatic, 0);
 }
 
-void tearDown(void) {}
-
 // ---- numbers ------------------------------------------------------------------------------------------------------
 
 static ros_twist_verdict_t read_twist(double v, double yaw, ros_twist_t *out) {
@@ -24,14 +22,14 @@ static ros_twist_verdict_t read_twist(double v, double yaw, ros_twist_t *out) {
     return ros_twist_read(linear, angular, out);
 }
 
-static void test_twist_metres_and_radians_become_thousandths(void) {
+TEST(test_twist_metres_and_radians_become_thousandths) {
     ros_twist_t twist;
     TEST_ASSERT_EQUAL(ROS_TWIST_GOOD, read_twist(0.2496, -1.0004, &twist));
     TEST_ASSERT_EQUAL_INT32(250, twist.v_mm_s);
     TEST_ASSERT_EQUAL_INT32(-1000, twist.yaw_mrad_s);
 }
 
-static void test_twist_what_is_no_number_anywhere_is_refused_whole(void) {
+TEST(test_twist_what_is_no_number_anywhere_is_refused_whole) {
     const double bad[] = {NAN, INFINITY, -INFINITY};
     for (unsigned i = 0; i < 3U; i++) {
         for (unsigned place = 0; place < 6U; place++) {
@@ -45,7 +43,7 @@ static void test_twist_what_is_no_number_anywhere_is_refused_whole(void) {
     }
 }
 
-static void test_twist_beyond_every_range_is_refused(void) {
+TEST(test_twist_beyond_every_range_is_refused) {
     ros_twist_t twist;
     TEST_ASSERT_EQUAL(ROS_TWIST_TOO_LARGE, read_twist(1e30, 0, &twist));
     TEST_ASSERT_EQUAL(ROS_TWIST_TOO_LARGE, read_twist(0, -1e30, &twist));
@@ -55,26 +53,26 @@ static void test_twist_beyond_every_range_is_refused(void) {
 
 // ---- arming by itself ---------------------------------------------------------------------------------------------
 
-static void test_auto_arm_command_after_silence_asks_once(void) {
+TEST(test_auto_arm_command_after_silence_asks_once) {
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US - 1));
     setUp();
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, ROS_QUIET_US));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US + 20000));
 }
 
-static void test_auto_arm_zeros_for_long_enough_ask(void) {
+TEST(test_auto_arm_zeros_for_long_enough_ask) {
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, 100000));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US - 1));
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US));
 }
 
-static void test_auto_arm_stream_that_never_rests_never_asks(void) {
+TEST(test_auto_arm_stream_that_never_rests_never_asks) {
     for (int64_t t = 0; t < 60LL * SECOND; t += 100000) {
         TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, t));
     }
 }
 
-static void test_auto_arm_foreign_stop_waits_for_the_service(void) {
+TEST(test_auto_arm_foreign_stop_waits_for_the_service) {
     ros_auto_stopped(&automatic, false);
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND));
@@ -91,7 +89,7 @@ static unsigned stream(int64_t from_us, int64_t until_us) {
     return asks;
 }
 
-static void test_auto_arm_stream_after_a_persons_stop_does_not_ask(void) {
+TEST(test_auto_arm_stream_after_a_persons_stop_does_not_ask) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_EQUAL_UINT(0, stream(5LL * SECOND, 65LL * SECOND)); // Also after silence: the stop came last.
     TEST_ASSERT_EQUAL_UINT(0, stream(65LL * SECOND + ROS_SILENT_US - 50000 - 1, 70LL * SECOND));
@@ -99,14 +97,14 @@ static void test_auto_arm_stream_after_a_persons_stop_does_not_ask(void) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, 70LL * SECOND + ROS_SILENT_US));
 }
 
-static void test_auto_arm_persons_stop_ends_by_the_service(void) {
+TEST(test_auto_arm_persons_stop_ends_by_the_service) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     ros_auto_told(&automatic);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 2LL * SECOND + 50000));
 }
 
-static void test_auto_arm_persons_stop_again_begins_anew(void) {
+TEST(test_auto_arm_persons_stop_again_begins_anew) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     ros_auto_person_stopped(&automatic);
@@ -114,7 +112,7 @@ static void test_auto_arm_persons_stop_again_begins_anew(void) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 6LL * SECOND));
 }
 
-static void test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service(void) {
+TEST(test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service) {
     ros_auto_stopped(&automatic, false);
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
@@ -126,31 +124,13 @@ static void test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service(voi
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
 }
 
-static void test_auto_arm_silence_of_its_own_source_keeps_the_trust(void) {
+TEST(test_auto_arm_silence_of_its_own_source_keeps_the_trust) {
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
 }
 
-static void test_auto_arm_refused_by_the_gateway_asks_again_only_later(void) {
+TEST(test_auto_arm_refused_by_the_gateway_asks_again_only_later) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US - 1));
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_twist_metres_and_radians_become_thousandths);
-    RUN_TEST(test_twist_what_is_no_number_anywhere_is_refused_whole);
-    RUN_TEST(test_twist_beyond_every_range_is_refused);
-    RUN_TEST(test_auto_arm_command_after_silence_asks_once);
-    RUN_TEST(test_auto_arm_zeros_for_long_enough_ask);
-    RUN_TEST(test_auto_arm_stream_that_never_rests_never_asks);
-    RUN_TEST(test_auto_arm_foreign_stop_waits_for_the_service);
-    RUN_TEST(test_auto_arm_stream_after_a_persons_stop_does_not_ask);
-    RUN_TEST(test_auto_arm_persons_stop_ends_by_the_service);
-    RUN_TEST(test_auto_arm_persons_stop_again_begins_anew);
-    RUN_TEST(test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service);
-    RUN_TEST(test_auto_arm_silence_of_its_own_source_keeps_the_trust);
-    RUN_TEST(test_auto_arm_refused_by_the_gateway_asks_again_only_later);
-    return UNITY_END();
 }

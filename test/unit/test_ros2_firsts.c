@@ -2,7 +2,7 @@
 // What new writers of Fast DDS wrote first: heartbeats on their way in, ACKNACKs on their way out.
 #include "firsts.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -20,8 +20,6 @@ void setUp(void) {
     memset(out, 0xA5, sizeof out);
     length = 0;
 }
-
-void tearDown(void) {}
 
 static void put(const uint8_t *bytes, size_t count) {
     memcpy(message + length, bytes, count);
@@ -83,7 +81,7 @@ static size_t await_at(int64_t now_us) {
 
 // ---- heartbeats -----------------------------------------------------------------------------------------------------
 
-static void test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer(void) {
+TEST(test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         begin_message(1);
@@ -105,7 +103,7 @@ static void test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer(
     }
 }
 
-static void test_firsts_writer_is_new_for_five_seconds(void) {
+TEST(test_firsts_writer_is_new_for_five_seconds) {
     begin_message(1);
     put_heartbeat(true, 2, 1, 1);
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000));
@@ -117,7 +115,7 @@ static void test_firsts_writer_is_new_for_five_seconds(void) {
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000 + 2LL * FIRSTS_NEW_US));
 }
 
-static void test_firsts_of_many_writers_the_oldest_is_forgotten(void) {
+TEST(test_firsts_of_many_writers_the_oldest_is_forgotten) {
     for (uint8_t i = 0; i < FIRSTS_WRITERS; i++) {
         begin_message(i);
         put_heartbeat(true, 3, 1, 1);
@@ -141,7 +139,7 @@ static void test_firsts_of_many_writers_the_oldest_is_forgotten(void) {
     TEST_ASSERT_GREATER_THAN_size_t(0, await_at(FIRSTS_NEW_US));
 }
 
-static void test_firsts_all_else_is_left_alone(void) {
+TEST(test_firsts_all_else_is_left_alone) {
     static const struct {
         const char *what;
         int64_t first, last;
@@ -171,7 +169,7 @@ static void test_firsts_all_else_is_left_alone(void) {
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(0));
 }
 
-static void test_firsts_damaged_message_or_small_room_is_left_alone(void) {
+TEST(test_firsts_damaged_message_or_small_room_is_left_alone) {
     begin_message(1);
     put_heartbeat(true, 3, 1, 2);
     put_part(0x01, 1, 4);
@@ -189,7 +187,7 @@ static void test_firsts_damaged_message_or_small_room_is_left_alone(void) {
     TEST_ASSERT_EQUAL_size_t(0, await_at(0));
 }
 
-static void test_firsts_several_heartbeats_of_a_message_each_have_their_own(void) {
+TEST(test_firsts_several_heartbeats_of_a_message_each_have_their_own) {
     begin_message(1);
     put_heartbeat(true, 3, 1, 1);
     put_heartbeat(true, 0xC3, 1, 1);
@@ -233,7 +231,7 @@ static uint32_t count_before(size_t end) {
     return rtps_read(message + end - 4U, 4, true);
 }
 
-static void test_firsts_first_acknack_is_that_of_fast_dds(void) {
+TEST(test_firsts_first_acknack_is_that_of_fast_dds) {
     for (unsigned little = 0; little < 2U; little++) {
         begin_message(1);
         put_destination(15, 12);
@@ -247,7 +245,7 @@ static void test_firsts_first_acknack_is_that_of_fast_dds(void) {
     }
 }
 
-static void test_firsts_later_acknacks_count_one_more(void) {
+TEST(test_firsts_later_acknacks_count_one_more) {
     static const uint32_t bits[] = {0, 1, 32, 33, 256};
     for (size_t i = 0; i < sizeof bits / sizeof bits[0]; i++) {
         begin_message(1);
@@ -267,7 +265,7 @@ static void test_firsts_later_acknacks_count_one_more(void) {
     TEST_ASSERT_EQUAL_INT64_MESSAGE(1, base_at(at), "it asks for a sample");
 }
 
-static void test_firsts_only_what_is_for_fast_dds_changes(void) {
+TEST(test_firsts_only_what_is_for_fast_dds_changes) {
     begin_message(1);
     const size_t none = put_acknack(true, 1, 0, 0);
     put_destination(16, 12);
@@ -288,7 +286,7 @@ static void test_firsts_only_what_is_for_fast_dds_changes(void) {
     TEST_ASSERT_EQUAL_INT64(1, base_at(last));
 }
 
-static void test_firsts_damaged_acknack_is_left_alone(void) {
+TEST(test_firsts_damaged_acknack_is_left_alone) {
     begin_message(1);
     put_destination(15, 12);
     const size_t at = put_acknack(true, 1, 256, 5);
@@ -318,19 +316,4 @@ static void test_firsts_damaged_acknack_is_left_alone(void) {
     message[at] = 6;
     TEST_ASSERT_EQUAL_MEMORY(out, message, length);
     TEST_ASSERT_TRUE(rtps_ask_firsts(message, length));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer);
-    RUN_TEST(test_firsts_writer_is_new_for_five_seconds);
-    RUN_TEST(test_firsts_of_many_writers_the_oldest_is_forgotten);
-    RUN_TEST(test_firsts_all_else_is_left_alone);
-    RUN_TEST(test_firsts_damaged_message_or_small_room_is_left_alone);
-    RUN_TEST(test_firsts_several_heartbeats_of_a_message_each_have_their_own);
-    RUN_TEST(test_firsts_first_acknack_is_that_of_fast_dds);
-    RUN_TEST(test_firsts_later_acknacks_count_one_more);
-    RUN_TEST(test_firsts_only_what_is_for_fast_dds_changes);
-    RUN_TEST(test_firsts_damaged_acknack_is_left_alone);
-    return UNITY_END();
 }

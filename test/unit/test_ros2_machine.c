@@ -3,7 +3,7 @@
 #include "diagnosis.h"
 #include "odometry.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -31,8 +31,6 @@ void setUp(void) {
     (void)snprintf(facts.machine.timing, sizeof facts.machine.timing, "confirmed");
 }
 
-void tearDown(void) {}
-
 static void go(int64_t t_us, int64_t left_mm, int64_t right_mm) {
     const ros_ways_t ways = {t_us, left_mm, right_mm};
     ros_odometry_step(&odometry, &ways, &(ros_measures_t){.tick_m = 0.0201, .track_m = TRACK / 1000.0});
@@ -47,7 +45,7 @@ static void expect_near(double within, double expected, double actual) {
 
 // ---- odometry -----------------------------------------------------------------------------------------------------
 
-static void test_odometry_first_ways_are_the_origin(void) {
+TEST(test_odometry_first_ways_are_the_origin) {
     go(0, 123456, -98765);
     TEST_ASSERT_TRUE(odometry.begun);
     expect_near(1e-12, 0.0, odometry.x_m);
@@ -55,7 +53,7 @@ static void test_odometry_first_ways_are_the_origin(void) {
     TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
 }
 
-static void test_odometry_straight_way_is_x(void) {
+TEST(test_odometry_straight_way_is_x) {
     for (int i = 0; i <= 100; i++) {
         go(i * SECOND / 50, 10 * i, 10 * i);
     }
@@ -64,7 +62,7 @@ static void test_odometry_straight_way_is_x(void) {
     expect_near(1e-9, 1.0, odometry.path_m);
 }
 
-static void test_odometry_turn_to_the_left_is_positive_and_does_not_drift(void) {
+TEST(test_odometry_turn_to_the_left_is_positive_and_does_not_drift) {
     for (int i = 0; i <= 1000; i++) {
         go(i * SECOND / 50, -17 * i / 10, 17 * i / 10);
     }
@@ -72,7 +70,7 @@ static void test_odometry_turn_to_the_left_is_positive_and_does_not_drift(void) 
     expect_near(0.01, 0.0, odometry.x_m);
 }
 
-static void test_odometry_quarter_circle_ends_where_it_must(void) {
+TEST(test_odometry_quarter_circle_ends_where_it_must) {
     const double radius_mm = 1000.0;
     for (int i = 0; i <= 1000; i++) {
         const double angle = M_PI / 2.0 * i / 1000.0;
@@ -83,14 +81,14 @@ static void test_odometry_quarter_circle_ends_where_it_must(void) {
     expect_near(0.003, M_PI / 2.0, odometry.yaw_rad);
 }
 
-static void test_odometry_messages_lost_on_a_straight_way_lose_no_way(void) {
+TEST(test_odometry_messages_lost_on_a_straight_way_lose_no_way) {
     go(0, 0, 0);
     go(2 * SECOND, 1900, 1900);
     expect_near(1e-9, 1.9, odometry.x_m);
     TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
 }
 
-static void test_odometry_ways_that_jump_start_anew(void) {
+TEST(test_odometry_ways_that_jump_start_anew) {
     go(0, 0, 0);
     go(SECOND, 900, 900);
     go(SECOND + 20000, 0, 900);
@@ -101,7 +99,7 @@ static void test_odometry_ways_that_jump_start_anew(void) {
     TEST_ASSERT_EQUAL_UINT(1, odometry.restarts);
 }
 
-static void test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed(void) {
+TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed) {
     const ros_measures_t assumed = {false, false, 0.02, 0.54};
     const ros_measures_t confirmed = {true, true, 0.02, 0.54};
     go(0, 0, 0);
@@ -118,7 +116,7 @@ static void test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed(
 }
 
 /// Whole ticks, those of the wheels half a tick apart, 4.7 m at 0.5 m/s.
-static void test_doubt_on_a_straight_way_ignores_tick_jitter(void) {
+TEST(test_doubt_on_a_straight_way_ignores_tick_jitter) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     for (int i = 0; i <= 470; i++) {
         const double way_mm = 10.0 * i;
@@ -130,7 +128,7 @@ static void test_doubt_on_a_straight_way_ignores_tick_jitter(void) {
 }
 
 /// The largest growth on each metre of a straight way of 50 m is 5 % of it; on the spot a turn makes the heading uncertain, not the place.
-static void test_doubt_grows_by_5_percent_of_a_straight_way(void) {
+TEST(test_doubt_grows_by_5_percent_of_a_straight_way) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     double place_m = 0.0;
     double yaw_rad = 0.0;
@@ -148,7 +146,7 @@ static void test_doubt_grows_by_5_percent_of_a_straight_way(void) {
     }
 }
 
-static void test_doubt_of_the_heading_grows_with_turning_up_to_half_a_turn(void) {
+TEST(test_doubt_of_the_heading_grows_with_turning_up_to_half_a_turn) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     double before_rad = 0.0;
     for (int i = 0; i <= 4000; i++) {
@@ -176,7 +174,7 @@ static iwc_message_t snapshot(void) {
     return (iwc_message_t){.text = SNAPSHOT, .length = sizeof SNAPSHOT - 1U, .is_event = true};
 }
 
-static void test_snapshot_is_read_and_unknown_stays_unknown(void) {
+TEST(test_snapshot_is_read_and_unknown_stays_unknown) {
     iwc_t *gateway = iwc_new();
     const iwc_message_t message = snapshot();
     TEST_ASSERT_TRUE(ros_facts_read(gateway, &message, &facts.machine));
@@ -191,7 +189,7 @@ static void test_snapshot_is_read_and_unknown_stays_unknown(void) {
     iwc_free(gateway);
 }
 
-static void test_ledger_gives_measures_and_what_is_contradicted(void) {
+TEST(test_ledger_gives_measures_and_what_is_contradicted) {
     const iwc_message_t message = snapshot();
     ros_facts_read_assumptions(&message, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
@@ -205,7 +203,7 @@ static void test_ledger_gives_measures_and_what_is_contradicted(void) {
 }
 
 /// An invented one would turn the machine on every map.
-static void test_track_that_is_not_configured_is_none(void) {
+TEST(test_track_that_is_not_configured_is_none) {
     static const char unset[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"value\":\"192\"},\"track\":{\"value\":null}}}";
     const iwc_message_t seen = {.text = unset, .length = sizeof unset - 1U, .is_event = true};
@@ -214,7 +212,7 @@ static void test_track_that_is_not_configured_is_none(void) {
     TEST_ASSERT_EQUAL_INT64(0, facts.machine.track_mm);
 }
 
-static void test_configuration_stands_for_the_values_that_a_board_has_not(void) {
+TEST(test_configuration_stands_for_the_values_that_a_board_has_not) {
     static const char board[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"state\":\"assumed\",\"value\":null},"
         "\"track\":{\"state\":\"confirmed\",\"value\":null},\"gear_ratio\":{\"value\":null}}}";
@@ -250,14 +248,14 @@ static void expect(ros_tells_t which, ros_level_t level, const char *part) {
     }
 }
 
-static void test_diagnosis_button_never_seen_to_work_is_a_warning(void) {
+TEST(test_diagnosis_button_never_seen_to_work_is_a_warning) {
     facts.machine.estop_tried = false;
     expect(ROS_TELLS_ESTOP, ROS_WARN, "never seen to work");
     facts.machine.estop_simulated = true;
     expect(ROS_TELLS_ESTOP, ROS_OK, "released");
 }
 
-static void test_diagnosis_all_in_order_is_ok(void) {
+TEST(test_diagnosis_all_in_order_is_ok) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&facts, (ros_tells_t)i, &status);
         TEST_ASSERT_EQUAL_MESSAGE(ROS_OK, status.level, status.message);
@@ -266,7 +264,7 @@ static void test_diagnosis_all_in_order_is_ok(void) {
     expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
 }
 
-static void test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale(void) {
+TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale) {
     facts.link = ROS_LINK_GONE;
     (void)snprintf(facts.trouble, sizeof facts.trouble, "nobody listens");
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "nobody listens");
@@ -276,7 +274,7 @@ static void test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale(void) {
     expect(ROS_TELLS_ESTOP, ROS_STALE, "does not answer");
 }
 
-static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
+TEST(test_diagnosis_each_stop_has_its_sentence_and_cure) {
     facts.machine.now.machine = IWC_LATCHED;
     (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "the left wheel was lost");
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
@@ -314,7 +312,7 @@ static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
     expect(ROS_REPORTS_ASSUMPTIONS, ROS_ERROR, "track: no");
 }
 
-static void test_diagnosis_commands_tell_what_keeps_them_from_driving(void) {
+TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving) {
     facts.commands.late = 3;
     expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late");
     (void)snprintf(facts.commands.refusal, sizeof facts.commands.refusal, "arm first");
@@ -336,7 +334,7 @@ static void test_diagnosis_commands_tell_what_keeps_them_from_driving(void) {
     expect(ROS_TELLS_COMMANDS, ROS_OK, "watching only");
 }
 
-static void test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix(void) {
+TEST(test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix) {
     ros_unmatched_t *unmatched = &facts.commands.unmatched;
     *unmatched =
         (ros_unmatched_t){.count = 1, .topic = "/w1/cmd_vel", .policy = "", .wanted = "geometry_msgs/msg/Twist"};
@@ -352,7 +350,7 @@ static void test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix(
     expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
 }
 
-static void test_type_name_of_a_stranger_stays_within_its_size_and_characters(void) {
+TEST(test_type_name_of_a_stranger_stays_within_its_size_and_characters) {
     char name[16];
     ros_facts_type_name("a::msg::dds_::B\x07\"_", name, sizeof name);
     TEST_ASSERT_EQUAL_STRING("a/msg/B??", name);
@@ -370,7 +368,7 @@ static void expect_estop(ros_link_t link, const char *state, ros_estop_t expecte
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected, ros_facts_estop(&facts), state);
 }
 
-static void test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line(void) {
+TEST(test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line) {
     expect_estop(ROS_LINK_UP, "released", ROS_ESTOP_RELEASED);
     expect_estop(ROS_LINK_UP, "pressed", ROS_ESTOP_PRESSED);
     expect_estop(ROS_LINK_UP, "unreadable", ROS_ESTOP_PRESSED);
@@ -382,7 +380,7 @@ static void test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line
     expect_estop(ROS_LINK_GONE, "none", ROS_ESTOP_NO_LINE);
 }
 
-static void test_diagnosis_values_that_are_not_known_are_empty(void) {
+TEST(test_diagnosis_values_that_are_not_known_are_empty) {
     ros_diagnose(&facts, ROS_TELLS_LEFT, &status);
     TEST_ASSERT_EQUAL_STRING("speed_mm_s", status.values[0].key);
     TEST_ASSERT_EQUAL_STRING("", status.values[0].text);
@@ -390,7 +388,7 @@ static void test_diagnosis_values_that_are_not_known_are_empty(void) {
 
 // ---- iwheel/state -------------------------------------------------------------------------------------------------
 
-static void test_state_texts_from_others_stay_within_their_quotes(void) {
+TEST(test_state_texts_from_others_stay_within_their_quotes) {
     char json[2048];
     facts.machine.now.holder.known = true;
     (void)snprintf(facts.machine.holder, sizeof facts.machine.holder, "a\"b\\\\u0007");
@@ -401,39 +399,9 @@ static void test_state_texts_from_others_stay_within_their_quotes(void) {
     TEST_ASSERT_NOT_NULL(strstr(json, "\"cause\":null"));
 }
 
-static void test_state_gateway_gone_tells_nothing_old(void) {
+TEST(test_state_gateway_gone_tells_nothing_old) {
     char json[2048];
     facts.link = ROS_LINK_GONE;
     ros_state_json(&facts, json, sizeof json);
     TEST_ASSERT_EQUAL_STRING("{\"gateway\":\"gone\"}", json);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_odometry_first_ways_are_the_origin);
-    RUN_TEST(test_odometry_straight_way_is_x);
-    RUN_TEST(test_odometry_turn_to_the_left_is_positive_and_does_not_drift);
-    RUN_TEST(test_odometry_quarter_circle_ends_where_it_must);
-    RUN_TEST(test_odometry_messages_lost_on_a_straight_way_lose_no_way);
-    RUN_TEST(test_odometry_ways_that_jump_start_anew);
-    RUN_TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed);
-    RUN_TEST(test_doubt_on_a_straight_way_ignores_tick_jitter);
-    RUN_TEST(test_doubt_grows_by_5_percent_of_a_straight_way);
-    RUN_TEST(test_doubt_of_the_heading_grows_with_turning_up_to_half_a_turn);
-    RUN_TEST(test_snapshot_is_read_and_unknown_stays_unknown);
-    RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
-    RUN_TEST(test_track_that_is_not_configured_is_none);
-    RUN_TEST(test_configuration_stands_for_the_values_that_a_board_has_not);
-    RUN_TEST(test_diagnosis_all_in_order_is_ok);
-    RUN_TEST(test_diagnosis_button_never_seen_to_work_is_a_warning);
-    RUN_TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale);
-    RUN_TEST(test_diagnosis_each_stop_has_its_sentence_and_cure);
-    RUN_TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving);
-    RUN_TEST(test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix);
-    RUN_TEST(test_type_name_of_a_stranger_stays_within_its_size_and_characters);
-    RUN_TEST(test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line);
-    RUN_TEST(test_diagnosis_values_that_are_not_known_are_empty);
-    RUN_TEST(test_state_texts_from_others_stay_within_their_quotes);
-    RUN_TEST(test_state_gateway_gone_tells_nothing_old);
-    return UNITY_END();
 }

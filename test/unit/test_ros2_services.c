@@ -2,7 +2,7 @@
 // Requests and replies of services as the vendors of ROS send them, and what is added to an RTPS message on its way out.
 #include "services.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -25,8 +25,6 @@ void setUp(void) {
     memcpy(marks.writers[1].id, WRITER, sizeof WRITER);
     length = 0;
 }
-
-void tearDown(void) {}
 
 static void put(const uint8_t *bytes, size_t count) {
     memcpy(message + length, bytes, count);
@@ -70,7 +68,7 @@ static void put_heartbeat(void) {
 
 // ---- requests -------------------------------------------------------------------------------------------------------
 
-static void test_service_request_of_fast_dds_has_one_byte(void) {
+TEST(test_service_request_of_fast_dds_has_one_byte) {
     const uint8_t payload[8] = {0, 1, 0, 0, 0};
     caller.number = 7;
     ros_service_read(payload, 5, &caller);
@@ -80,7 +78,7 @@ static void test_service_request_of_fast_dds_has_one_byte(void) {
     TEST_ASSERT_EQUAL_INT(ROS_FORM_IDENTITY, caller.form);
 }
 
-static void test_service_request_of_cyclonedds_has_a_header_of_either_order(void) {
+TEST(test_service_request_of_cyclonedds_has_a_header_of_either_order) {
     const uint8_t guid[8] = {1, 2, 3, 4, 5, 6, 7, 8};
     const uint8_t little[24] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0, 1};
     const uint8_t big[24] = {0, 0, 0, 0, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0, 0, 1, 0, 0, 0, 9};
@@ -94,7 +92,7 @@ static void test_service_request_of_cyclonedds_has_a_header_of_either_order(void
     TEST_ASSERT_EQUAL_INT64(0x100000009LL, caller.number);
 }
 
-static void test_service_request_of_another_type_is_unreadable(void) {
+TEST(test_service_request_of_another_type_is_unreadable) {
     static const size_t sizes[] = {0, 1, 4, 9, 20, 25, 64};
     const uint8_t payload[64] = {0, 1};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
@@ -111,7 +109,7 @@ static void test_service_request_of_another_type_is_unreadable(void) {
 
 // ---- sample identity ------------------------------------------------------------------------------------------------
 
-static void test_service_identity_is_the_writers_and_the_number(void) {
+TEST(test_service_identity_is_the_writers_and_the_number) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         begin_message();
@@ -123,7 +121,7 @@ static void test_service_identity_is_the_writers_and_the_number(void) {
     }
 }
 
-static void test_service_identity_is_the_one_that_inline_qos_names(void) {
+TEST(test_service_identity_is_the_one_that_inline_qos_names) {
     static const uint8_t kinds[2][2] = {{0x83, 0}, {0x0F, 0x80}};
     for (unsigned i = 0; i < 2U; i++) {
         uint8_t qos[40] = {0x71, 0, 4, 0, 0, 0, 0, 1, kinds[i][0], kinds[i][1], 24, 0, 'c', 'l', 'i', 'e', 'n', 't'};
@@ -137,7 +135,7 @@ static void test_service_identity_is_the_one_that_inline_qos_names(void) {
     }
 }
 
-static void test_service_identity_of_a_damaged_message_is_none(void) {
+TEST(test_service_identity_of_a_damaged_message_is_none) {
     const uint8_t endless[8] = {0x83, 0, 0xFF, 0xFF, 1, 2, 3, 4};
     begin_message();
     put_data(true, 6, endless, sizeof endless);
@@ -154,14 +152,14 @@ static void test_service_identity_of_a_damaged_message_is_none(void) {
 
 // ---- replies ----------------------------------------------------------------------------------------------------------
 
-static void test_service_reply_of_fast_dds_is_flag_and_text(void) {
+TEST(test_service_reply_of_fast_dds_is_flag_and_text) {
     const uint8_t wanted[] = {0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'o', 'k', 0};
     caller.form = ROS_FORM_IDENTITY;
     TEST_ASSERT_EQUAL_size_t(sizeof wanted, ros_service_write(&caller, true, "ok", out, sizeof out));
     TEST_ASSERT_EQUAL_MEMORY(wanted, out, sizeof wanted);
 }
 
-static void test_service_reply_of_cyclonedds_begins_with_the_header(void) {
+TEST(test_service_reply_of_cyclonedds_begins_with_the_header) {
     const uint8_t wanted[] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0};
     const uint8_t guid[8] = {1, 2, 3, 4, 5, 6, 7, 8};
     memcpy(caller.guid, guid, sizeof guid);
@@ -171,7 +169,7 @@ static void test_service_reply_of_cyclonedds_begins_with_the_header(void) {
     TEST_ASSERT_EQUAL_MEMORY(wanted, out, sizeof wanted);
 }
 
-static void test_service_reply_that_does_not_fit_is_cut(void) {
+TEST(test_service_reply_that_does_not_fit_is_cut) {
     caller.form = ROS_FORM_HEADER;
     for (size_t size = 40; size < 100U; size++) {
         memset(out, 0xA5, sizeof out);
@@ -195,7 +193,7 @@ static size_t mark(void) {
     return ros_service_mark(&marks, message, length, out, sizeof out);
 }
 
-static void test_service_mark_names_the_caller_in_the_reply(void) {
+TEST(test_service_mark_names_the_caller_in_the_reply) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         note(ROS_FORM_IDENTITY, 0x77);
@@ -217,7 +215,7 @@ static void test_service_mark_names_the_caller_in_the_reply(void) {
     }
 }
 
-static void test_service_mark_reads_submessages_without_a_length(void) {
+TEST(test_service_mark_reads_submessages_without_a_length) {
     const uint8_t without_time[4] = {0x09, 3, 0, 0};
     note(ROS_FORM_IDENTITY, 0x77);
     begin_message();
@@ -227,7 +225,7 @@ static void test_service_mark_reads_submessages_without_a_length(void) {
     TEST_ASSERT_EQUAL_size_t(length + ROS_MARK_SIZE, mark());
 }
 
-static void test_service_mark_leaves_inline_qos_that_is_there(void) {
+TEST(test_service_mark_leaves_inline_qos_that_is_there) {
     const uint8_t qos[12] = {0x71, 0, 4, 0, 0, 0, 0, 1, 1, 0, 0, 0};
     note(ROS_FORM_UNREADABLE, 0x77);
     begin_message();
@@ -238,7 +236,7 @@ static void test_service_mark_leaves_inline_qos_that_is_there(void) {
     TEST_ASSERT_EACH_EQUAL_HEX8(0x77, caller.guid, ROS_GUID_SIZE);
 }
 
-static void test_service_mark_leaves_all_else_alone(void) {
+TEST(test_service_mark_leaves_all_else_alone) {
     begin_message();
     put_data(true, 1, NULL, 0);
     TEST_ASSERT_EQUAL_size_t_MESSAGE(0, mark(), "nothing was noted");
@@ -260,7 +258,7 @@ static void test_service_mark_leaves_all_else_alone(void) {
     TEST_ASSERT_EQUAL_size_t_MESSAGE(0, mark(), "no RTPS");
 }
 
-static void test_service_mark_forgets_what_dds_does_not_keep(void) {
+TEST(test_service_mark_forgets_what_dds_does_not_keep) {
     for (uint8_t i = 1; i <= ROS_MARKS + 2U; i++) {
         note(ROS_FORM_IDENTITY, i);
     }
@@ -277,7 +275,7 @@ static void test_service_mark_forgets_what_dds_does_not_keep(void) {
     }
 }
 
-static void test_service_mark_of_a_damaged_message_is_none(void) {
+TEST(test_service_mark_of_a_damaged_message_is_none) {
     note(ROS_FORM_IDENTITY, 0x77);
     begin_message();
     put_heartbeat();
@@ -291,24 +289,4 @@ static void test_service_mark_of_a_damaged_message_is_none(void) {
     }
     TEST_ASSERT_EQUAL_size_t(whole + ROS_MARK_SIZE,
                              ros_service_mark(&marks, message, whole, out, whole + ROS_MARK_SIZE));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_service_request_of_fast_dds_has_one_byte);
-    RUN_TEST(test_service_request_of_cyclonedds_has_a_header_of_either_order);
-    RUN_TEST(test_service_request_of_another_type_is_unreadable);
-    RUN_TEST(test_service_identity_is_the_writers_and_the_number);
-    RUN_TEST(test_service_identity_is_the_one_that_inline_qos_names);
-    RUN_TEST(test_service_identity_of_a_damaged_message_is_none);
-    RUN_TEST(test_service_reply_of_fast_dds_is_flag_and_text);
-    RUN_TEST(test_service_reply_of_cyclonedds_begins_with_the_header);
-    RUN_TEST(test_service_reply_that_does_not_fit_is_cut);
-    RUN_TEST(test_service_mark_names_the_caller_in_the_reply);
-    RUN_TEST(test_service_mark_reads_submessages_without_a_length);
-    RUN_TEST(test_service_mark_leaves_inline_qos_that_is_there);
-    RUN_TEST(test_service_mark_leaves_all_else_alone);
-    RUN_TEST(test_service_mark_forgets_what_dds_does_not_keep);
-    RUN_TEST(test_service_mark_of_a_damaged_message_is_none);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The configuration file of the bridge to ROS 2: each error with its line and cure.
 #include "ros_settings.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -27,7 +27,7 @@ static int read_text(const char *text) {
     return result;
 }
 
-static void test_settings_empty_sections_are_the_defaults(void) {
+TEST(test_settings_empty_sections_are_the_defaults) {
     TEST_ASSERT_EQUAL_INT(0, read_text("; nothing\n"));
     TEST_ASSERT_EQUAL_STRING("/run/iwheel/gateway.sock", settings.gateway.socket);
     TEST_ASSERT_TRUE(settings.drive.enabled);
@@ -36,7 +36,7 @@ static void test_settings_empty_sections_are_the_defaults(void) {
     TEST_ASSERT_EQUAL_STRING("", ros_settings_space(&settings));
 }
 
-static void test_settings_all_keys_are_read(void) {
+TEST(test_settings_all_keys_are_read) {
     TEST_ASSERT_EQUAL_INT(
         0, read_text("[gateway]\nsocket = /tmp/x\n[ros]\ndomain=7\nnetwork = loopback\nrelease = humble\n"
                      "namespace = w1\nnode = base ; a comment\n[drive]\nenabled = no\n"
@@ -53,7 +53,7 @@ static void test_settings_all_keys_are_read(void) {
     TEST_ASSERT_EQUAL_STRING("w1/odom", settings.odometry.odom_frame);
 }
 
-static void test_settings_each_error_names_line_and_cure(void) {
+TEST(test_settings_each_error_names_line_and_cure) {
     const struct {
         const char *text;
         const char *words;
@@ -77,7 +77,7 @@ static void test_settings_each_error_names_line_and_cure(void) {
     }
 }
 
-static void test_settings_what_is_printed_reads_back_the_same(void) {
+TEST(test_settings_what_is_printed_reads_back_the_same) {
     char *printed = NULL;
     size_t size = 0;
     TEST_ASSERT_EQUAL_INT(0, read_text("[ros]\nnamespace = w1\n[drive]\nauto_arm = yes\n"));
@@ -92,17 +92,7 @@ static void test_settings_what_is_printed_reads_back_the_same(void) {
     free(printed);
 }
 
-static void test_settings_shipped_file_is_the_defaults(void) {
+TEST(test_settings_shipped_file_is_the_defaults) {
     TEST_ASSERT_EQUAL_INT(0, settings_load(&ros_settings_form, IWHEEL_SHARE_DIR "/ros2.conf", &settings, stderr));
     TEST_ASSERT_EQUAL_MEMORY(&ros_settings_standard, &settings, sizeof settings);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_settings_empty_sections_are_the_defaults);
-    RUN_TEST(test_settings_all_keys_are_read);
-    RUN_TEST(test_settings_each_error_names_line_and_cure);
-    RUN_TEST(test_settings_what_is_printed_reads_back_the_same);
-    RUN_TEST(test_settings_shipped_file_is_the_defaults);
-    return UNITY_END();
 }

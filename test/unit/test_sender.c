@@ -2,7 +2,7 @@
 // The sender alone: whole pairs, both or none, what it counts and how it begins.
 #include "fake_bus.h"
 #include "iwheel/private/transmit.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static const iw_pair_t zero_pair = {{{0, 2000}, {0, 2000}}};
@@ -21,8 +21,6 @@ void setUp(void) {
     memset(&sender, FIXTURE_POISON, sizeof sender);
     iw_sender_init(&sender, &config, &hal);
 }
-
-void tearDown(void) {}
 
 static iw_send_result_t send(int16_t left_mm_s, int16_t right_mm_s) {
     iw_pair_t pair = zero_pair;
@@ -43,7 +41,7 @@ static void send_whole(iw_time_us_t after_us) {
     echo(IW_RIGHT);
 }
 
-static void test_sender_begins_with_nothing_sent_and_nothing_under_way(void) {
+TEST(test_sender_begins_with_nothing_sent_and_nothing_under_way) {
     TEST_ASSERT_TRUE(iw_sender_ready(&sender, false));
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&sender.confirmation) == IW_NEVER);
     TEST_ASSERT_EQUAL_UINT32(0, sender.confirmation.stray);
@@ -56,14 +54,14 @@ static void test_sender_begins_with_nothing_sent_and_nothing_under_way(void) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender.verdict);
 }
 
-static void test_sender_first_pair_ends_no_gap(void) {
+TEST(test_sender_first_pair_ends_no_gap) {
     send_whole(0);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
     TEST_ASSERT_EQUAL_UINT32(1, sender.sent.pairs);
 }
 
-static void test_sender_keeps_the_largest_gap_until_the_next_silence(void) {
+TEST(test_sender_keeps_the_largest_gap_until_the_next_silence) {
     send_whole(0);
     send_whole(MS(20));
     send_whole(MS(10));
@@ -75,7 +73,7 @@ static void test_sender_keeps_the_largest_gap_until_the_next_silence(void) {
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
 }
 
-static void test_sender_zero_to_one_wheel_only_is_no_whole_pair(void) {
+TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair) {
     static const iw_side_t blocked[] = {IW_LEFT, IW_RIGHT};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -91,7 +89,7 @@ static void test_sender_zero_to_one_wheel_only_is_no_whole_pair(void) {
     }
 }
 
-static void test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left(void) {
+TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left) {
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
     TEST_ASSERT_EQUAL_UINT32(1, bus.sent);
@@ -99,14 +97,14 @@ static void test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.pairs);
 }
 
-static void test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one(void) {
+TEST(test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one) {
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(1, 1));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
     TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
 }
 
-static void test_sender_pair_leaves_in_one_call(void) {
+TEST(test_sender_pair_leaves_in_one_call) {
     send_whole(0);
     TEST_ASSERT_EQUAL_UINT32(1, bus.calls);
     TEST_ASSERT_EQUAL_UINT32(2, bus.call_frames);
@@ -116,7 +114,7 @@ static void test_sender_pair_leaves_in_one_call(void) {
 }
 
 /// The port accepts the left frame and refuses the right one: the left one is in the account, and nothing is tried again.
-static void test_sender_one_accepted_of_two_is_a_refused_pair(void) {
+TEST(test_sender_one_accepted_of_two_is_a_refused_pair) {
     static const int16_t speeds_mm_s[] = {0, 1};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -134,7 +132,7 @@ static void test_sender_one_accepted_of_two_is_a_refused_pair(void) {
     }
 }
 
-static void test_sender_pair_that_the_port_refuses_whole_is_in_no_account(void) {
+TEST(test_sender_pair_that_the_port_refuses_whole_is_in_no_account) {
     bus.send_result[IW_LEFT] = -1;
     bus.send_result[IW_RIGHT] = -1;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
@@ -144,7 +142,7 @@ static void test_sender_pair_that_the_port_refuses_whole_is_in_no_account(void) 
     TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_RIGHT]);
 }
 
-static void test_sender_port_that_claims_more_than_two_frames_has_accepted_two(void) {
+TEST(test_sender_port_that_claims_more_than_two_frames_has_accepted_two) {
     bus.boast = 7;
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(1, 1));
     TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_LEFT]);
@@ -152,7 +150,7 @@ static void test_sender_port_that_claims_more_than_two_frames_has_accepted_two(v
 }
 
 /// Not ready, and asked all the same: behind two frames that wait for their echo no third one leaves.
-static void test_sender_pair_that_neither_wheel_may_have_reaches_no_port(void) {
+TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port) {
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
     TEST_ASSERT_FALSE(iw_sender_ready(&sender, true));
@@ -160,7 +158,7 @@ static void test_sender_pair_that_neither_wheel_may_have_reaches_no_port(void) {
     TEST_ASSERT_EQUAL_UINT32(2, bus.calls);
 }
 
-static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
+TEST(test_sender_remembers_why_the_gate_stopped_a_pair) {
     const int16_t fast_mm_s = (int16_t)(config.max_speed_mm_s + 1);
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, fast_mm_s)); // The pair is judged first.
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, sender.verdict);
@@ -172,7 +170,7 @@ static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, sender.verdict);
 }
 
-static void test_sender_purge_clears_the_account_only_if_the_port_surely_did(void) {
+TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did) {
     static const int results[] = {-1, 0, 1};
     for (size_t i = 0; i < 3; i++) {
         setUp();
@@ -181,22 +179,4 @@ static void test_sender_purge_clears_the_account_only_if_the_port_surely_did(voi
         TEST_ASSERT_EQUAL_INT(results[i], iw_sender_purge(&sender));
         TEST_ASSERT_EQUAL_INT(results[i] > 0, iw_sender_ready(&sender, false));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_sender_begins_with_nothing_sent_and_nothing_under_way);
-    RUN_TEST(test_sender_first_pair_ends_no_gap);
-    RUN_TEST(test_sender_keeps_the_largest_gap_until_the_next_silence);
-    RUN_TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair);
-    RUN_TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left);
-    RUN_TEST(test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one);
-    RUN_TEST(test_sender_pair_leaves_in_one_call);
-    RUN_TEST(test_sender_one_accepted_of_two_is_a_refused_pair);
-    RUN_TEST(test_sender_pair_that_the_port_refuses_whole_is_in_no_account);
-    RUN_TEST(test_sender_port_that_claims_more_than_two_frames_has_accepted_two);
-    RUN_TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port);
-    RUN_TEST(test_sender_remembers_why_the_gate_stopped_a_pair);
-    RUN_TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did);
-    return UNITY_END();
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What the relay knows of the board: which start of it, which stamp was heard when, and what is wrong with a line that says nothing right.
+// What the relay knows of the board: which start of it, which stamp was heard when, and what came that was not understood.
 #include "serial_link.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -17,8 +17,6 @@ void setUp(void) {
     memset(&state, 0, sizeof state);
     serial_link_init(&state, 0);
 }
-
-void tearDown(void) {}
 
 /// The last news of these bytes.
 static serial_news_t hear_raw(const char *bytes, uint64_t now_us) {
@@ -47,7 +45,7 @@ static uint64_t stamp_at(uint64_t then_us) {
     return serial_link_stamp(&state, then_us, &t_us) ? t_us : UINT64_MAX;
 }
 
-static void test_link_is_there_from_its_event_on(void) {
+TEST(test_link_is_there_from_its_event_on) {
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(1, 1, "{\"ok\":true}", 10));
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(BOOT, 5, 20));
     TEST_ASSERT_EQUAL_STRING(BOOT, state.boot);
@@ -56,7 +54,7 @@ static void test_link_is_there_from_its_event_on(void) {
     TEST_ASSERT_EQUAL_UINT(1, line.channel);
 }
 
-static void test_link_another_boot_is_another_board(void) {
+TEST(test_link_another_boot_is_another_board) {
     (void)hear_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 6000000, 20));
     TEST_ASSERT_EQUAL_STRING(OTHER, state.boot);
@@ -64,7 +62,7 @@ static void test_link_another_boot_is_another_board(void) {
     TEST_ASSERT_EQUAL_UINT64(6000000, stamp_at(20));
 }
 
-static void test_link_stamp_that_falls_is_a_start_whatever_is_said(void) {
+TEST(test_link_stamp_that_falls_is_a_start_whatever_is_said) {
     (void)hear_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LOST, hear(2, 4000, "{\"event\":\"state\"}", 20));
     TEST_ASSERT_EQUAL(SERIAL_SILENT, state.state);
@@ -72,7 +70,7 @@ static void test_link_stamp_that_falls_is_a_start_whatever_is_said(void) {
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 5000, 30));
 }
 
-static void test_link_stamp_is_the_newest_heard_by_then(void) {
+TEST(test_link_stamp_is_the_newest_heard_by_then) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 100U; i++) {
         (void)hear(1, 100U + i * 20000U, "{}", 1000U + i * 20000U);
@@ -83,7 +81,7 @@ static void test_link_stamp_is_the_newest_heard_by_then(void) {
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, stamp_at(1000U)); // Longer ago than any command lives.
 }
 
-static void test_link_stamps_that_come_close_together_reach_back_all_the_same(void) {
+TEST(test_link_stamps_that_come_close_together_reach_back_all_the_same) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 1000U; i++) {
         (void)hear(1, 100U + i * 200U, "{}", 1000U + i * 200U);
@@ -94,14 +92,14 @@ static void test_link_stamps_that_come_close_together_reach_back_all_the_same(vo
     TEST_ASSERT_TRUE(stamp_at(then_us) + 2U * SERIAL_STAMP_US >= 100U + 400U * 200U);
 }
 
-static void test_link_falls_silent_once(void) {
+TEST(test_link_falls_silent_once) {
     (void)hear_link(BOOT, 5, 1000);
     TEST_ASSERT_FALSE(serial_link_fell_silent(&state, 1000U + SERIAL_SILENT_US - 1U));
     TEST_ASSERT_TRUE(serial_link_fell_silent(&state, 1000U + SERIAL_SILENT_US));
     TEST_ASSERT_FALSE(serial_link_fell_silent(&state, 1000U + SERIAL_SILENT_US));
 }
 
-static void test_link_bad_lines_are_counted_and_change_nothing(void) {
+TEST(test_link_bad_lines_are_counted_and_change_nothing) {
     (void)hear_link(BOOT, 5, 1000);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear_raw("1 6 {\"ok\":true}*00000000\n", 2000));
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(1, 7, "{\"ok\":tru}", 2000));
@@ -112,33 +110,12 @@ static void test_link_bad_lines_are_counted_and_change_nothing(void) {
     TEST_ASSERT_EQUAL_UINT64(3, state.complaints);
 }
 
-static void explains(const char *bytes, const char *words) {
-    char text[512];
-    setUp();
-    for (unsigned i = 0; i < 5U; i++) {
-        (void)hear_raw(bytes, 1000);
-    }
-    serial_link_explain(&state, "/dev/x", 115200, text, sizeof text);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, words), text);
-}
-
-static void test_link_says_what_is_wrong_with_a_line(void) {
-    explains("", "nothing comes from /dev/x");
-    explains("\xf8\x80\xff\x81\xe0\x9e\x83\xf1", "another than 115200");
-    explains("boot: ok\r\n", "such as \"boot: ok.\"");
-    explains("0 1 {\"event\":\"link\"}*12345678\n", "wrong CRC");
-    explains("half", "no whole line");
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_link_is_there_from_its_event_on);
-    RUN_TEST(test_link_another_boot_is_another_board);
-    RUN_TEST(test_link_stamp_that_falls_is_a_start_whatever_is_said);
-    RUN_TEST(test_link_stamp_is_the_newest_heard_by_then);
-    RUN_TEST(test_link_stamps_that_come_close_together_reach_back_all_the_same);
-    RUN_TEST(test_link_falls_silent_once);
-    RUN_TEST(test_link_bad_lines_are_counted_and_change_nothing);
-    RUN_TEST(test_link_says_what_is_wrong_with_a_line);
-    return UNITY_END();
+TEST(test_link_noise_is_counted_until_it_is_forgotten) {
+    (void)hear_raw("boot: ok\n\xff", 1000);
+    TEST_ASSERT_EQUAL_UINT64(10, state.noise.bytes);
+    TEST_ASSERT_EQUAL_UINT64(1, state.noise.odd);
+    TEST_ASSERT_EQUAL_UINT64(1, state.noise.lines[IWN_LINE_UNCHECKED]);
+    TEST_ASSERT_EQUAL_STRING("boot: ok", state.noise.sample);
+    serial_link_forget_noise(&state);
+    TEST_ASSERT_EQUAL_UINT64(0, state.noise.bytes + state.noise.odd + state.noise.lines[IWN_LINE_UNCHECKED]);
 }

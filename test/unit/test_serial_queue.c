@@ -2,7 +2,7 @@
 // What waits between a client and a board: in order, bounded, replaced by what is newer, never sent late.
 #include "serial_queue.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -16,8 +16,6 @@ void setUp(void) {
     serial_queue_init(&queue, HOLD);
     number = 0;
 }
-
-void tearDown(void) {}
 
 static serial_request_t *put(serial_kind_t kind, uint64_t came_us) {
     serial_request_t *place = serial_queue_place(&queue);
@@ -39,7 +37,7 @@ static bool answered(uint64_t which) {
     return serial_queue_take(&queue, which, true, "}", 1);
 }
 
-static void test_kind_of_each_command_is_what_it_can_do(void) {
+TEST(test_kind_of_each_command_is_what_it_can_do) {
     TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_DRIVE));
     TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_TWIST));
     TEST_ASSERT_EQUAL_INT(SERIAL_STOPS, serial_kind_of(IWN_CMD_STOP));
@@ -50,7 +48,7 @@ static void test_kind_of_each_command_is_what_it_can_do(void) {
     TEST_ASSERT_EQUAL_INT(SERIAL_ASKS, serial_kind_of(IWN_CMD_STATUS));
 }
 
-static void test_queue_sends_one_and_the_next_when_it_is_answered(void) {
+TEST(test_queue_sends_one_and_the_next_when_it_is_answered) {
     serial_request_t *first = put(SERIAL_ASKS, NOW);
     serial_request_t *second = put(SERIAL_ASKS, NOW);
     TEST_ASSERT_EQUAL_PTR(first, send_next(NOW));
@@ -60,7 +58,7 @@ static void test_queue_sends_one_and_the_next_when_it_is_answered(void) {
     TEST_ASSERT_EQUAL_PTR(second, send_next(NOW));
 }
 
-static void test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent(void) {
+TEST(test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent) {
     const serial_request_t *sent = put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     const serial_request_t *waits = put(SERIAL_MOVES, NOW + 1U);
@@ -73,7 +71,7 @@ static void test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one
     TEST_ASSERT_NULL(send_next(NOW + 3U));
 }
 
-static void test_queue_answers_leave_in_the_order_of_the_requests(void) {
+TEST(test_queue_answers_leave_in_the_order_of_the_requests) {
     (void)put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     (void)put(SERIAL_MOVES, NOW);
@@ -87,7 +85,7 @@ static void test_queue_answers_leave_in_the_order_of_the_requests(void) {
     TEST_ASSERT_EQUAL_UINT(3, send_next(NOW)->number);
 }
 
-static void test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not(void) {
+TEST(test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     const serial_request_t *arm = put(SERIAL_GRANTS, NOW);
@@ -98,7 +96,7 @@ static void test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does
     TEST_ASSERT_EQUAL_PTR(stop, serial_queue_next(&queue, true, NOW));
 }
 
-static void test_queue_stop_takes_questions_before_it_along(void) {
+TEST(test_queue_stop_takes_questions_before_it_along) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     serial_request_t *question = put(SERIAL_ASKS, NOW);
@@ -107,7 +105,7 @@ static void test_queue_stop_takes_questions_before_it_along(void) {
     TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
 }
 
-static void test_queue_early_answer_is_held_until_its_turn(void) {
+TEST(test_queue_early_answer_is_held_until_its_turn) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     serial_request_t *stop = put(SERIAL_STOPS, NOW);
@@ -121,7 +119,7 @@ static void test_queue_early_answer_is_held_until_its_turn(void) {
     TEST_ASSERT_EQUAL_STRING_LEN(",\"state\":\"stopping\"}", stop->json, stop->length);
 }
 
-static void test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is(void) {
+TEST(test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is) {
     serial_request_t *drive = put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     serial_request_t *stop = put(SERIAL_STOPS, NOW);
@@ -133,7 +131,7 @@ static void test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is(
     TEST_ASSERT_EQUAL_INT(SERIAL_SENT, drive->state);
 }
 
-static void test_queue_command_that_waited_too_long_is_refused_and_not_sent(void) {
+TEST(test_queue_command_that_waited_too_long_is_refused_and_not_sent) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     const serial_request_t *drive = put(SERIAL_MOVES, NOW);
@@ -147,7 +145,7 @@ static void test_queue_command_that_waited_too_long_is_refused_and_not_sent(void
     TEST_ASSERT_NULL(send_next(NOW + SERIAL_FRESH_US));
 }
 
-static void test_queue_lost_answer_holds_the_next_command_no_longer_than_told(void) {
+TEST(test_queue_lost_answer_holds_the_next_command_no_longer_than_told) {
     (void)put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     (void)put(SERIAL_MOVES, NOW + 10000U);
@@ -159,7 +157,7 @@ static void test_queue_lost_answer_holds_the_next_command_no_longer_than_told(vo
     TEST_ASSERT_EQUAL_UINT(1, queue.unanswered);
 }
 
-static void test_queue_answer_that_nobody_waits_for_is_known(void) {
+TEST(test_queue_answer_that_nobody_waits_for_is_known) {
     (void)put(SERIAL_ASKS, NOW);
     TEST_ASSERT_FALSE(answered(1));
     (void)send_next(NOW);
@@ -169,7 +167,7 @@ static void test_queue_answer_that_nobody_waits_for_is_known(void) {
     TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, serial_queue_answered(&queue)->error);
 }
 
-static void test_queue_is_full_and_empty_again(void) {
+TEST(test_queue_is_full_and_empty_again) {
     for (unsigned round = 0; round < 3U; round++) {
         for (unsigned i = 0; i < SERIAL_QUEUE_SIZE; i++) {
             TEST_ASSERT_FALSE(serial_queue_is_full(&queue));
@@ -184,21 +182,4 @@ static void test_queue_is_full_and_empty_again(void) {
         }
         TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, serial_queue_next_us(&queue, NOW));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_kind_of_each_command_is_what_it_can_do);
-    RUN_TEST(test_queue_sends_one_and_the_next_when_it_is_answered);
-    RUN_TEST(test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent);
-    RUN_TEST(test_queue_answers_leave_in_the_order_of_the_requests);
-    RUN_TEST(test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not);
-    RUN_TEST(test_queue_stop_takes_questions_before_it_along);
-    RUN_TEST(test_queue_early_answer_is_held_until_its_turn);
-    RUN_TEST(test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is);
-    RUN_TEST(test_queue_command_that_waited_too_long_is_refused_and_not_sent);
-    RUN_TEST(test_queue_lost_answer_holds_the_next_command_no_longer_than_told);
-    RUN_TEST(test_queue_answer_that_nobody_waits_for_is_known);
-    RUN_TEST(test_queue_is_full_and_empty_again);
-    return UNITY_END();
 }

@@ -6,6 +6,8 @@
 
 #include "unity.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,6 +32,7 @@ static size_t to_relay_length;
 static char to_board[65536]; // Everything that the relay has written.
 static size_t to_board_length;
 static bool port_is_full;
+static bool port_is_missing;
 static int client_fd;
 static unsigned step;
 static bool (*script)(void); // Called before each wait; true: the relay ends.
@@ -60,8 +63,11 @@ int64_t iwl_clock_wall_us(void) {
 int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size) {
     (void)path;
     (void)baud;
-    (void)out_why;
-    (void)size;
+    if (port_is_missing) {
+        (void)snprintf(out_why, size, "port: plug the board in");
+        self->fd = -1;
+        return ENOENT;
+    }
     self->fd = eventfd(0, EFD_CLOEXEC);
     return 0;
 }
@@ -154,12 +160,16 @@ static void client_writes(const char *line) {
     TEST_ASSERT_EQUAL_INT(strlen(line), write(client_fd, line, strlen(line)));
 }
 
-static unsigned written(const char *words) {
+static unsigned count_in(const char *text, const char *words) {
     unsigned count = 0;
-    for (const char *at = to_board; (at = strstr(at, words)) != NULL; at++) {
+    for (const char *at = text; (at = strstr(at, words)) != NULL; at++) {
         count++;
     }
     return count;
+}
+
+static unsigned written(const char *words) {
+    return count_in(to_board, words);
 }
 
 static void run(bool (*play)(void)) {
@@ -171,7 +181,7 @@ void setUp(void) {
     now_us = 10000000;
     to_relay_length = to_board_length = 0;
     to_board[0] = '\0';
-    port_is_full = false;
+    port_is_full = port_is_missing = false;
     client_fd = -1;
     step = 0;
     settings = serial_settings_standard;
@@ -481,6 +491,111 @@ static void test_stop_never_refused_by_a_relay_without_a_place(void) {
     TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // It has asked nothing.
 }
 
+static char complaints[4096]; // The log.
+
+/// Runs it and keeps what it logs.
+static void run_logged(bool (*play)(void)) {
+    char path[64];
+    (void)snprintf(path, sizeof path, "%s/log", folder);
+    const int kept = dup(STDERR_FILENO);
+    const int file = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    (void)dup2(file, STDERR_FILENO);
+    script = play;
+    const int code = relay_run(&relay, &settings);
+    (void)dup2(kept, STDERR_FILENO);
+    (void)close(kept);
+    const ssize_t length = pread(file, complaints, sizeof complaints - 1U, 0);
+    complaints[(length > 0) ? length : 0] = '\0';
+    (void)close(file);
+    (void)unlink(path);
+    TEST_ASSERT_EQUAL_INT(0, code);
+}
+
+static unsigned logged(const char *words) {
+    return count_in(complaints, words);
+}
+
+/// A client that comes at this step is told this.
+static void assert_told_at(unsigned at, const char *words) {
+    if (step == at) {
+        client_connects();
+    }
+    if (step == at + 20U) {
+        memset(received, 0, sizeof received);
+        (void)recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
+        (void)close(client_fd);
+        client_fd = -1;
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(received, words), received);
+    }
+}
+
+static void device_sends(const char *bytes) {
+    to_relay_length += (size_t)snprintf(&to_relay[to_relay_length], sizeof to_relay - to_relay_length, "%s", bytes);
+}
+
+/// Nothing comes for 3 s; then a device of another rate talks, then one of another protocol, which says less.
+static bool noise_after_nothing(void) {
+    if (step >= 3000U && step < 4900U && step % 10U == 0U) {
+        device_sends("\xf8\x80\xff\x81");
+    }
+    if (step >= 5100U && step % 100U == 0U) {
+        device_sends("login: \n");
+    }
+    assert_told_at(2600, "nothing comes");
+    assert_told_at(5100, "baud rate is another");
+    assert_told_at(7600, "another protocol");
+    return step == 9000U;
+}
+
+static void test_relay_reason_changes_with_what_comes(void) {
+    run_logged(noise_after_nothing);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: 760 bytes came"), complaints);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: another protocol"), complaints);
+}
+
+/// The port is not there.
+static bool port_stays_away(void) {
+    assert_told_at(4000, "plug the board in");
+    return step == 4100U;
+}
+
+static void test_relay_missing_port_is_no_silent_board(void) {
+    port_is_missing = true;
+    run_logged(port_stays_away);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: port: plug the board in"), complaints);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, logged("warning: nothing comes"), complaints);
+}
+
+/// Long after the port was opened the board's clock falls back, and it says nothing more.
+static bool board_restarts_late(void) {
+    if (step % 1000U == 2U && step < 5000U) {
+        board_links(EARLY + step);
+    }
+    if (step == 5000U) {
+        board_writes(1, 5, "{\"event\":\"state\"}");
+    }
+    assert_told_at(7400, "started anew");
+    return step == 7600U;
+}
+
+static void test_relay_board_that_restarts_is_silent_only_later(void) {
+    run_logged(board_restarts_late);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
+}
+
+static bool board_goes(void) {
+    if (step == 2U || step == 3500U) {
+        board_links(EARLY + step);
+    }
+    return step == 7000U;
+}
+
+static void test_relay_board_that_goes_is_logged_each_time(void) {
+    run_logged(board_goes);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(2, logged("warning: nothing comes"), complaints);
+}
+
 int main(void) {
     UNITY_BEGIN();
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
@@ -493,6 +608,10 @@ int main(void) {
     RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_ends_nothing);
     RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
+    RUN_TEST(test_relay_reason_changes_with_what_comes);
+    RUN_TEST(test_relay_missing_port_is_no_silent_board);
+    RUN_TEST(test_relay_board_that_restarts_is_silent_only_later);
+    RUN_TEST(test_relay_board_that_goes_is_logged_each_time);
     (void)rmdir(folder);
     return UNITY_END();
 }

@@ -5,7 +5,7 @@
 
 #include "iwheel_linux/clock.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -92,14 +92,14 @@ static unsigned served(void) {
     return count;
 }
 
-static void test_round_serves_no_crowd_at_once_and_says_that_somebody_waits(void) {
+TEST(test_round_serves_no_crowd_at_once_and_says_that_somebody_waits) {
     sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_GREATER_THAN_UINT(0, served());
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
     TEST_ASSERT_TRUE(sock_service_is_busy(&daemon_->clients));
 }
 
-static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn(void) {
+TEST(test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn) {
     unsigned before = 0;
     for (unsigned rounds = 0; served() < CROWD; rounds++) {
         sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
@@ -114,13 +114,13 @@ static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn
     TEST_ASSERT_FALSE(daemon_->clients.some_wait);
 }
 
-static void test_round_begins_with_the_holder_of_the_lease(void) {
+TEST(test_round_begins_with_the_holder_of_the_lease) {
     sock_service_clients(&daemon_->clients, CROWD);
     TEST_ASSERT_TRUE(is_served(CROWD - 1U));
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
 }
 
-static void test_round_a_client_that_was_not_reached_is_not_caught_up(void) {
+TEST(test_round_a_client_that_was_not_reached_is_not_caught_up) {
     daemon_->clients.now_us = iwl_clock_now_us();
     sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_FALSE(is_served(CROWD - 1U));
@@ -128,7 +128,7 @@ static void test_round_a_client_that_was_not_reached_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(daemon_->clients.now_us, daemon_->clients.client[0].caught_up_us);
 }
 
-static void test_round_of_sending_reaches_everybody_in_turn(void) {
+TEST(test_round_of_sending_reaches_everybody_in_turn) {
     while (served() < CROWD) {
         sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     }
@@ -142,7 +142,7 @@ static void test_round_of_sending_reaches_everybody_in_turn(void) {
 }
 
 /// What waits is moved to the front again and again.
-static void test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time(void) {
+TEST(test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time) {
     sock_client_t *client = &daemon_->clients.client[0];
     char line[64];
     char expected[sizeof line];
@@ -169,15 +169,4 @@ static void test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_ti
             memmove(drained, &drained[whole], length);
         }
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_round_serves_no_crowd_at_once_and_says_that_somebody_waits);
-    RUN_TEST(test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn);
-    RUN_TEST(test_round_begins_with_the_holder_of_the_lease);
-    RUN_TEST(test_round_a_client_that_was_not_reached_is_not_caught_up);
-    RUN_TEST(test_round_of_sending_reaches_everybody_in_turn);
-    RUN_TEST(test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What do setpoint pairs say? Ramps, curves, sign changes, the bound of the stopping time.
 #include "setpoint_rig.h"
-#include "unity.h"
+#include "unit.h"
 #include <stdlib.h>
 
 static setpoint_rig_t rig;
@@ -10,13 +10,11 @@ void setUp(void) {
     setpoint_rig_init(&rig);
 }
 
-void tearDown(void) {}
-
 static bool between(int32_t low, int32_t value, int32_t high) {
     return (low <= high) ? (value >= low && value <= high) : (value >= high && value <= low);
 }
 
-static void test_setpoint_acceleration_follows_time_at_every_period(void) {
+TEST(test_setpoint_acceleration_follows_time_at_every_period) {
     static const uint16_t periods_ms[] = {5, 7, 10, 20, 50};
     static const uint16_t accels[] = {50, 800, 20000};
     for (size_t i = 0; i < 5; i++) {
@@ -39,7 +37,7 @@ static void test_setpoint_acceleration_follows_time_at_every_period(void) {
     }
 }
 
-static void test_setpoint_braking_follows_time_at_every_period(void) {
+TEST(test_setpoint_braking_follows_time_at_every_period) {
     static const uint16_t periods_ms[] = {5, 7, 10, 20, 50};
     for (size_t i = 0; i < 5; i++) {
         setUp();
@@ -57,7 +55,7 @@ static void test_setpoint_braking_follows_time_at_every_period(void) {
 }
 
 /// 35 minutes: in 32 bits slope and time would make a step of nothing.
-static void test_setpoint_braking_has_ended_after_any_pause(void) {
+TEST(test_setpoint_braking_has_ended_after_any_pause) {
     rig.config.decel_mm_s2 = 2048;
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);
     setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
@@ -66,7 +64,7 @@ static void test_setpoint_braking_has_ended_after_any_pause(void) {
     TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_RIGHT].speed_mm_s);
 }
 
-static void test_setpoint_ramps_count_fractions_of_a_millisecond(void) {
+TEST(test_setpoint_ramps_count_fractions_of_a_millisecond) {
     setpoint_rig_follow(&rig);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, 1000, 1000, 2000);
@@ -77,7 +75,7 @@ static void test_setpoint_ramps_count_fractions_of_a_millisecond(void) {
     }
 }
 
-static void test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond(void) {
+TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond) {
     static const struct {
         uint16_t after_us;
         int16_t target_mm_s;
@@ -93,7 +91,7 @@ static void test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond(void) {
     }
 }
 
-static void test_setpoint_ramp_that_has_hardly_begun_goes_on(void) {
+TEST(test_setpoint_ramp_that_has_hardly_begun_goes_on) {
     rig.config.accel_mm_s2 = 2000;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 1, 1, 2000);
@@ -103,7 +101,7 @@ static void test_setpoint_ramp_that_has_hardly_begun_goes_on(void) {
     TEST_ASSERT_EQUAL_INT16(1, pair.wheel[IW_LEFT].speed_mm_s);
 }
 
-static void test_setpoint_slower_command_uses_the_slope_towards_zero(void) {
+TEST(test_setpoint_slower_command_uses_the_slope_towards_zero) {
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);
     setpoint_rig_command(&rig, 100, 100, 2000);
     rig.now_us = iw_setpoint_next_us(&rig.setpoint);
@@ -112,7 +110,7 @@ static void test_setpoint_slower_command_uses_the_slope_towards_zero(void) {
     TEST_ASSERT_INT_WITHIN(1, 700, pair.wheel[IW_LEFT].speed_mm_s);
 }
 
-static void test_setpoint_late_call_away_from_zero_is_granted_two_periods(void) {
+TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods) {
     static const uint32_t late_ms[] = {41, 60, 500, 3600000};
     for (size_t i = 0; i < 4; i++) {
         setUp();
@@ -124,7 +122,7 @@ static void test_setpoint_late_call_away_from_zero_is_granted_two_periods(void) 
     }
 }
 
-static void test_setpoint_late_call_is_granted_not_a_microsecond_more(void) {
+TEST(test_setpoint_late_call_is_granted_not_a_microsecond_more) {
     rig.config.period_ms = 50;
     rig.config.accel_mm_s2 = 20000;
     rig.config.max_speed_mm_s = 5000;
@@ -134,7 +132,7 @@ static void test_setpoint_late_call_is_granted_not_a_microsecond_more(void) {
     TEST_ASSERT_TRUE(between(1999, pair.wheel[IW_LEFT].speed_mm_s, 2000));
 }
 
-static void test_setpoint_late_call_towards_zero_counts_all_of_the_time(void) {
+TEST(test_setpoint_late_call_towards_zero_counts_all_of_the_time) {
     setpoint_rig_cruise(&rig, 1000, 600, 2000);
     setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
     const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(400));
@@ -143,7 +141,7 @@ static void test_setpoint_late_call_towards_zero_counts_all_of_the_time(void) {
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-static void test_setpoint_braking_after_huge_gaps_is_zero(void) {
+TEST(test_setpoint_braking_after_huge_gaps_is_zero) {
     static const uint64_t gaps_us[] = {1000000,     4294967295U, 4294967296U,        4294968296U,
                                        8589934592U, 3600000000U, 281474976710656ULL, 1152921504606846976ULL};
     for (size_t i = 0; i < sizeof gaps_us / sizeof gaps_us[0]; i++) {
@@ -160,7 +158,7 @@ static void test_setpoint_braking_after_huge_gaps_is_zero(void) {
     }
 }
 
-static void test_setpoint_small_slopes_accumulate(void) {
+TEST(test_setpoint_small_slopes_accumulate) {
     rig.config.period_ms = 5;
     rig.config.accel_mm_s2 = 50;
     setpoint_rig_follow(&rig);
@@ -183,7 +181,7 @@ static void assert_curve_kept(int16_t part) {
     TEST_ASSERT_TRUE(moving > 20);
 }
 
-static void test_setpoint_both_wheels_ramp_together(void) {
+TEST(test_setpoint_both_wheels_ramp_together) {
     static const int16_t parts[] = {1000, 500, 333, 7, 0, -250, -1000};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
         setUp();
@@ -196,7 +194,7 @@ static void test_setpoint_both_wheels_ramp_together(void) {
     }
 }
 
-static void test_setpoint_sign_change_passes_through_zero(void) {
+TEST(test_setpoint_sign_change_passes_through_zero) {
     setpoint_rig_cruise(&rig, 500, -300, 2000);
     setpoint_rig_command(&rig, -500, 300, 2000);
     iw_pair_t before = iw_setpoint_applied(&rig.setpoint);
@@ -211,7 +209,7 @@ static void test_setpoint_sign_change_passes_through_zero(void) {
     TEST_ASSERT_EQUAL_INT(300, before.wheel[IW_RIGHT].speed_mm_s);
 }
 
-static void test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero(void) {
+TEST(test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero) {
     setpoint_rig_cruise(&rig, 100, 100, 2000);
     setpoint_rig_command(&rig, -1000, -1000, 2000);
     const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(5000));
@@ -219,7 +217,7 @@ static void test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero(voi
     TEST_ASSERT_TRUE(pair.wheel[IW_LEFT].speed_mm_s >= -32);
 }
 
-static void test_setpoint_command_counts_under_follow_only(void) {
+TEST(test_setpoint_command_counts_under_follow_only) {
     static const iw_demand_t deaf[] = {IW_DEMAND_SILENCE, IW_DEMAND_ZERO, IW_DEMAND_BRAKE};
     for (size_t i = 0; i < 3; i++) {
         setUp();
@@ -237,7 +235,7 @@ static void test_setpoint_command_counts_under_follow_only(void) {
     }
 }
 
-static void test_setpoint_command_is_forgotten_when_follow_ends(void) {
+TEST(test_setpoint_command_is_forgotten_when_follow_ends) {
     static const iw_demand_t ends[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -255,7 +253,7 @@ static void test_setpoint_command_is_forgotten_when_follow_ends(void) {
     }
 }
 
-static void test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes(void) {
+TEST(test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes) {
     fixture_random_t random;
     fixture_random_init(&random, 3);
     setpoint_rig_follow(&rig);
@@ -281,7 +279,7 @@ static void test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes(v
     }
 }
 
-static void test_setpoint_reaches_every_target_within_its_ramps(void) {
+TEST(test_setpoint_reaches_every_target_within_its_ramps) {
     fixture_random_t random;
     fixture_random_init(&random, 4);
     setpoint_rig_follow(&rig);
@@ -316,7 +314,7 @@ static void brake_at_a_random_moment(fixture_random_t *random) {
     setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
 }
 
-static void test_setpoint_stop_takes_no_longer_than_the_fastest_ramp(void) {
+TEST(test_setpoint_stop_takes_no_longer_than_the_fastest_ramp) {
     fixture_random_t random;
     fixture_random_init(&random, 5);
     for (uint32_t n = 0; n < 1000; n++) {
@@ -336,7 +334,7 @@ static void test_setpoint_stop_takes_no_longer_than_the_fastest_ramp(void) {
     }
 }
 
-static void test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one(void) {
+TEST(test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one) {
     setpoint_rig_cruise(&rig, 1000, 0, 2000);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, 100, 1000, 2000);
@@ -345,30 +343,4 @@ static void test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one(void
         const int64_t ideal = 1000 - (int64_t)(rig.now_us - start_us) * 1500 / 1000000;
         TEST_ASSERT_INT_WITHIN(1, (ideal < 100) ? 100 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_setpoint_acceleration_follows_time_at_every_period);
-    RUN_TEST(test_setpoint_braking_follows_time_at_every_period);
-    RUN_TEST(test_setpoint_braking_has_ended_after_any_pause);
-    RUN_TEST(test_setpoint_ramps_count_fractions_of_a_millisecond);
-    RUN_TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond);
-    RUN_TEST(test_setpoint_ramp_that_has_hardly_begun_goes_on);
-    RUN_TEST(test_setpoint_slower_command_uses_the_slope_towards_zero);
-    RUN_TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods);
-    RUN_TEST(test_setpoint_late_call_is_granted_not_a_microsecond_more);
-    RUN_TEST(test_setpoint_late_call_towards_zero_counts_all_of_the_time);
-    RUN_TEST(test_setpoint_braking_after_huge_gaps_is_zero);
-    RUN_TEST(test_setpoint_small_slopes_accumulate);
-    RUN_TEST(test_setpoint_both_wheels_ramp_together);
-    RUN_TEST(test_setpoint_sign_change_passes_through_zero);
-    RUN_TEST(test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero);
-    RUN_TEST(test_setpoint_command_counts_under_follow_only);
-    RUN_TEST(test_setpoint_command_is_forgotten_when_follow_ends);
-    RUN_TEST(test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes);
-    RUN_TEST(test_setpoint_reaches_every_target_within_its_ramps);
-    RUN_TEST(test_setpoint_stop_takes_no_longer_than_the_fastest_ramp);
-    RUN_TEST(test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // When do setpoint pairs leave? Grid, spacing, silence, lateness.
 #include "fixture.h"
 #include "iwheel/private/setpoint.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static iw_config_t config;
@@ -13,8 +13,6 @@ void setUp(void) {
     memset(&setpoint, FIXTURE_POISON, sizeof setpoint);
     iw_setpoint_init(&setpoint, &config);
 }
-
-void tearDown(void) {}
 
 static iw_pair_t pair_of(int16_t left_mm_s, int16_t right_mm_s) {
     const iw_pair_t pair = {{{left_mm_s, 2000}, {right_mm_s, 2000}}};
@@ -61,7 +59,7 @@ static void assert_silent(iw_time_us_t now_us) {
     TEST_ASSERT_TRUE(iw_setpoint_next_us(&setpoint) == IW_NEVER);
 }
 
-static void test_setpoint_after_init_is_silent(void) {
+TEST(test_setpoint_after_init_is_silent) {
     assert_silent(0);
     assert_silent(FIXTURE_START_US);
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
@@ -71,12 +69,12 @@ static void test_setpoint_after_init_is_silent(void) {
     assert_silent(FIXTURE_START_US);
 }
 
-static void test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun(void) {
+TEST(test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun) {
     iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
     assert_only_due_from(1000);
 }
 
-static void test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing(void) {
+TEST(test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_BRAKE);
     take_at(FIXTURE_START_US);
     iw_setpoint_hasten(&setpoint, FIXTURE_START_US + MS(2));
@@ -85,7 +83,7 @@ static void test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing(void) 
     assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
 }
 
-static void test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows(void) {
+TEST(test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_ZERO);
     take_at(FIXTURE_START_US);
     take_at(FIXTURE_START_US + MS(35));
@@ -94,7 +92,7 @@ static void test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allow
     assert_only_due_from(FIXTURE_START_US + MS(75) + 1U);
 }
 
-static void test_setpoint_any_demand_from_silence_is_due_at_once_with_zero(void) {
+TEST(test_setpoint_any_demand_from_silence_is_due_at_once_with_zero) {
     static const iw_demand_t demands[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE, IW_DEMAND_FOLLOW};
     for (size_t i = 0; i < sizeof demands / sizeof demands[0]; i++) {
         setUp();
@@ -108,14 +106,14 @@ static void test_setpoint_any_demand_from_silence_is_due_at_once_with_zero(void)
     }
 }
 
-static void test_setpoint_first_pair_taken_late_is_still_zero(void) {
+TEST(test_setpoint_first_pair_taken_late_is_still_zero) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     command_at(FIXTURE_START_US, 1000, 1000);
     take_at(FIXTURE_START_US + MS(700));
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
 }
 
-static void test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs(void) {
+TEST(test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs) {
     fixture_random_t random;
     fixture_random_init(&random, 1);
     static const uint16_t periods_ms[] = {5, 20, 33, 50};
@@ -132,7 +130,7 @@ static void test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs(void)
     }
 }
 
-static void test_setpoint_late_call_takes_one_pair_and_no_burst(void) {
+TEST(test_setpoint_late_call_takes_one_pair_and_no_burst) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     static const uint32_t late_ms[] = {21, 39, 41, 110, 990, 3599990};
@@ -149,7 +147,7 @@ static void test_setpoint_late_call_takes_one_pair_and_no_burst(void) {
     }
 }
 
-static void test_setpoint_pair_taken_late_still_keeps_spacing(void) {
+TEST(test_setpoint_pair_taken_late_still_keeps_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     take_at(FIXTURE_START_US + MS(39));
@@ -159,14 +157,14 @@ static void test_setpoint_pair_taken_late_still_keeps_spacing(void) {
     TEST_ASSERT_TRUE(next_us <= FIXTURE_START_US + MS(44));
 }
 
-static void test_setpoint_changed_command_leaves_five_ms_after_the_last_pair(void) {
+TEST(test_setpoint_changed_command_leaves_five_ms_after_the_last_pair) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     command_at(FIXTURE_START_US + MS(1), 500, 500);
     assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
 }
 
-static void test_setpoint_changed_command_later_than_spacing_leaves_at_once(void) {
+TEST(test_setpoint_changed_command_later_than_spacing_leaves_at_once) {
     static const uint32_t after_us[] = {5000, 5001, 12345, 19999};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
         setUp();
@@ -182,7 +180,7 @@ static void test_setpoint_changed_command_later_than_spacing_leaves_at_once(void
     }
 }
 
-static void test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change(void) {
+TEST(test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 300, 300);
     const iw_pair_t changes[] = {{{{301, 2000}, {300, 2000}}},
                                  {{{301, 2000}, {301, 2000}}},
@@ -196,13 +194,13 @@ static void test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change(void) 
     }
 }
 
-static void test_setpoint_same_command_again_moves_nothing(void) {
+TEST(test_setpoint_same_command_again_moves_nothing) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 300, -300);
     command_at(last_us + MS(7), 300, -300);
     assert_only_due_from(last_us + MS(20));
 }
 
-static void test_setpoint_command_storm_is_spaced_and_never_starves(void) {
+TEST(test_setpoint_command_storm_is_spaced_and_never_starves) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     iw_time_us_t last_us = FIXTURE_START_US;
@@ -219,7 +217,7 @@ static void test_setpoint_command_storm_is_spaced_and_never_starves(void) {
     TEST_ASSERT_UINT_WITHIN(2, 200, pairs);
 }
 
-static void test_setpoint_gap_stays_within_a_period_whatever_is_commanded(void) {
+TEST(test_setpoint_gap_stays_within_a_period_whatever_is_commanded) {
     fixture_random_t random;
     fixture_random_init(&random, 2);
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
@@ -243,7 +241,7 @@ static void test_setpoint_gap_stays_within_a_period_whatever_is_commanded(void) 
     }
 }
 
-static void test_setpoint_changed_demand_moves_the_pair_forward(void) {
+TEST(test_setpoint_changed_demand_moves_the_pair_forward) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 300, 300);
     iw_setpoint_demand(&setpoint, last_us + MS(2), IW_DEMAND_BRAKE);
     assert_only_due_from(last_us + IW_SETPOINT_SPACING_US);
@@ -252,7 +250,7 @@ static void test_setpoint_changed_demand_moves_the_pair_forward(void) {
     assert_only_due_from(last_us + MS(17));
 }
 
-static void test_setpoint_same_demand_again_moves_nothing(void) {
+TEST(test_setpoint_same_demand_again_moves_nothing) {
     static const iw_demand_t demands[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE, IW_DEMAND_FOLLOW};
     for (size_t i = 0; i < sizeof demands / sizeof demands[0]; i++) {
         setUp();
@@ -266,7 +264,7 @@ static void test_setpoint_same_demand_again_moves_nothing(void) {
     }
 }
 
-static void test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair(void) {
+TEST(test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair) {
     static const uint32_t after_us[] = {0, 1, 4999, 5000, 19999};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
         setUp();
@@ -278,7 +276,7 @@ static void test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair(voi
     }
 }
 
-static void test_setpoint_demand_silence_ends_everything_at_once(void) {
+TEST(test_setpoint_demand_silence_ends_everything_at_once) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 1000, 1000);
     iw_setpoint_demand(&setpoint, last_us + MS(1), IW_DEMAND_SILENCE);
     assert_silent(last_us + MS(1));
@@ -290,7 +288,7 @@ static void test_setpoint_demand_silence_ends_everything_at_once(void) {
     assert_silent(last_us + MS(3));
 }
 
-static void test_setpoint_after_silence_starts_from_zero_without_the_old_command(void) {
+TEST(test_setpoint_after_silence_starts_from_zero_without_the_old_command) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 1000, 1000);
     iw_setpoint_demand(&setpoint, last_us + MS(1), IW_DEMAND_SILENCE);
     iw_setpoint_demand(&setpoint, last_us + MS(300), IW_DEMAND_FOLLOW);
@@ -300,7 +298,7 @@ static void test_setpoint_after_silence_starts_from_zero_without_the_old_command
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
 }
 
-static void test_setpoint_first_pair_after_a_short_silence_is_due_at_once(void) {
+TEST(test_setpoint_first_pair_after_a_short_silence_is_due_at_once) {
     iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
     take_at(1000);
     iw_setpoint_demand(&setpoint, 2000, IW_DEMAND_SILENCE);
@@ -308,7 +306,7 @@ static void test_setpoint_first_pair_after_a_short_silence_is_due_at_once(void) 
     assert_only_due_from(3000);
 }
 
-static void test_setpoint_due_does_not_change_anything(void) {
+TEST(test_setpoint_due_does_not_change_anything) {
     cruise(FIXTURE_START_US, 400, 400);
     const iw_setpoint_t before = setpoint;
     (void)iw_setpoint_due(&setpoint, before.last_us + MS(500));
@@ -316,31 +314,4 @@ static void test_setpoint_due_does_not_change_anything(void) {
     (void)iw_setpoint_applied(&setpoint);
     (void)iw_setpoint_is_zero(&setpoint);
     TEST_ASSERT_EQUAL_MEMORY(&before, &setpoint, sizeof before);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_setpoint_after_init_is_silent);
-    RUN_TEST(test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun);
-    RUN_TEST(test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing);
-    RUN_TEST(test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows);
-    RUN_TEST(test_setpoint_any_demand_from_silence_is_due_at_once_with_zero);
-    RUN_TEST(test_setpoint_first_pair_taken_late_is_still_zero);
-    RUN_TEST(test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs);
-    RUN_TEST(test_setpoint_late_call_takes_one_pair_and_no_burst);
-    RUN_TEST(test_setpoint_pair_taken_late_still_keeps_spacing);
-    RUN_TEST(test_setpoint_changed_command_leaves_five_ms_after_the_last_pair);
-    RUN_TEST(test_setpoint_changed_command_later_than_spacing_leaves_at_once);
-    RUN_TEST(test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change);
-    RUN_TEST(test_setpoint_same_command_again_moves_nothing);
-    RUN_TEST(test_setpoint_command_storm_is_spaced_and_never_starves);
-    RUN_TEST(test_setpoint_gap_stays_within_a_period_whatever_is_commanded);
-    RUN_TEST(test_setpoint_changed_demand_moves_the_pair_forward);
-    RUN_TEST(test_setpoint_same_demand_again_moves_nothing);
-    RUN_TEST(test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair);
-    RUN_TEST(test_setpoint_demand_silence_ends_everything_at_once);
-    RUN_TEST(test_setpoint_after_silence_starts_from_zero_without_the_old_command);
-    RUN_TEST(test_setpoint_first_pair_after_a_short_silence_is_due_at_once);
-    RUN_TEST(test_setpoint_due_does_not_change_anything);
-    return UNITY_END();
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What zero is under either role of the current, how currents ramp, and what a collapse leaves.
 #include "setpoint_rig.h"
-#include "unity.h"
+#include "unit.h"
 #include <stdlib.h>
 
 static setpoint_rig_t rig;
@@ -10,9 +10,7 @@ void setUp(void) {
     setpoint_rig_init(&rig);
 }
 
-void tearDown(void) {}
-
-static void test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command(void) {
+TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command) {
     setpoint_rig_cruise(&rig, 1000, 500, 2000);
     rig.now_us += 1;
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
@@ -32,7 +30,7 @@ static void test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_comman
     TEST_ASSERT_TRUE(pair.wheel[IW_LEFT].speed_mm_s > 0);
 }
 
-static void test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero(void) {
+TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero) {
     setpoint_rig_cruise(&rig, 1000, 500, 2000);
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
     setpoint_rig_command(&rig, -700, 1000, 2000);
@@ -43,7 +41,7 @@ static void test_setpoint_command_right_after_a_collapse_does_not_replace_its_ze
     TEST_ASSERT_TRUE(setpoint_rig_take_next(&rig).wheel[IW_LEFT].speed_mm_s < 0);
 }
 
-static void test_setpoint_collapse_while_braking_leaves_no_tail(void) {
+TEST(test_setpoint_collapse_while_braking_leaves_no_tail) {
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);
     setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
     (void)setpoint_rig_take_next(&rig);
@@ -53,7 +51,7 @@ static void test_setpoint_collapse_while_braking_leaves_no_tail(void) {
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-static void test_setpoint_zero_with_a_limit_carries_the_maximum_current(void) {
+TEST(test_setpoint_zero_with_a_limit_carries_the_maximum_current) {
     rig.config.max_current_mA = 1500;
     setpoint_rig_begin(&rig);
     setpoint_rig_follow(&rig);
@@ -71,7 +69,7 @@ static void test_setpoint_zero_with_a_limit_carries_the_maximum_current(void) {
 }
 
 /// A wheel that loses its torque at once is a wheel that lets go.
-static void test_setpoint_limit_falls_by_80_mA_in_20_ms(void) {
+TEST(test_setpoint_limit_falls_by_80_mA_in_20_ms) {
     setpoint_rig_follow(&rig);
     const iw_pair_t target = {{{1000, 700}, {1000, 300}}};
     iw_setpoint_command(&rig.setpoint, rig.now_us, &target);
@@ -85,7 +83,7 @@ static void test_setpoint_limit_falls_by_80_mA_in_20_ms(void) {
     }
 }
 
-static void test_setpoint_limit_rises_with_the_next_pair(void) {
+TEST(test_setpoint_limit_rises_with_the_next_pair) {
     setpoint_rig_cruise(&rig, 1000, 1000, 300);
     TEST_ASSERT_EQUAL_INT(300, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
     setpoint_rig_command(&rig, 1000, 1000, 900);
@@ -97,14 +95,14 @@ static void test_setpoint_limit_rises_with_the_next_pair(void) {
     TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_RIGHT].current_mA);
 }
 
-static void test_setpoint_limit_of_a_long_gap_falls_to_its_target(void) {
+TEST(test_setpoint_limit_of_a_long_gap_falls_to_its_target) {
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 1000, 1000, 300);
     TEST_ASSERT_EQUAL_INT(300, setpoint_rig_take_after(&rig, MS(1000000)).wheel[IW_LEFT].current_mA);
 }
 
 /// A command that comes before the zero of a collapse does not take its torque.
-static void test_setpoint_zero_of_a_collapse_carries_the_maximum_current(void) {
+TEST(test_setpoint_zero_of_a_collapse_carries_the_maximum_current) {
     setpoint_rig_cruise(&rig, 1000, 1000, 300);
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
     setpoint_rig_command(&rig, 500, 500, 300);
@@ -114,7 +112,7 @@ static void test_setpoint_zero_of_a_collapse_carries_the_maximum_current(void) {
     TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_RIGHT].current_mA);
 }
 
-static void test_setpoint_zero_with_a_current_setpoint_carries_no_current(void) {
+TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_cruise(&rig, 500, -500, 1200);
     TEST_ASSERT_EQUAL_INT(1200, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].current_mA);
@@ -126,7 +124,7 @@ static void test_setpoint_zero_with_a_current_setpoint_carries_no_current(void) 
     }
 }
 
-static void test_setpoint_current_setpoint_scales_with_the_speed(void) {
+TEST(test_setpoint_current_setpoint_scales_with_the_speed) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 1000, -1000, 2000);
@@ -141,7 +139,7 @@ static void test_setpoint_current_setpoint_scales_with_the_speed(void) {
     }
 }
 
-static void test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current(void) {
+TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     rig.config.max_speed_mm_s = 10;
     rig.config.decel_mm_s2 = 20000;
@@ -151,7 +149,7 @@ static void test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-static void test_setpoint_current_without_speed_is_no_zero_and_stops_in_time(void) {
+TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 0, 0, 2000);
@@ -170,7 +168,7 @@ static void test_setpoint_current_without_speed_is_no_zero_and_stops_in_time(voi
     TEST_ASSERT_EQUAL_INT(0, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
 }
 
-static void test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain(void) {
+TEST(test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain) {
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -199,7 +197,7 @@ static void test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain(v
     }
 }
 
-static void test_setpoint_current_setpoint_changes_sign_through_zero(void) {
+TEST(test_setpoint_current_setpoint_changes_sign_through_zero) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_cruise(&rig, 500, 500, 1500);
     setpoint_rig_command(&rig, 500, 500, -1500);
@@ -211,23 +209,4 @@ static void test_setpoint_current_setpoint_changes_sign_through_zero(void) {
         before = current;
     }
     TEST_ASSERT_EQUAL_INT(-1500, before);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command);
-    RUN_TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero);
-    RUN_TEST(test_setpoint_collapse_while_braking_leaves_no_tail);
-    RUN_TEST(test_setpoint_zero_with_a_limit_carries_the_maximum_current);
-    RUN_TEST(test_setpoint_limit_falls_by_80_mA_in_20_ms);
-    RUN_TEST(test_setpoint_limit_rises_with_the_next_pair);
-    RUN_TEST(test_setpoint_limit_of_a_long_gap_falls_to_its_target);
-    RUN_TEST(test_setpoint_zero_of_a_collapse_carries_the_maximum_current);
-    RUN_TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current);
-    RUN_TEST(test_setpoint_current_setpoint_scales_with_the_speed);
-    RUN_TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current);
-    RUN_TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time);
-    RUN_TEST(test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain);
-    RUN_TEST(test_setpoint_current_setpoint_changes_sign_through_zero);
-    return UNITY_END();
 }

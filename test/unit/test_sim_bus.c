@@ -2,7 +2,7 @@
 // The simulated bus: time on the wire, arbitration, acknowledgement, adapters' queues.
 #include "iwheel_sim/sim_bus.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -16,8 +16,6 @@ void setUp(void) {
     memset(&bus, 0xA5, sizeof bus);
     sim_bus_init(&bus, START_US);
 }
-
-void tearDown(void) {}
 
 static iw_can_frame_t frame_of(uint32_t id, uint8_t dlc) {
     return (iw_can_frame_t){.id = id, .dlc = dlc};
@@ -40,7 +38,7 @@ static void submit(iw_time_us_t now_us, uint8_t port, uint32_t id) {
     TEST_ASSERT_TRUE(sim_bus_submit(&bus, now_us, port, &frame));
 }
 
-static void test_bus_frame_takes_its_bits(void) {
+TEST(test_bus_frame_takes_its_bits) {
     iw_can_frame_t frame = frame_of(256U, 8U);
     TEST_ASSERT_EQUAL_UINT32(120U, sim_bus_frame_bits(&frame));
     frame.dlc = 0U;
@@ -51,7 +49,7 @@ static void test_bus_frame_takes_its_bits(void) {
     TEST_ASSERT_EQUAL_UINT32(50U, sim_bus_frame_bits(&frame));
 }
 
-static void test_bus_delivers_at_the_end_of_the_frame_and_not_before(void) {
+TEST(test_bus_delivers_at_the_end_of_the_frame_and_not_before) {
     sim_delivery_t delivery;
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US + 10U, 0U, 256U);
@@ -64,7 +62,7 @@ static void test_bus_delivers_at_the_end_of_the_frame_and_not_before(void) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, sim_bus_next_us(&bus));
 }
 
-static void test_bus_lowest_id_wins_when_several_wait(void) {
+TEST(test_bus_lowest_id_wins_when_several_wait) {
     for (uint8_t port = 0U; port < 5U; port++) {
         sim_bus_open(&bus, port, 4U, false);
     }
@@ -81,7 +79,7 @@ static void test_bus_lowest_id_wins_when_several_wait(void) {
     expect_none(START_US + SECOND);
 }
 
-static void test_bus_frame_that_has_begun_is_not_displaced(void) {
+TEST(test_bus_frame_that_has_begun_is_not_displaced) {
     sim_bus_open(&bus, 0U, 4U, false);
     sim_bus_open(&bus, 1U, 4U, false);
     submit(START_US, 0U, 545U);
@@ -90,7 +88,7 @@ static void test_bus_frame_that_has_begun_is_not_displaced(void) {
     expect_next(START_US + SECOND, 256U, 1U);
 }
 
-static void test_bus_one_ports_frames_keep_their_order_whatever_their_ids(void) {
+TEST(test_bus_one_ports_frames_keep_their_order_whatever_their_ids) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 700U);
     submit(START_US, 0U, 1U);
@@ -98,7 +96,7 @@ static void test_bus_one_ports_frames_keep_their_order_whatever_their_ids(void) 
     expect_next(START_US + SECOND, 1U, 0U);
 }
 
-static void test_bus_full_queue_loses_the_newest_and_counts_it(void) {
+TEST(test_bus_full_queue_loses_the_newest_and_counts_it) {
     iw_can_frame_t const frame = frame_of(5U, 4U);
     sim_bus_open(&bus, 0U, 2U, true);
     submit(START_US, 0U, 1U);
@@ -111,7 +109,7 @@ static void test_bus_full_queue_loses_the_newest_and_counts_it(void) {
     expect_none(START_US + 2U * SECOND);
 }
 
-static void test_bus_queue_survives_going_round_many_times(void) {
+TEST(test_bus_queue_survives_going_round_many_times) {
     sim_bus_open(&bus, 0U, 3U, false);
     for (uint32_t i = 0U; i < 500U; i++) {
         submit(START_US + i * MS, 0U, i);
@@ -122,7 +120,7 @@ static void test_bus_queue_survives_going_round_many_times(void) {
     TEST_ASSERT_EQUAL_UINT32(1000U, bus.port[0].sent);
 }
 
-static void test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebody_comes(void) {
+TEST(test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebody_comes) {
     sim_delivery_t delivery;
     sim_bus_open(&bus, 0U, 4U, true);
     submit(START_US, 0U, 266U);
@@ -133,7 +131,7 @@ static void test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebod
     TEST_ASSERT_EQUAL_UINT64(START_US + 3600U * SECOND + 85U, delivery.end_us);
 }
 
-static void test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_later(void) {
+TEST(test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_later) {
     sim_bus_open(&bus, 0U, 4U, true);
     sim_bus_acknowledge(&bus, START_US, true);
     submit(START_US, 0U, 266U);
@@ -145,7 +143,7 @@ static void test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_lat
     expect_next(START_US + 2U * SECOND, 266U, 0U);
 }
 
-static void test_bus_stalled_takes_nothing_from_anybody_then_everything(void) {
+TEST(test_bus_stalled_takes_nothing_from_anybody_then_everything) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 256U);
     expect_none(START_US + 50U);
@@ -157,7 +155,7 @@ static void test_bus_stalled_takes_nothing_from_anybody_then_everything(void) {
     expect_next(START_US + 2U * SECOND, 257U, 0U);
 }
 
-static void test_bus_clear_forgets_queue_and_frame_being_sent(void) {
+TEST(test_bus_clear_forgets_queue_and_frame_being_sent) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 256U);
     submit(START_US, 0U, 257U);
@@ -166,20 +164,4 @@ static void test_bus_clear_forgets_queue_and_frame_being_sent(void) {
     expect_none(START_US + SECOND);
     submit(START_US + SECOND, 0U, 258U);
     expect_next(START_US + 2U * SECOND, 258U, 0U);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_bus_frame_takes_its_bits);
-    RUN_TEST(test_bus_delivers_at_the_end_of_the_frame_and_not_before);
-    RUN_TEST(test_bus_lowest_id_wins_when_several_wait);
-    RUN_TEST(test_bus_frame_that_has_begun_is_not_displaced);
-    RUN_TEST(test_bus_one_ports_frames_keep_their_order_whatever_their_ids);
-    RUN_TEST(test_bus_full_queue_loses_the_newest_and_counts_it);
-    RUN_TEST(test_bus_queue_survives_going_round_many_times);
-    RUN_TEST(test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebody_comes);
-    RUN_TEST(test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_later);
-    RUN_TEST(test_bus_stalled_takes_nothing_from_anybody_then_everything);
-    RUN_TEST(test_bus_clear_forgets_queue_and_frame_being_sent);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The running simulator, a child process, through its sockets: local bus, e-stop button, control. Takes a second.
 #include "simulator.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <linux/can.h>
 #include <linux/can/error.h>
@@ -128,7 +128,7 @@ static void send_setpoint(int fd) {
     TEST_ASSERT_EQUAL_INT(sizeof frame, send(fd, &frame, sizeof frame, MSG_NOSIGNAL));
 }
 
-static void test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo(void) {
+TEST(test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo) {
     struct can_frame frame;
     start();
     int const sender = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -142,7 +142,7 @@ static void test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo
     (void)close(other);
 }
 
-static void test_hub_reader_that_stalls_loses_frames_and_the_others_none(void) {
+TEST(test_hub_reader_that_stalls_loses_frames_and_the_others_none) {
     struct can_frame frame;
     start();
     int const stalled = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -157,7 +157,7 @@ static void test_hub_reader_that_stalls_loses_frames_and_the_others_none(void) {
     (void)close(reader);
 }
 
-static void test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody(void) {
+TEST(test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody) {
     struct can_frame frame;
     unsigned char junk[72] = {0x0AU, 0x01U};
     start();
@@ -172,7 +172,7 @@ static void test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody(void
     (void)close(fd);
 }
 
-static void test_hub_tells_bus_off_and_restart_and_is_silent_between(void) {
+TEST(test_hub_tells_bus_off_and_restart_and_is_silent_between) {
     struct can_frame frame;
     start();
     int const fd = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -186,7 +186,7 @@ static void test_hub_tells_bus_off_and_restart_and_is_silent_between(void) {
     (void)close(fd);
 }
 
-static void test_hub_late_client_is_told_that_it_is_bus_off(void) {
+TEST(test_hub_late_client_is_told_that_it_is_bus_off) {
     struct can_frame frame;
     start();
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("busoff on"));
@@ -196,7 +196,7 @@ static void test_hub_late_client_is_told_that_it_is_bus_off(void) {
     (void)close(fd);
 }
 
-static void test_hub_error_frame_of_a_client_reaches_the_others_only(void) {
+TEST(test_hub_error_frame_of_a_client_reaches_the_others_only) {
     struct can_frame const forged = {.can_id = CAN_ERR_FLAG | CAN_ERR_BUSOFF, .can_dlc = 8U};
     struct can_frame frame;
     start();
@@ -214,7 +214,7 @@ static void test_hub_error_frame_of_a_client_reaches_the_others_only(void) {
     (void)close(other);
 }
 
-static void test_hub_bus_down_closes_connections_until_it_is_up(void) {
+TEST(test_hub_bus_down_closes_connections_until_it_is_up) {
     struct can_frame frame;
     start();
     int fd = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -230,7 +230,7 @@ static void test_hub_bus_down_closes_connections_until_it_is_up(void) {
     (void)close(fd);
 }
 
-static void test_button_tells_its_state_on_connect_and_at_every_change(void) {
+TEST(test_button_tells_its_state_on_connect_and_at_every_change) {
     char state = '?';
     start();
     int const fd = open_socket(options.estop_path, SOCK_STREAM);
@@ -255,7 +255,7 @@ static void test_button_tells_its_state_on_connect_and_at_every_change(void) {
     (void)close(late);
 }
 
-static void test_control_takes_bytes_one_by_one_and_several_lines_at_once(void) {
+TEST(test_control_takes_bytes_one_by_one_and_several_lines_at_once) {
     char answer[64];
     start();
     int const fd = open_socket(options.control_path, SOCK_STREAM);
@@ -271,7 +271,7 @@ static void test_control_takes_bytes_one_by_one_and_several_lines_at_once(void) 
     (void)close(fd);
 }
 
-static void test_control_line_without_end_is_refused_and_closed(void) {
+TEST(test_control_line_without_end_is_refused_and_closed) {
     char flood[1000];
     char answer[128] = "";
     memset(flood, 'x', sizeof flood);
@@ -284,7 +284,7 @@ static void test_control_line_without_end_is_refused_and_closed(void) {
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
 }
 
-static void test_control_nul_in_a_line_is_refused(void) {
+TEST(test_control_nul_in_a_line_is_refused) {
     char answer[128] = "";
     start();
     int const fd = open_socket(options.control_path, SOCK_STREAM);
@@ -294,7 +294,7 @@ static void test_control_nul_in_a_line_is_refused(void) {
     (void)close(fd);
 }
 
-static void test_simulator_ends_cleanly_and_takes_its_sockets_away(void) {
+TEST(test_simulator_ends_cleanly_and_takes_its_sockets_away) {
     static const int signals[] = {SIGTERM, SIGINT};
     for (size_t i = 0U; i < 2U; i++) {
         start();
@@ -305,7 +305,7 @@ static void test_simulator_ends_cleanly_and_takes_its_sockets_away(void) {
     }
 }
 
-static void test_simulator_replaces_sockets_that_a_killed_one_left(void) {
+TEST(test_simulator_replaces_sockets_that_a_killed_one_left) {
     start();
     TEST_ASSERT_EQUAL_INT(-SIGKILL, end(SIGKILL));
     TEST_ASSERT_EQUAL_INT(0, access(options.can_path, F_OK));
@@ -313,7 +313,7 @@ static void test_simulator_replaces_sockets_that_a_killed_one_left(void) {
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
 }
 
-static void test_simulator_second_on_the_same_bus_refuses_and_leaves_the_first_alone(void) {
+TEST(test_simulator_second_on_the_same_bus_refuses_and_leaves_the_first_alone) {
     start();
     (void)freopen("/dev/null", "w", stderr);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, run_simulator());
@@ -321,7 +321,7 @@ static void test_simulator_second_on_the_same_bus_refuses_and_leaves_the_first_a
     (void)close(open_socket(options.can_path, SOCK_SEQPACKET));
 }
 
-static void test_simulator_refuses_to_replace_a_file_that_is_no_socket(void) {
+TEST(test_simulator_refuses_to_replace_a_file_that_is_no_socket) {
     FILE *const file = fopen(options.can_path, "w");
     TEST_ASSERT_NOT_NULL(file);
     (void)fclose(file);
@@ -331,24 +331,4 @@ static void test_simulator_refuses_to_replace_a_file_that_is_no_socket(void) {
     TEST_ASSERT_EQUAL_INT(0, lstat(options.can_path, &there));
     TEST_ASSERT_TRUE(S_ISREG(there.st_mode));
     TEST_ASSERT_NOT_EQUAL(0, access(options.control_path, F_OK));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo);
-    RUN_TEST(test_hub_reader_that_stalls_loses_frames_and_the_others_none);
-    RUN_TEST(test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody);
-    RUN_TEST(test_hub_tells_bus_off_and_restart_and_is_silent_between);
-    RUN_TEST(test_hub_late_client_is_told_that_it_is_bus_off);
-    RUN_TEST(test_hub_error_frame_of_a_client_reaches_the_others_only);
-    RUN_TEST(test_hub_bus_down_closes_connections_until_it_is_up);
-    RUN_TEST(test_button_tells_its_state_on_connect_and_at_every_change);
-    RUN_TEST(test_control_takes_bytes_one_by_one_and_several_lines_at_once);
-    RUN_TEST(test_control_line_without_end_is_refused_and_closed);
-    RUN_TEST(test_control_nul_in_a_line_is_refused);
-    RUN_TEST(test_simulator_ends_cleanly_and_takes_its_sockets_away);
-    RUN_TEST(test_simulator_replaces_sockets_that_a_killed_one_left);
-    RUN_TEST(test_simulator_second_on_the_same_bus_refuses_and_leaves_the_first_alone);
-    RUN_TEST(test_simulator_refuses_to_replace_a_file_that_is_no_socket);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "sim_ranges.h"
 #include "test_sim_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 
@@ -11,8 +11,6 @@ void setUp(void) {
     rig_init();
     rig_run(START_US, BOOTED);
 }
-
-void tearDown(void) {}
 
 static sim_motion_t *motion(iw_side_t side) {
     return &pair.wheel[side].motion;
@@ -25,14 +23,14 @@ static iw_time_us_t drive_for(int16_t left_mm_s, int16_t right_mm_s, uint32_t ms
     return BOOTED + ms * MS;
 }
 
-static void test_machine_wheel_with_droop_settles_below_its_setpoint(void) {
+TEST(test_machine_wheel_with_droop_settles_below_its_setpoint) {
     motion(IW_RIGHT)->droop_permille = 40U;
     (void)drive_for(1000, 1000, 2000U);
     TEST_ASSERT_INT32_WITHIN(1, 1000, sim_motion_true_mm_s(motion(IW_LEFT)));
     TEST_ASSERT_INT32_WITHIN(1, 960, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-static void test_machine_free_wheel_coasts_whatever_it_is_commanded(void) {
+TEST(test_machine_free_wheel_coasts_whatever_it_is_commanded) {
     iw_time_us_t const now_us = drive_for(1000, 1000, 2000U);
     motion(IW_RIGHT)->freewheels = true;
     rig_run(now_us, now_us + 500U * MS);
@@ -40,7 +38,7 @@ static void test_machine_free_wheel_coasts_whatever_it_is_commanded(void) {
     TEST_ASSERT_INT32_WITHIN(5, 650, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-static void test_machine_kerb_takes_its_share_and_ends_at_once(void) {
+TEST(test_machine_kerb_takes_its_share_and_ends_at_once) {
     iw_time_us_t const now_us = drive_for(1000, 1000, 2000U);
     int64_t const before_mm = sim_motion_true_mm(motion(IW_LEFT));
     motion(IW_LEFT)->kerb_permille = 500U;
@@ -52,7 +50,7 @@ static void test_machine_kerb_takes_its_share_and_ends_at_once(void) {
     TEST_ASSERT_INT32_WITHIN(1, 1000, sim_motion_true_mm_s(motion(IW_LEFT)));
 }
 
-static void test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel(void) {
+TEST(test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel) {
     motion(IW_LEFT)->slope_mm_s2 = 1500;
     motion(IW_RIGHT)->slope_mm_s2 = 1500;
     motion(IW_RIGHT)->freewheels = true;
@@ -61,19 +59,19 @@ static void test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel(void)
     TEST_ASSERT_INT32_WITHIN(10, 800, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-static void test_machine_slope_within_friction_rolls_nothing(void) {
+TEST(test_machine_slope_within_friction_rolls_nothing) {
     motion(IW_LEFT)->slope_mm_s2 = 690;
     rig_run(BOOTED, BOOTED + SECOND);
     TEST_ASSERT_EQUAL_INT32(0, motion(IW_LEFT)->speed_um_s);
 }
 
-static void test_machine_slope_steeper_than_the_torque_wins(void) {
+TEST(test_machine_slope_steeper_than_the_torque_wins) {
     motion(IW_LEFT)->slope_mm_s2 = -4500;
     (void)drive_for(500, 500, 500U);
     TEST_ASSERT_LESS_OR_EQUAL_INT32(0, motion(IW_LEFT)->speed_um_s);
 }
 
-static void test_machine_late_wheel_obeys_each_setpoint_later(void) {
+TEST(test_machine_late_wheel_obeys_each_setpoint_later) {
     pair.wheel[IW_RIGHT].late_us = 400U * MS;
     iw_time_us_t const now_us = drive_for(300, 300, 390U);
     TEST_ASSERT_GREATER_THAN_INT32(250, sim_motion_true_mm_s(motion(IW_LEFT)));
@@ -89,7 +87,7 @@ static void test_machine_late_wheel_obeys_each_setpoint_later(void) {
     TEST_ASSERT_EQUAL_INT32(0, motion(IW_RIGHT)->speed_um_s);
 }
 
-static void test_machine_late_wheel_that_reboots_forgets_what_it_had_received(void) {
+TEST(test_machine_late_wheel_that_reboots_forgets_what_it_had_received) {
     pair.wheel[IW_RIGHT].late_us = 400U * MS;
     iw_time_us_t const now_us = drive_for(300, 300, 300U);
     rig_let_go();
@@ -98,7 +96,7 @@ static void test_machine_late_wheel_that_reboots_forgets_what_it_had_received(vo
     TEST_ASSERT_EQUAL_UINT32(0U, motion(IW_RIGHT)->setpoints);
 }
 
-static void test_machine_late_wheel_holds_no_more_than_it_can(void) {
+TEST(test_machine_late_wheel_holds_no_more_than_it_can) {
     iw_codec_setpoint_t const setpoint = {100, 2000, 1U};
     pair.wheel[IW_LEFT].late_us = 400U * MS;
     for (uint32_t i = 0U; i < SIM_WHEEL_LATE_MAX + 10U; i++) {
@@ -119,7 +117,7 @@ static void speeds_after_60_ms(int16_t yaw_permille, int16_t left_mm_s, int16_t 
     out_mm_s[IW_RIGHT] = sim_motion_true_mm_s(motion(IW_RIGHT));
 }
 
-static void test_machine_yaw_inertia_slows_turning_and_not_going_straight(void) {
+TEST(test_machine_yaw_inertia_slows_turning_and_not_going_straight) {
     int32_t without[IW_SIDES];
     int32_t with[IW_SIDES];
     speeds_after_60_ms(0, 100, 100, without);
@@ -132,13 +130,13 @@ static void test_machine_yaw_inertia_slows_turning_and_not_going_straight(void) 
     TEST_ASSERT_GREATER_THAN_INT32(without[IW_LEFT] + 10, with[IW_LEFT]);
 }
 
-static void test_machine_yaw_inertia_moves_the_other_wheel_along(void) {
+TEST(test_machine_yaw_inertia_moves_the_other_wheel_along) {
     int32_t with[IW_SIDES];
     speeds_after_60_ms(300, 0, 500, with);
     TEST_ASSERT_GREATER_THAN_INT32(5, with[IW_LEFT]);
 }
 
-static void test_machine_cut_rpm_are_never_above_the_true_speed(void) {
+TEST(test_machine_cut_rpm_are_never_above_the_true_speed) {
     pair.wheel[IW_LEFT].truncates = true;
     pair.wheel[IW_RIGHT].truncates = true;
     iw_time_us_t now_us = drive_for(993, -993, 2000U); // 49.4 rpm.
@@ -155,7 +153,7 @@ static bool within(int64_t value, int64_t low, int64_t high) {
     return value >= low && value <= high;
 }
 
-static void test_ranges_machine_lies_within_and_reaches_both_ends(void) {
+TEST(test_ranges_machine_lies_within_and_reaches_both_ends) {
     sim_random_t random;
     uint32_t shortest_us = UINT32_MAX;
     uint32_t longest_us = 0U;
@@ -178,7 +176,7 @@ static void test_ranges_machine_lies_within_and_reaches_both_ends(void) {
     TEST_ASSERT_EQUAL_UINT32(SIM_RANGE_LAG_MAX_US, longest_us);
 }
 
-static void test_ranges_road_lies_within_and_slopes_both_wheels_alike(void) {
+TEST(test_ranges_road_lies_within_and_slopes_both_wheels_alike) {
     sim_random_t random;
     sim_random_init(&random, 2U);
     pair.pose.mirrored[IW_RIGHT] = true;
@@ -193,7 +191,7 @@ static void test_ranges_road_lies_within_and_slopes_both_wheels_alike(void) {
     }
 }
 
-static void test_ranges_kerb_is_under_one_wheel_and_ends_in_time(void) {
+TEST(test_ranges_kerb_is_under_one_wheel_and_ends_in_time) {
     sim_random_t random;
     sim_random_init(&random, 3U);
     for (unsigned i = 0U; i < 200U; i++) {
@@ -207,24 +205,4 @@ static void test_ranges_kerb_is_under_one_wheel_and_ends_in_time(void) {
         TEST_ASSERT_EQUAL_UINT16(0U, motion(IW_LEFT)->kerb_permille);
         TEST_ASSERT_EQUAL_UINT16(0U, motion(IW_RIGHT)->kerb_permille);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_machine_wheel_with_droop_settles_below_its_setpoint);
-    RUN_TEST(test_machine_free_wheel_coasts_whatever_it_is_commanded);
-    RUN_TEST(test_machine_kerb_takes_its_share_and_ends_at_once);
-    RUN_TEST(test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel);
-    RUN_TEST(test_machine_slope_within_friction_rolls_nothing);
-    RUN_TEST(test_machine_slope_steeper_than_the_torque_wins);
-    RUN_TEST(test_machine_late_wheel_obeys_each_setpoint_later);
-    RUN_TEST(test_machine_late_wheel_that_reboots_forgets_what_it_had_received);
-    RUN_TEST(test_machine_late_wheel_holds_no_more_than_it_can);
-    RUN_TEST(test_machine_yaw_inertia_slows_turning_and_not_going_straight);
-    RUN_TEST(test_machine_yaw_inertia_moves_the_other_wheel_along);
-    RUN_TEST(test_machine_cut_rpm_are_never_above_the_true_speed);
-    RUN_TEST(test_ranges_machine_lies_within_and_reaches_both_ends);
-    RUN_TEST(test_ranges_road_lies_within_and_slopes_both_wheels_alike);
-    RUN_TEST(test_ranges_kerb_is_under_one_wheel_and_ends_in_time);
-    return UNITY_END();
 }

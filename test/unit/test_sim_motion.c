@@ -3,7 +3,7 @@
 #include "iwheel_sim/motion.h"
 #include "iwheel_sim/trig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -18,8 +18,6 @@ void setUp(void) {
     memset(&motion, 0xA5, sizeof motion);
     sim_motion_init(&motion, &config, START_US);
 }
-
-void tearDown(void) {}
 
 static void restart(void) {
     sim_motion_init(&motion, &config, START_US);
@@ -40,7 +38,7 @@ static iw_time_us_t drive(iw_time_us_t from_us, uint32_t ms, int16_t speed_mm_s,
     return now_us;
 }
 
-static void test_random_same_seed_gives_same_numbers_and_another_seed_others(void) {
+TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others) {
     sim_random_t one;
     sim_random_t same;
     sim_random_t other;
@@ -56,7 +54,7 @@ static void test_random_same_seed_gives_same_numbers_and_another_seed_others(voi
     TEST_ASSERT_GREATER_THAN_UINT32(990U, differ);
 }
 
-static void test_random_noise_stays_within_and_reaches_its_amplitude_around_zero(void) {
+TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero) {
     sim_random_t random;
     int64_t sum = 0;
     int32_t low = 0;
@@ -75,7 +73,7 @@ static void test_random_noise_stays_within_and_reaches_its_amplitude_around_zero
     TEST_ASSERT_EQUAL_UINT32(0U, sim_random_below(&random, 0U));
 }
 
-static void test_trig_known_angles_give_known_values(void) {
+TEST(test_trig_known_angles_give_known_values) {
     static const struct {
         int64_t angle_nrad;
         int64_t sine_ppm;
@@ -99,14 +97,14 @@ static void test_trig_known_angles_give_known_values(void) {
     }
 }
 
-static void test_motion_told_nothing_stays_at_rest(void) {
+TEST(test_motion_told_nothing_stays_at_rest) {
     sim_motion_advance(&motion, START_US + 3600U * 1000000ULL);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
     TEST_ASSERT_EQUAL_INT64(0, motion.position_nm);
     TEST_ASSERT_FALSE(motion.driven);
 }
 
-static void test_motion_reaches_the_speed_it_is_told_without_overshoot(void) {
+TEST(test_motion_reaches_the_speed_it_is_told_without_overshoot) {
     iw_time_us_t now_us = START_US;
     for (; now_us < START_US + 1500U * MS; now_us += 20U * MS) {
         (void)tell(now_us, 500, 2000);
@@ -116,7 +114,7 @@ static void test_motion_reaches_the_speed_it_is_told_without_overshoot(void) {
     TEST_ASSERT_EQUAL_INT32(499, sim_motion_true_mm_s(&motion));
 }
 
-static void test_motion_acceleration_is_bound_by_the_current(void) {
+TEST(test_motion_acceleration_is_bound_by_the_current) {
     static const int16_t current_mA[] = {2000, 1000, -1000, 250};
     static const int32_t most_um_s[] = {400000, 200000, 200000, 50000};
     for (size_t i = 0U; i < 4U; i++) {
@@ -126,18 +124,18 @@ static void test_motion_acceleration_is_bound_by_the_current(void) {
     }
 }
 
-static void test_motion_current_beyond_the_range_gives_no_more_than_its_limit(void) {
+TEST(test_motion_current_beyond_the_range_gives_no_more_than_its_limit) {
     (void)drive(START_US, 100U, 5000, 32767);
     TEST_ASSERT_INT32_WITHIN(2000, 400000, motion.speed_um_s);
 }
 
-static void test_motion_limit_of_zero_current_lets_it_coast(void) {
+TEST(test_motion_limit_of_zero_current_lets_it_coast) {
     iw_time_us_t const now_us = drive(START_US, 1500U, 1000, 2000);
     (void)drive(now_us, 200U, 1000, 0);
     TEST_ASSERT_INT32_WITHIN(2000, 1000000 - 140000, motion.speed_um_s);
 }
 
-static void test_motion_setpoint_holds_until_one_second_and_not_longer(void) {
+TEST(test_motion_setpoint_holds_until_one_second_and_not_longer) {
     iw_time_us_t const last_us = drive(START_US, 1500U, 1000, 2000);
     TEST_ASSERT_TRUE(tell(last_us, 1000, 2000));
     sim_motion_advance(&motion, last_us + 999999U);
@@ -148,7 +146,7 @@ static void test_motion_setpoint_holds_until_one_second_and_not_longer(void) {
     TEST_ASSERT_INT32_WITHIN(500, 1000000, motion.speed_um_s);
 }
 
-static void test_motion_after_the_watchdog_coasts_to_rest(void) {
+TEST(test_motion_after_the_watchdog_coasts_to_rest) {
     iw_time_us_t const last_us = drive(START_US, 1500U, 700, 2000);
     sim_motion_advance(&motion, last_us + 980U * MS + 500U * MS);
     TEST_ASSERT_INT32_WITHIN(2000, 350000, motion.speed_um_s);
@@ -156,13 +154,13 @@ static void test_motion_after_the_watchdog_coasts_to_rest(void) {
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-static void test_motion_fresh_setpoint_after_the_watchdog_drives_again(void) {
+TEST(test_motion_fresh_setpoint_after_the_watchdog_drives_again) {
     iw_time_us_t const last_us = drive(START_US, 500U, 300, 2000);
     (void)drive(last_us + 3000U * MS, 500U, -300, 2000);
     TEST_ASSERT_INT32_WITHIN(1000, -300000, motion.speed_um_s);
 }
 
-static void test_motion_coasts_the_same_in_one_step_or_many(void) {
+TEST(test_motion_coasts_the_same_in_one_step_or_many) {
     sim_motion_t many;
     iw_time_us_t const last_us = drive(START_US, 500U, 800, 2000);
     many = motion;
@@ -174,14 +172,14 @@ static void test_motion_coasts_the_same_in_one_step_or_many(void) {
     TEST_ASSERT_INT64_WITHIN(2000000, motion.position_nm, many.position_nm);
 }
 
-static void test_motion_time_going_back_changes_nothing(void) {
+TEST(test_motion_time_going_back_changes_nothing) {
     (void)drive(START_US, 200U, 800, 2000);
     sim_motion_t const before = motion;
     sim_motion_advance(&motion, START_US);
     TEST_ASSERT_EQUAL_MEMORY(&before, &motion, sizeof motion);
 }
 
-static void test_motion_type_set_ignores_other_types(void) {
+TEST(test_motion_type_set_ignores_other_types) {
     config.accepted_type = 7;
     restart();
     iw_codec_setpoint_t setpoint = {500, 2000, 6U};
@@ -193,7 +191,7 @@ static void test_motion_type_set_ignores_other_types(void) {
     TEST_ASSERT_TRUE(motion.driven);
 }
 
-static void test_motion_current_as_setpoint_speed_zero_is_torque(void) {
+TEST(test_motion_current_as_setpoint_speed_zero_is_torque) {
     config.current_is_setpoint = true;
     restart();
     (void)drive(START_US, 200U, 0, 1000);
@@ -202,12 +200,12 @@ static void test_motion_current_as_setpoint_speed_zero_is_torque(void) {
     TEST_ASSERT_INT32_WITHIN(3000, -400000, motion.speed_um_s);
 }
 
-static void test_motion_current_as_limit_speed_zero_holds_still(void) {
+TEST(test_motion_current_as_limit_speed_zero_holds_still) {
     (void)drive(START_US, 200U, 0, 2000);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-static void test_motion_current_as_setpoint_zero_pair_comes_to_rest(void) {
+TEST(test_motion_current_as_setpoint_zero_pair_comes_to_rest) {
     config.current_is_setpoint = true;
     restart();
     iw_time_us_t const now_us = drive(START_US, 1000U, 300, 1000);
@@ -216,14 +214,14 @@ static void test_motion_current_as_setpoint_zero_pair_comes_to_rest(void) {
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-static void test_motion_zero_setpoint_brakes_to_an_exact_stop(void) {
+TEST(test_motion_zero_setpoint_brakes_to_an_exact_stop) {
     iw_time_us_t const now_us = drive(START_US, 1000U, 1000, 2000);
     (void)drive(now_us, 1000U, 0, 2000);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
     TEST_ASSERT_EQUAL_INT64(0, sim_motion_milli_rpm(&motion));
 }
 
-static void test_motion_blocked_stands_still_and_draws_current_until_unblocked(void) {
+TEST(test_motion_blocked_stands_still_and_draws_current_until_unblocked) {
     motion.blocked = true;
     iw_time_us_t const now_us = drive(START_US, 500U, 500, 1500);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
@@ -234,7 +232,7 @@ static void test_motion_blocked_stands_still_and_draws_current_until_unblocked(v
     TEST_ASSERT_INT32_WITHIN(1000, 500000, motion.speed_um_s);
 }
 
-static void test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven(void) {
+TEST(test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven) {
     motion.runaway_mm_s = 1000;
     iw_time_us_t now_us = drive(START_US, 1500U, -300, 2000);
     TEST_ASSERT_INT32_WITHIN(2000, -1300000, motion.speed_um_s);
@@ -244,13 +242,13 @@ static void test_motion_runaway_goes_faster_than_told_in_its_direction_while_dri
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-static void test_motion_one_metre_per_second_is_49_74_rpm(void) {
+TEST(test_motion_one_metre_per_second_is_49_74_rpm) {
     motion.speed_um_s = 1000000;
     TEST_ASSERT_INT64_WITHIN(2, 49736, sim_motion_milli_rpm(&motion));
     TEST_ASSERT_INT32_WITHIN(50, 1000000, sim_motion_um_s_of_milli_rpm(&motion.config, 49736));
 }
 
-static void test_motion_rpm_of_the_rotor_has_the_gear_in_it(void) {
+TEST(test_motion_rpm_of_the_rotor_has_the_gear_in_it) {
     config.gear_turns = 15U;
     config.gear_per = 2U;
     config.rpm_of_rotor = true;
@@ -260,7 +258,7 @@ static void test_motion_rpm_of_the_rotor_has_the_gear_in_it(void) {
     TEST_ASSERT_INT32_WITHIN(100, -1000000, sim_motion_um_s_of_milli_rpm(&motion.config, -373020));
 }
 
-static void test_motion_sixty_ticks_per_turn_both_ways(void) {
+TEST(test_motion_sixty_ticks_per_turn_both_ways) {
     iw_time_us_t now_us = drive(START_US, 4000U, 1000, 2000);
     int64_t const expected = motion.position_nm * 60 / 1206371579;
     TEST_ASSERT_GREATER_THAN_INT64(150, expected);
@@ -270,14 +268,14 @@ static void test_motion_sixty_ticks_per_turn_both_ways(void) {
     TEST_ASSERT_EQUAL_INT64(motion.position_nm * 60 / 1206371579 - 1, (int32_t)motion.ticks);
 }
 
-static void test_motion_ticks_count_rotor_turns(void) {
+TEST(test_motion_ticks_count_rotor_turns) {
     config.gear_turns = 20U;
     restart();
     (void)drive(START_US, 3000U, 500, 2000);
     TEST_ASSERT_EQUAL_INT64(motion.position_nm * 1200 / 1206371579, (int32_t)motion.ticks);
 }
 
-static void test_motion_swapped_sign_reports_the_opposite_of_what_it_does(void) {
+TEST(test_motion_swapped_sign_reports_the_opposite_of_what_it_does) {
     motion.swapped = true;
     (void)drive(START_US, 2000U, 500, 2000);
     TEST_ASSERT_GREATER_THAN_INT64(0, motion.position_nm);
@@ -285,7 +283,7 @@ static void test_motion_swapped_sign_reports_the_opposite_of_what_it_does(void) 
     TEST_ASSERT_LESS_THAN_INT32(-30, (int32_t)motion.ticks);
 }
 
-static void test_motion_larger_wheel_really_goes_faster(void) {
+TEST(test_motion_larger_wheel_really_goes_faster) {
     config.radius_mm = 384U;
     restart();
     (void)drive(START_US, 2000U, 500, 2000);
@@ -293,7 +291,7 @@ static void test_motion_larger_wheel_really_goes_faster(void) {
     TEST_ASSERT_INT64_WITHIN(1, motion.position_nm / 500000, sim_motion_true_mm(&motion));
 }
 
-static void test_motion_release_forgets_the_setpoint(void) {
+TEST(test_motion_release_forgets_the_setpoint) {
     iw_time_us_t const now_us = drive(START_US, 1000U, 500, 2000);
     sim_motion_release(&motion, now_us);
     TEST_ASSERT_FALSE(motion.driven);
@@ -302,14 +300,14 @@ static void test_motion_release_forgets_the_setpoint(void) {
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-static void test_motion_draws_more_while_it_accelerates(void) {
+TEST(test_motion_draws_more_while_it_accelerates) {
     (void)drive(START_US, 60U, 2000, 2000);
     TEST_ASSERT_UINT32_WITHIN(160U, 2000U, sim_motion_draw_mA(&motion));
     (void)drive(START_US + 60U * MS, 2000U, 500, 2000);
     TEST_ASSERT_EQUAL_UINT32(150U, sim_motion_draw_mA(&motion));
 }
 
-static void test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius(void) {
+TEST(test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius) {
     config.radius_mm = 160U;
     restart();
     sim_motion_push(&motion, START_US, 3000);
@@ -324,7 +322,7 @@ static void test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_r
     TEST_ASSERT_EQUAL_INT64(0, sim_motion_true_mm(&motion));
 }
 
-static void test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest(void) {
+TEST(test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest) {
     TEST_ASSERT_TRUE(tell(START_US, 500, 2000));
     sim_motion_push(&motion, START_US, -100);
     sim_motion_advance(&motion, START_US + 40U * MS);
@@ -334,46 +332,10 @@ static void test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest(void
 }
 
 /// 2^31 nm are 2.1 m.
-static void test_motion_way_of_many_metres_does_not_wrap(void) {
+TEST(test_motion_way_of_many_metres_does_not_wrap) {
     (void)drive(START_US, 20000U, 1000, 4000);
     TEST_ASSERT_GREATER_THAN_INT64(17000, sim_motion_true_mm(&motion));
     sim_motion_push(&motion, START_US + 30000U * MS, 5000);
     sim_motion_advance(&motion, START_US + 60000U * MS);
     TEST_ASSERT_GREATER_THAN_INT64(22000, sim_motion_true_mm(&motion));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_motion_way_of_many_metres_does_not_wrap);
-    RUN_TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others);
-    RUN_TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero);
-    RUN_TEST(test_trig_known_angles_give_known_values);
-    RUN_TEST(test_motion_told_nothing_stays_at_rest);
-    RUN_TEST(test_motion_reaches_the_speed_it_is_told_without_overshoot);
-    RUN_TEST(test_motion_acceleration_is_bound_by_the_current);
-    RUN_TEST(test_motion_current_beyond_the_range_gives_no_more_than_its_limit);
-    RUN_TEST(test_motion_limit_of_zero_current_lets_it_coast);
-    RUN_TEST(test_motion_setpoint_holds_until_one_second_and_not_longer);
-    RUN_TEST(test_motion_after_the_watchdog_coasts_to_rest);
-    RUN_TEST(test_motion_fresh_setpoint_after_the_watchdog_drives_again);
-    RUN_TEST(test_motion_coasts_the_same_in_one_step_or_many);
-    RUN_TEST(test_motion_time_going_back_changes_nothing);
-    RUN_TEST(test_motion_type_set_ignores_other_types);
-    RUN_TEST(test_motion_current_as_setpoint_speed_zero_is_torque);
-    RUN_TEST(test_motion_current_as_limit_speed_zero_holds_still);
-    RUN_TEST(test_motion_current_as_setpoint_zero_pair_comes_to_rest);
-    RUN_TEST(test_motion_zero_setpoint_brakes_to_an_exact_stop);
-    RUN_TEST(test_motion_blocked_stands_still_and_draws_current_until_unblocked);
-    RUN_TEST(test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven);
-    RUN_TEST(test_motion_one_metre_per_second_is_49_74_rpm);
-    RUN_TEST(test_motion_rpm_of_the_rotor_has_the_gear_in_it);
-    RUN_TEST(test_motion_sixty_ticks_per_turn_both_ways);
-    RUN_TEST(test_motion_ticks_count_rotor_turns);
-    RUN_TEST(test_motion_swapped_sign_reports_the_opposite_of_what_it_does);
-    RUN_TEST(test_motion_larger_wheel_really_goes_faster);
-    RUN_TEST(test_motion_release_forgets_the_setpoint);
-    RUN_TEST(test_motion_draws_more_while_it_accelerates);
-    RUN_TEST(test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius);
-    RUN_TEST(test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest);
-    return UNITY_END();
 }

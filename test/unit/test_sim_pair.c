@@ -2,7 +2,7 @@
 // The pair of simulated wheels: when which frame leaves; its life from power to reboot; determinism.
 #include "test_sim_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -10,9 +10,7 @@ void setUp(void) {
     rig_init();
 }
 
-void tearDown(void) {}
-
-static void test_pair_every_id_keeps_its_period_exactly_for_ten_seconds(void) {
+TEST(test_pair_every_id_keeps_its_period_exactly_for_ten_seconds) {
     static const struct {
         uint32_t id;
         uint32_t period_us;
@@ -29,7 +27,7 @@ static void test_pair_every_id_keeps_its_period_exactly_for_ten_seconds(void) {
     }
 }
 
-static void test_pair_sends_its_nine_ids_and_nothing_else(void) {
+TEST(test_pair_sends_its_nine_ids_and_nothing_else) {
     uint32_t total = 0U;
     uint32_t known = 0U;
     rig_run(START_US, START_US + 10U * SECOND);
@@ -44,7 +42,7 @@ static void test_pair_sends_its_nine_ids_and_nothing_else(void) {
     TEST_ASSERT_EQUAL_UINT32(known, total);
 }
 
-static void test_pair_is_silent_and_deaf_while_it_boots(void) {
+TEST(test_pair_is_silent_and_deaf_while_it_boots) {
     TEST_ASSERT_FALSE(sim_pair_acknowledges(&pair));
     rig_drive(500, 500);
     rig_run(START_US, START_US + 399U * MS);
@@ -56,7 +54,7 @@ static void test_pair_is_silent_and_deaf_while_it_boots(void) {
     TEST_ASSERT_TRUE(sim_pair_acknowledges(&pair));
 }
 
-static void test_pair_offset_frames_end_sixty_seconds_after_the_start(void) {
+TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start) {
     rig_run(START_US, START_US + 100U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[513].count);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[545].count);
@@ -65,7 +63,7 @@ static void test_pair_offset_frames_end_sixty_seconds_after_the_start(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(START_US + 400U * MS + 2U * SECOND, seen[513].first_us);
 }
 
-static void test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back(void) {
+TEST(test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back) {
     rig_drive(500, 500);
     rig_run(START_US, START_US + 70U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT32(1000, rig_last(257U).as.status.odometry_ticks);
@@ -82,7 +80,7 @@ static void test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offs
     TEST_ASSERT_EQUAL_UINT32(2U, pair.wheel[IW_LEFT].boots);
 }
 
-static void test_pair_without_power_is_silent_coasts_and_starts_anew(void) {
+TEST(test_pair_without_power_is_silent_coasts_and_starts_anew) {
     rig_drive(700, 700);
     rig_run(START_US, START_US + 3U * SECOND);
     sim_pair_power(&pair, START_US + 3U * SECOND, false);
@@ -99,7 +97,7 @@ static void test_pair_without_power_is_silent_coasts_and_starts_anew(void) {
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.speed_rpm);
 }
 
-static void test_pair_power_told_twice_changes_nothing(void) {
+TEST(test_pair_power_told_twice_changes_nothing) {
     rig_run(START_US, BOOTED);
     sim_pair_t const before = pair;
     sim_pair_power(&pair, BOOTED, true);
@@ -109,7 +107,7 @@ static void test_pair_power_told_twice_changes_nothing(void) {
     TEST_ASSERT_EQUAL_INT(SIM_WHEEL_OFF, pair.wheel[IW_LEFT].state);
 }
 
-static void test_pair_muted_wheel_is_silent_but_follows_and_acknowledges(void) {
+TEST(test_pair_muted_wheel_is_silent_but_follows_and_acknowledges) {
     pair.wheel[IW_LEFT].muted = true;
     rig_drive(500, 500);
     rig_run(START_US, START_US + 3U * SECOND);
@@ -121,7 +119,7 @@ static void test_pair_muted_wheel_is_silent_but_follows_and_acknowledges(void) {
     TEST_ASSERT_EQUAL_UINT32(250U, seen[256].count);
 }
 
-static void test_pair_that_is_old_already_sends_no_offset_but_knows_it(void) {
+TEST(test_pair_that_is_old_already_sends_no_offset_but_knows_it) {
     config.age_us = 61U * SECOND;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, START_US + 5U * SECOND);
@@ -130,14 +128,14 @@ static void test_pair_that_is_old_already_sends_no_offset_but_knows_it(void) {
     TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learnt_dN);
 }
 
-static void test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only(void) {
+TEST(test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only) {
     config.age_us = 30U * SECOND;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, START_US + 100U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(30U, seen[513].count);
 }
 
-static void test_pair_loss_swallows_its_share_of_telemetry_and_setpoints(void) {
+TEST(test_pair_loss_swallows_its_share_of_telemetry_and_setpoints) {
     rig_run(START_US, BOOTED);
     rig_forget();
     pair.wheel[IW_LEFT].loss_permille = 250U;
@@ -152,7 +150,7 @@ static void test_pair_loss_swallows_its_share_of_telemetry_and_setpoints(void) {
     TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count);
 }
 
-static void test_pair_slow_stretches_every_period_and_back(void) {
+TEST(test_pair_slow_stretches_every_period_and_back) {
     sim_wheel_slow(&pair.wheel[IW_LEFT], 2500U);
     rig_run(START_US, START_US + 3U * SECOND);
     rig_forget();
@@ -167,7 +165,7 @@ static void test_pair_slow_stretches_every_period_and_back(void) {
     TEST_ASSERT_UINT32_WITHIN(260U, 2500U, seen[256].count);
 }
 
-static void test_pair_ignores_frames_that_are_no_setpoint_of_the_table(void) {
+TEST(test_pair_ignores_frames_that_are_no_setpoint_of_the_table) {
     rig_run(START_US, BOOTED);
     sim_pair_t const before = pair;
     static const iw_can_frame_t strange[] = {
@@ -193,7 +191,7 @@ static void expect_same(const sim_sent_t *one, const sim_sent_t *other) {
     TEST_ASSERT_EQUAL_MEMORY(one->frame.data, other->frame.data, sizeof one->frame.data);
 }
 
-static void test_pair_same_seed_same_bytes_however_often_it_is_stepped(void) {
+TEST(test_pair_same_seed_same_bytes_however_often_it_is_stepped) {
     static sim_pair_t fine;
     iw_time_us_t fine_us = START_US;
     sim_sent_t one;
@@ -210,7 +208,7 @@ static void test_pair_same_seed_same_bytes_however_often_it_is_stepped(void) {
     TEST_ASSERT_GREATER_THAN_UINT32(12000U, frames);
 }
 
-static void test_pair_another_seed_gives_other_noise(void) {
+TEST(test_pair_another_seed_gives_other_noise) {
     static sim_pair_t other;
     sim_sent_t sent;
     uint32_t differ = 0U;
@@ -223,7 +221,7 @@ static void test_pair_another_seed_gives_other_noise(void) {
     TEST_ASSERT_GREATER_THAN_UINT32(50U, differ);
 }
 
-static void test_pair_null_configuration_is_the_default(void) {
+TEST(test_pair_null_configuration_is_the_default) {
     static sim_pair_t standard;
     sim_sent_t one;
     sim_sent_t other;
@@ -233,25 +231,4 @@ static void test_pair_null_configuration_is_the_default(void) {
         expect_same(&one, &other);
     }
     TEST_ASSERT_FALSE(sim_pair_step(&standard, START_US + 5U * SECOND, &other));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pair_every_id_keeps_its_period_exactly_for_ten_seconds);
-    RUN_TEST(test_pair_sends_its_nine_ids_and_nothing_else);
-    RUN_TEST(test_pair_is_silent_and_deaf_while_it_boots);
-    RUN_TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start);
-    RUN_TEST(test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back);
-    RUN_TEST(test_pair_without_power_is_silent_coasts_and_starts_anew);
-    RUN_TEST(test_pair_power_told_twice_changes_nothing);
-    RUN_TEST(test_pair_muted_wheel_is_silent_but_follows_and_acknowledges);
-    RUN_TEST(test_pair_that_is_old_already_sends_no_offset_but_knows_it);
-    RUN_TEST(test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only);
-    RUN_TEST(test_pair_loss_swallows_its_share_of_telemetry_and_setpoints);
-    RUN_TEST(test_pair_slow_stretches_every_period_and_back);
-    RUN_TEST(test_pair_ignores_frames_that_are_no_setpoint_of_the_table);
-    RUN_TEST(test_pair_same_seed_same_bytes_however_often_it_is_stepped);
-    RUN_TEST(test_pair_another_seed_gives_other_noise);
-    RUN_TEST(test_pair_null_configuration_is_the_default);
-    return UNITY_END();
 }

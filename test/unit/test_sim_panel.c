@@ -5,7 +5,7 @@
 
 #include "sim_texts.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -44,8 +44,6 @@ void setUp(void) {
     run_until(NOW_US);
 }
 
-void tearDown(void) {}
-
 static void expect_done(const char *line) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(SIM_CHANGED, sim_panel_execute(&panel, NOW_US, line), line);
     TEST_ASSERT_EQUAL_STRING("ok\n", panel.answer);
@@ -65,7 +63,7 @@ static sim_wheel_t *wheel(iw_side_t side) {
     return &world.pair.wheel[side];
 }
 
-static void test_panel_every_command_with_right_arguments_is_done(void) {
+TEST(test_panel_every_command_with_right_arguments_is_done) {
     static const char *const right[] = {
         "power off",
         "power on",
@@ -167,7 +165,7 @@ static void test_panel_every_command_with_right_arguments_is_done(void) {
     }
 }
 
-static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
+TEST(test_panel_wrong_commands_are_refused_and_change_nothing) {
     static const char *const wrong[] = {
         "",
         "   ",
@@ -310,7 +308,7 @@ static int32_t pushed_mm(iw_side_t side) {
     return (int32_t)(wheel(side)->motion.push_nm / 1000000);
 }
 
-static void test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense(void) {
+TEST(test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense) {
     expect_done("track 600");
     expect_done("turn 2");
     TEST_ASSERT_INT32_WITHIN(1, -3770, pushed_mm(IW_LEFT)); // 2 x pi x 600 mm
@@ -322,7 +320,7 @@ static void test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_i
     TEST_ASSERT_INT32_WITHIN(1, 1885, pushed_mm(IW_RIGHT));
 }
 
-static void test_panel_line_too_long_is_refused(void) {
+TEST(test_panel_line_too_long_is_refused) {
     char line[400];
     memset(line, 'x', sizeof line);
     line[sizeof line - 1U] = '\0';
@@ -332,20 +330,20 @@ static void test_panel_line_too_long_is_refused(void) {
     expect_refused(line);
 }
 
-static void test_panel_refusal_tells_the_usage(void) {
+TEST(test_panel_refusal_tells_the_usage) {
     expect_refused("load left");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "usage: load left|right|both NEWTON"));
     expect_refused("lod left 5");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "help"));
 }
 
-static void test_panel_reboot_without_power_is_refused_with_the_cure(void) {
+TEST(test_panel_reboot_without_power_is_refused_with_the_cure) {
     expect_done("power off");
     expect_refused("reboot left");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "power on"));
 }
 
-static void test_panel_help_lists_commands_and_ends_in_a_dot(void) {
+TEST(test_panel_help_lists_commands_and_ends_in_a_dot) {
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "help"));
     static const char *const name[] = {"power", "reboot", "load", "sign", "foreign", "estop", "status", "help"};
     for (size_t i = 0U; i < sizeof name / sizeof name[0]; i++) {
@@ -380,19 +378,19 @@ static unsigned all_lines(const char *list) {
 }
 
 /// The help of each is there once, and there is none of a command that is not.
-static void test_panel_lists_are_those_of_the_tables(void) {
+TEST(test_panel_lists_are_those_of_the_tables) {
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_wheel), expect_listed(sim_wheel_commands, sim_commands_wheel));
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_bus), expect_listed(sim_bus_commands, sim_commands_bus) + 1U);
     TEST_ASSERT_EQUAL_UINT(1U, lines_of(sim_commands_bus, "help"));
 }
 
-static void test_panel_usage_longer_than_its_column_is_told_whole(void) {
+TEST(test_panel_usage_longer_than_its_column_is_told_whole) {
     expect_refused("contact 1");
     TEST_ASSERT_EQUAL_STRING("error that is not right; usage: contact 1|2 press|release|pulse MS|unplug|plug\n",
                              panel.answer);
 }
 
-static void test_panel_status_is_one_line_that_tells_the_truth(void) {
+TEST(test_panel_status_is_one_line_that_tells_the_truth) {
     expect_done("load left 50");
     expect_done("power off");
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "status"));
@@ -403,7 +401,7 @@ static void test_panel_status_is_one_line_that_tells_the_truth(void) {
     TEST_ASSERT_EQUAL_PTR(&panel.answer[strlen(panel.answer) - 1U], strchr(panel.answer, '\n'));
 }
 
-static void test_panel_status_tells_the_last_setpoint_and_its_age(void) {
+TEST(test_panel_status_tells_the_last_setpoint_and_its_age) {
     expect_done("frame 10A#0101F407D0");
     run_until(NOW_US + 500000U);
     (void)sim_panel_execute(&panel, NOW_US + 500000U, "status");
@@ -411,14 +409,14 @@ static void test_panel_status_tells_the_last_setpoint_and_its_age(void) {
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint_age_ms\":499,\"driven\":true"));
 }
 
-static void test_panel_status_that_does_not_fit_is_cut_and_ended(void) {
+TEST(test_panel_status_that_does_not_fit_is_cut_and_ended) {
     char small[40];
     memset(small, 0x5A, sizeof small);
     TEST_ASSERT_EQUAL_size_t(sizeof small - 1U, sim_panel_status(&panel, NOW_US, small, sizeof small));
     TEST_ASSERT_EQUAL_CHAR('\0', small[sizeof small - 1U]);
 }
 
-static void test_panel_commands_reach_the_side_they_name(void) {
+TEST(test_panel_commands_reach_the_side_they_name) {
     expect_done("block left");
     expect_done("mute right");
     expect_done("sign both swapped");
@@ -432,14 +430,14 @@ static void test_panel_commands_reach_the_side_they_name(void) {
     TEST_ASSERT_EQUAL_INT32(12500, wheel(IW_RIGHT)->force.load_mN);
 }
 
-static void test_panel_mark_and_quit_reach_the_hooks(void) {
+TEST(test_panel_mark_and_quit_reach_the_hooks) {
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge looks here"));
     TEST_ASSERT_EQUAL_STRING("the judge looks here", marked);
     expect_done("quit");
     TEST_ASSERT_EQUAL_UINT(1U, quits);
 }
 
-static void test_words_frame_reads_what_candump_writes(void) {
+TEST(test_words_frame_reads_what_candump_writes) {
     iw_can_frame_t frame;
     TEST_ASSERT_TRUE(sim_words_frame("10a#DEADbeef", &frame));
     TEST_ASSERT_EQUAL_HEX32(0x10AU, frame.id);
@@ -452,7 +450,7 @@ static void test_words_frame_reads_what_candump_writes(void) {
     TEST_ASSERT_EQUAL_HEX32(0x7FFU | IW_CAN_REMOTE, frame.id);
 }
 
-static void test_each_contact_moves_alone_and_the_button_moves_both(void) {
+TEST(test_each_contact_moves_alone_and_the_button_moves_both) {
     static sim_button_t first;
     static sim_button_t second;
     first = (sim_button_t){.release_us = IW_NEVER};
@@ -483,25 +481,4 @@ static void test_each_contact_moves_alone_and_the_button_moves_both(void) {
     expect_done("estop release");
     expect_done("estop pulse 5");
     TEST_ASSERT_TRUE(first.release_us == NOW_US + 5000U && second.release_us == NOW_US + 5000U);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_panel_every_command_with_right_arguments_is_done);
-    RUN_TEST(test_panel_wrong_commands_are_refused_and_change_nothing);
-    RUN_TEST(test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense);
-    RUN_TEST(test_panel_line_too_long_is_refused);
-    RUN_TEST(test_panel_refusal_tells_the_usage);
-    RUN_TEST(test_panel_reboot_without_power_is_refused_with_the_cure);
-    RUN_TEST(test_panel_help_lists_commands_and_ends_in_a_dot);
-    RUN_TEST(test_panel_lists_are_those_of_the_tables);
-    RUN_TEST(test_panel_usage_longer_than_its_column_is_told_whole);
-    RUN_TEST(test_panel_status_is_one_line_that_tells_the_truth);
-    RUN_TEST(test_panel_status_tells_the_last_setpoint_and_its_age);
-    RUN_TEST(test_panel_status_that_does_not_fit_is_cut_and_ended);
-    RUN_TEST(test_panel_commands_reach_the_side_they_name);
-    RUN_TEST(test_panel_mark_and_quit_reach_the_hooks);
-    RUN_TEST(test_words_frame_reads_what_candump_writes);
-    RUN_TEST(test_each_contact_moves_alone_and_the_button_moves_both);
-    return UNITY_END();
 }

@@ -3,7 +3,7 @@
 #include "panel.h"
 #include "script.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -21,8 +21,6 @@ void setUp(void) {
     panel.world = &world;
     panel.hooks = (sim_hooks_t){.hub = NULL};
 }
-
-void tearDown(void) {}
 
 static const char *check(void *context, const char *command) {
     sim_panel_t *const to = context;
@@ -46,7 +44,7 @@ static void expect_step(iw_time_us_t at_us, const char *command) {
     TEST_ASSERT_EQUAL_STRING(command, sim_script_take(&script, at_us));
 }
 
-static void test_script_gives_each_command_at_its_time(void) {
+TEST(test_script_gives_each_command_at_its_time) {
     sim_script_fault_t fault;
     TEST_ASSERT_TRUE(load("# story\npower off\n\n  at 2.5 power on\nwait 1.0\nestop press\nwait 0.25 estop release\r\n"
                           "wait 5\n",
@@ -59,7 +57,7 @@ static void test_script_gives_each_command_at_its_time(void) {
     TEST_ASSERT_NULL(sim_script_take(&script, IW_NEVER - 1U));
 }
 
-static void test_script_faults_are_told_with_their_line(void) {
+TEST(test_script_faults_are_told_with_their_line) {
     static const struct {
         const char *text;
         unsigned line;
@@ -82,7 +80,7 @@ static void test_script_faults_are_told_with_their_line(void) {
     }
 }
 
-static void test_script_line_too_long_and_too_many_commands_are_refused(void) {
+TEST(test_script_line_too_long_and_too_many_commands_are_refused) {
     static char text[SIM_SCRIPT_STEPS * 10U + 20U];
     sim_script_fault_t fault;
     memset(text, 'x', 400U);
@@ -99,18 +97,9 @@ static void test_script_line_too_long_and_too_many_commands_are_refused(void) {
     TEST_ASSERT_EQUAL_UINT(SIM_SCRIPT_STEPS + 1U, fault.line);
 }
 
-static void test_script_missing_file_is_told(void) {
+TEST(test_script_missing_file_is_told) {
     sim_script_fault_t fault;
     TEST_ASSERT_FALSE(sim_script_load(&script, "/nonexistent/script", check, &panel, &fault));
     TEST_ASSERT_EQUAL_UINT(0U, fault.line);
     TEST_ASSERT_EQUAL_STRING("No such file or directory", fault.reason);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_script_gives_each_command_at_its_time);
-    RUN_TEST(test_script_faults_are_told_with_their_line);
-    RUN_TEST(test_script_line_too_long_and_too_many_commands_are_refused);
-    RUN_TEST(test_script_missing_file_is_told);
-    return UNITY_END();
 }

@@ -2,22 +2,18 @@
 // Which commands the simulator refuses when it is a node on a CAN interface.
 #include "sim_socketcan.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
-void setUp(void) {}
-
-void tearDown(void) {}
-
-static void test_commands_that_need_the_hub_are_refused_with_any_arguments(void) {
+TEST(test_commands_that_need_the_hub_are_refused_with_any_arguments) {
     static const char *const refused[] = {"ack off", "stall on", "busoff", "passive\ton", "bus down", "queue 4"};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         TEST_ASSERT_TRUE_MESSAGE(sim_socketcan_refuses(refused[i]), refused[i]);
     }
 }
 
-static void test_commands_of_the_wheels_and_other_nodes_are_not(void) {
+TEST(test_commands_of_the_wheels_and_other_nodes_are_not) {
     static const char *const allowed[] = {"power off",   "mute left", "foreign once", "frame 100#", "babble 1 100 on",
                                           "estop press", "status",    "normal",       "busy",       "",
                                           "acknowledge", "b"};
@@ -26,7 +22,7 @@ static void test_commands_of_the_wheels_and_other_nodes_are_not(void) {
     }
 }
 
-static void test_open_of_a_name_that_no_interface_can_have_tells_why(void) {
+TEST(test_open_of_a_name_that_no_interface_can_have_tells_why) {
     static sim_socketcan_t can;
     static sim_world_t world;
     static sim_loop_t loop;
@@ -34,12 +30,4 @@ static void test_open_of_a_name_that_no_interface_can_have_tells_why(void) {
     TEST_ASSERT_FALSE(sim_socketcan_open(&can, "an_interface_of_17", &loop, &world, &reason));
     TEST_ASSERT_NOT_NULL(strstr(reason.text, "an_interface_of_17"));
     TEST_ASSERT_NOT_NULL(strstr(reason.text, "unix:PATH"));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_commands_that_need_the_hub_are_refused_with_any_arguments);
-    RUN_TEST(test_commands_of_the_wheels_and_other_nodes_are_not);
-    RUN_TEST(test_open_of_a_name_that_no_interface_can_have_tells_why);
-    return UNITY_END();
 }

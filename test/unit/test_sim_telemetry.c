@@ -2,7 +2,7 @@
 // The pair of simulated wheels: what its frames say.
 #include "test_sim_rig.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -10,9 +10,7 @@ void setUp(void) {
     rig_init();
 }
 
-void tearDown(void) {}
-
-static void test_pair_learns_its_sensor_zero_when_nobody_presses(void) {
+TEST(test_pair_learns_its_sensor_zero_when_nobody_presses) {
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
     TEST_ASSERT_INT_WITHIN(1, 98, rig_last(545U).as.offset.offset_dN);
@@ -20,7 +18,7 @@ static void test_pair_learns_its_sensor_zero_when_nobody_presses(void) {
     TEST_ASSERT_INT_WITHIN(3, 98, rig_last(544U).as.force.force_raw);
 }
 
-static void test_pair_load_at_the_start_contaminates_the_offset(void) {
+TEST(test_pair_load_at_the_start_contaminates_the_offset) {
     pair.wheel[IW_RIGHT].force.load_mN = 200000;
     rig_run(START_US, START_US + 4U * SECOND);
     pair.wheel[IW_RIGHT].force.load_mN = 0;
@@ -30,7 +28,7 @@ static void test_pair_load_at_the_start_contaminates_the_offset(void) {
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
 }
 
-static void test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset(void) {
+TEST(test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset) {
     rig_run(START_US, START_US + 3U * SECOND);
     pair.wheel[IW_LEFT].force.load_mN = 100000;
     rig_run(START_US + 3U * SECOND, START_US + 8U * SECOND);
@@ -38,7 +36,7 @@ static void test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset
     TEST_ASSERT_INT_WITHIN(600, 1230 + 10000, rig_last(512U).as.force.force_raw);
 }
 
-static void test_pair_load_sways_by_five_percent_at_0_7_hertz(void) {
+TEST(test_pair_load_sways_by_five_percent_at_0_7_hertz) {
     int32_t low = INT32_MAX;
     int32_t high = INT32_MIN;
     unsigned rising = 0U;
@@ -59,7 +57,7 @@ static void test_pair_load_sways_by_five_percent_at_0_7_hertz(void) {
     TEST_ASSERT_UINT32_WITHIN(1U, 7U, rising);
 }
 
-static void test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN(void) {
+TEST(test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN) {
     pair.wheel[IW_LEFT].force.unit = IW_FORCE_DN;
     pair.wheel[IW_RIGHT].force.unit = IW_FORCE_CN;
     rig_run(START_US, START_US + 4U * SECOND);
@@ -69,14 +67,14 @@ static void test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN(
     TEST_ASSERT_INT_WITHIN(1, 98, rig_last(545U).as.offset.offset_dN);
 }
 
-static void test_pair_zero_removed_shows_nothing_at_rest_but_still_tells_its_offset(void) {
+TEST(test_pair_zero_removed_shows_nothing_at_rest_but_still_tells_its_offset) {
     pair.wheel[IW_LEFT].force.zero_removed = true;
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_INT_WITHIN(30, 0, rig_last(512U).as.force.force_raw);
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
 }
 
-static void test_pair_force_saturates_and_can_be_forced_to_any_raw_value(void) {
+TEST(test_pair_force_saturates_and_can_be_forced_to_any_raw_value) {
     pair.wheel[IW_LEFT].force.load_mN = 4000000;
     pair.wheel[IW_RIGHT].force.load_mN = -4000000;
     rig_run(START_US, START_US + 1U * SECOND);
@@ -87,7 +85,7 @@ static void test_pair_force_saturates_and_can_be_forced_to_any_raw_value(void) {
     TEST_ASSERT_EQUAL_INT(-32768, rig_last(512U).as.force.force_raw);
 }
 
-static void test_pair_speed_frames_tell_the_speed_without_bias(void) {
+TEST(test_pair_speed_frames_tell_the_speed_without_bias) {
     int64_t sum = 0;
     rig_drive(500, -300);
     rig_run(START_US, START_US + 3U * SECOND);
@@ -100,7 +98,7 @@ static void test_pair_speed_frames_tell_the_speed_without_bias(void) {
     TEST_ASSERT_INT64_WITHIN(100, 24868, sum);
 }
 
-static void test_pair_at_rest_tells_exactly_zero_rpm(void) {
+TEST(test_pair_at_rest_tells_exactly_zero_rpm) {
     rig_drive(0, 0);
     rig_run(START_US, START_US + 3U * SECOND);
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.speed_rpm);
@@ -108,7 +106,7 @@ static void test_pair_at_rest_tells_exactly_zero_rpm(void) {
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.acceleration_raw);
 }
 
-static void test_pair_swapped_sign_turns_rpm_and_ticks_around(void) {
+TEST(test_pair_swapped_sign_turns_rpm_and_ticks_around) {
     pair.wheel[IW_RIGHT].motion.swapped = true;
     rig_drive(500, 500);
     rig_run(START_US, START_US + 4U * SECOND);
@@ -118,7 +116,7 @@ static void test_pair_swapped_sign_turns_rpm_and_ticks_around(void) {
     TEST_ASSERT_LESS_THAN_INT32(-60, rig_last(289U).as.status.odometry_ticks);
 }
 
-static void test_pair_ticks_wrap_at_the_end_of_int32(void) {
+TEST(test_pair_ticks_wrap_at_the_end_of_int32) {
     rig_run(START_US, BOOTED);
     pair.wheel[IW_LEFT].motion.ticks = INT32_MAX;
     rig_drive(500, 500);
@@ -127,7 +125,7 @@ static void test_pair_ticks_wrap_at_the_end_of_int32(void) {
     TEST_ASSERT_GREATER_THAN_INT32(INT32_MIN + 20, rig_last(257U).as.status.odometry_ticks);
 }
 
-static void test_pair_straight_drive_ends_straight_ahead(void) {
+TEST(test_pair_straight_drive_ends_straight_ahead) {
     rig_run(START_US, BOOTED);
     rig_drive(500, 500);
     rig_run(BOOTED, START_US + 10U * SECOND);
@@ -139,7 +137,7 @@ static void test_pair_straight_drive_ends_straight_ahead(void) {
     TEST_ASSERT_EQUAL_INT(0, pose.z_mm);
 }
 
-static void test_pair_turn_on_the_spot_turns_by_way_over_track(void) {
+TEST(test_pair_turn_on_the_spot_turns_by_way_over_track) {
     rig_run(START_US, BOOTED);
     rig_drive(-200, 200);
     rig_run(BOOTED, START_US + 6U * SECOND);
@@ -150,21 +148,21 @@ static void test_pair_turn_on_the_spot_turns_by_way_over_track(void) {
     TEST_ASSERT_INT_WITHIN(15, 0, pose.y_mm);
 }
 
-static void test_pair_curve_to_the_left_has_positive_y_and_psi(void) {
+TEST(test_pair_curve_to_the_left_has_positive_y_and_psi) {
     rig_drive(250, 350);
     rig_run(START_US, START_US + 5U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT16(500, rig_last(290U).as.pose.y_mm);
     TEST_ASSERT_GREATER_THAN_INT16(600, rig_last(290U).as.pose.psi_mrad);
 }
 
-static void test_pair_pose_needs_the_left_wheel_on_the_bus(void) {
+TEST(test_pair_pose_needs_the_left_wheel_on_the_bus) {
     pair.wheel[IW_LEFT].muted = true;
     rig_drive(300, 300);
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT16(1500, rig_last(290U).as.pose.psi_mrad);
 }
 
-static void test_pair_mirrored_wheel_counts_the_other_way_in_the_pose(void) {
+TEST(test_pair_mirrored_wheel_counts_the_other_way_in_the_pose) {
     config.mirrored[IW_RIGHT] = true;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, BOOTED);
@@ -174,7 +172,7 @@ static void test_pair_mirrored_wheel_counts_the_other_way_in_the_pose(void) {
     TEST_ASSERT_INT_WITHIN(15, 0, rig_last(290U).as.pose.psi_mrad);
 }
 
-static void test_pair_pose_saturates_in_x_and_wraps_in_psi(void) {
+TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi) {
     rig_run(START_US, BOOTED);
     pair.pose.x_nm = INT64_C(40000000000);
     pair.pose.y_nm = INT64_C(-40000000000);
@@ -185,7 +183,7 @@ static void test_pair_pose_saturates_in_x_and_wraps_in_psi(void) {
     TEST_ASSERT_EQUAL_INT(33000 - 65536, rig_last(290U).as.pose.psi_mrad);
 }
 
-static void test_pair_battery_sags_under_load_and_temperature_rises(void) {
+TEST(test_pair_battery_sags_under_load_and_temperature_rises) {
     rig_run(START_US, START_US + 2U * SECOND);
     TEST_ASSERT_EQUAL_UINT8(248U, rig_last(257U).as.status.battery_dV);
     TEST_ASSERT_EQUAL_UINT8(28U, rig_last(257U).as.status.temperature_degC);
@@ -198,7 +196,7 @@ static void test_pair_battery_sags_under_load_and_temperature_rises(void) {
     TEST_ASSERT_UINT8_WITHIN(8U, 60U, rig_last(257U).as.status.temperature_degC);
 }
 
-static void test_pair_reboot_learns_the_offset_anew(void) {
+TEST(test_pair_reboot_learns_the_offset_anew) {
     rig_run(START_US, START_US + 4U * SECOND);
     pair.wheel[IW_LEFT].force.sensor_zero_mN = -50000;
     sim_pair_reboot(&pair, START_US + 4U * SECOND, IW_LEFT);
@@ -206,7 +204,7 @@ static void test_pair_reboot_learns_the_offset_anew(void) {
     TEST_ASSERT_INT_WITHIN(1, -500, rig_last(513U).as.offset.offset_dN);
 }
 
-static void test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample(void) {
+TEST(test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample) {
     pair.wheel[IW_LEFT].force.noise_mN = 0;
     rig_run(START_US, BOOTED + 900U * MS);
     pair.wheel[IW_LEFT].force.sensor_zero_mN = 52300;
@@ -214,7 +212,7 @@ static void test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample(
     TEST_ASSERT_INT_WITHIN(12, 323, rig_last(513U).as.offset.offset_dN);
 }
 
-static void test_pair_left_wheel_that_falls_silent_counts_as_standing_still(void) {
+TEST(test_pair_left_wheel_that_falls_silent_counts_as_standing_still) {
     rig_run(START_US, BOOTED);
     rig_drive(300, 300);
     rig_run(BOOTED, BOOTED + 2U * SECOND);
@@ -222,30 +220,4 @@ static void test_pair_left_wheel_that_falls_silent_counts_as_standing_still(void
     int16_t const before_mrad = rig_last(290U).as.pose.psi_mrad;
     rig_run(BOOTED + 2U * SECOND, BOOTED + 3U * SECOND);
     TEST_ASSERT_INT_WITHIN(40, 300 * 950 / 540, rig_last(290U).as.pose.psi_mrad - before_mrad);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_pair_learns_its_sensor_zero_when_nobody_presses);
-    RUN_TEST(test_pair_load_at_the_start_contaminates_the_offset);
-    RUN_TEST(test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset);
-    RUN_TEST(test_pair_load_sways_by_five_percent_at_0_7_hertz);
-    RUN_TEST(test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN);
-    RUN_TEST(test_pair_zero_removed_shows_nothing_at_rest_but_still_tells_its_offset);
-    RUN_TEST(test_pair_force_saturates_and_can_be_forced_to_any_raw_value);
-    RUN_TEST(test_pair_speed_frames_tell_the_speed_without_bias);
-    RUN_TEST(test_pair_at_rest_tells_exactly_zero_rpm);
-    RUN_TEST(test_pair_swapped_sign_turns_rpm_and_ticks_around);
-    RUN_TEST(test_pair_ticks_wrap_at_the_end_of_int32);
-    RUN_TEST(test_pair_straight_drive_ends_straight_ahead);
-    RUN_TEST(test_pair_turn_on_the_spot_turns_by_way_over_track);
-    RUN_TEST(test_pair_curve_to_the_left_has_positive_y_and_psi);
-    RUN_TEST(test_pair_pose_needs_the_left_wheel_on_the_bus);
-    RUN_TEST(test_pair_mirrored_wheel_counts_the_other_way_in_the_pose);
-    RUN_TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi);
-    RUN_TEST(test_pair_battery_sags_under_load_and_temperature_rises);
-    RUN_TEST(test_pair_reboot_learns_the_offset_anew);
-    RUN_TEST(test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample);
-    RUN_TEST(test_pair_left_wheel_that_falls_silent_counts_as_standing_still);
-    return UNITY_END();
 }

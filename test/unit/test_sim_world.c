@@ -3,7 +3,7 @@
 #include "iwheel_sim/world.h"
 
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -23,8 +23,6 @@ void setUp(void) {
     count = 0U;
     telemetry = 0U;
 }
-
-void tearDown(void) {}
 
 static iw_can_frame_t frame_of(uint32_t id, uint8_t dlc) {
     return (iw_can_frame_t){.id = id, .dlc = dlc};
@@ -67,7 +65,7 @@ static int16_t commanded_mm_s(uint32_t index) {
     return (int16_t)((history[index].frame.data[1] << 8) | history[index].frame.data[2]);
 }
 
-static void test_world_load_of_telemetry_alone_is_five_to_six_percent(void) {
+TEST(test_world_load_of_telemetry_alone_is_five_to_six_percent) {
     run_until(START_US + 10U * SECOND);
     uint64_t const before_us = world.bus.busy_us;
     telemetry = 0U;
@@ -91,7 +89,7 @@ static uint32_t sleep_until(iw_time_us_t until_us, iw_time_us_t (*wake_us)(const
     return wakes;
 }
 
-static void test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes(void) {
+TEST(test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes) {
     static sim_delivery_t every_step[HISTORY];
     uint32_t const wakes = sleep_until(START_US + 3U * SECOND, sim_world_next_us);
     uint32_t const told = count;
@@ -108,7 +106,7 @@ static void test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_w
     TEST_ASSERT_LESS_THAN_UINT32(wakes * 6U / 10U, fewer);
 }
 
-static void test_world_client_gets_its_frames_back_within_a_millisecond(void) {
+TEST(test_world_client_gets_its_frames_back_within_a_millisecond) {
     uint8_t const port = sim_world_connect(&world);
     (void)drive(port, START_US + SECOND, START_US + 2U * SECOND, 300);
     run_until(START_US + 2U * SECOND);
@@ -121,7 +119,7 @@ static void test_world_client_gets_its_frames_back_within_a_millisecond(void) {
     }
 }
 
-static void test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns(void) {
+TEST(test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns) {
     uint8_t const port = sim_world_connect(&world);
     iw_time_us_t now_us = drive(port, START_US + SECOND, START_US + 3U * SECOND, 1000);
     run_until(now_us);
@@ -144,7 +142,7 @@ static void test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_retur
     TEST_ASSERT_GREATER_THAN_UINT32(900U, world.dropped);
 }
 
-static void test_world_queue_of_one_keeps_only_the_controllers_frame(void) {
+TEST(test_world_queue_of_one_keeps_only_the_controllers_frame) {
     uint8_t const port = sim_world_connect(&world);
     sim_world_queue(&world, 1U);
     run_until(START_US + SECOND);
@@ -156,7 +154,7 @@ static void test_world_queue_of_one_keeps_only_the_controllers_frame(void) {
     TEST_ASSERT_EQUAL_HEX32(266U, history[0].frame.id);
 }
 
-static void test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge(void) {
+TEST(test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_reboot(&world, START_US + SECOND, IW_LEFT);
@@ -167,7 +165,7 @@ static void test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge(void)
     TEST_ASSERT_EQUAL_UINT32(5U, world.pair.wheel[IW_RIGHT].motion.setpoints);
 }
 
-static void test_world_ack_off_holds_clients_frames_while_telemetry_goes_on(void) {
+TEST(test_world_ack_off_holds_clients_frames_while_telemetry_goes_on) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_ack(&world, START_US + SECOND, false);
@@ -181,7 +179,7 @@ static void test_world_ack_off_holds_clients_frames_while_telemetry_goes_on(void
     TEST_ASSERT_EQUAL_UINT32(SIM_QUEUE_DEFAULT, count);
 }
 
-static void test_world_disconnected_client_takes_its_queue_along(void) {
+TEST(test_world_disconnected_client_takes_its_queue_along) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_power(&world, START_US + SECOND, false);
@@ -192,7 +190,7 @@ static void test_world_disconnected_client_takes_its_queue_along(void) {
     TEST_ASSERT_EQUAL_UINT32(0U, count);
 }
 
-static void test_world_has_room_for_so_many_clients_and_no_more(void) {
+TEST(test_world_has_room_for_so_many_clients_and_no_more) {
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         TEST_ASSERT_EQUAL_UINT8(SIM_PORT_CLIENT + i, sim_world_connect(&world));
     }
@@ -201,7 +199,7 @@ static void test_world_has_room_for_so_many_clients_and_no_more(void) {
     TEST_ASSERT_EQUAL_UINT8(SIM_PORT_CLIENT + 3U, sim_world_connect(&world));
 }
 
-static void test_world_bus_off_loses_what_clients_had_and_what_they_send(void) {
+TEST(test_world_bus_off_loses_what_clients_had_and_what_they_send) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_ack(&world, START_US + SECOND, false);
@@ -217,7 +215,7 @@ static void test_world_bus_off_loses_what_clients_had_and_what_they_send(void) {
     TEST_ASSERT_EQUAL_UINT32(2U, count);
 }
 
-static void test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obey(void) {
+TEST(test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obey) {
     run_until(START_US + SECOND);
     world.foreign.due_us = START_US + SECOND;
     world.foreign.setpoint.speed_mm_s = 400;
@@ -232,14 +230,14 @@ static void test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obe
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(2U, count);
 }
 
-static void test_world_foreign_once_is_one_pair(void) {
+TEST(test_world_foreign_once_is_one_pair) {
     run_until(START_US + SECOND);
     sim_world_foreign_once(&world, START_US + SECOND);
     run_until(START_US + 2U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(2U, count);
 }
 
-static void test_world_injected_frame_is_heard_as_it_is(void) {
+TEST(test_world_injected_frame_is_heard_as_it_is) {
     iw_can_frame_t frame = frame_of(0x12345U | IW_CAN_EXTENDED, 3U);
     frame.data[2] = 0x5AU;
     run_until(START_US + SECOND);
@@ -252,7 +250,7 @@ static void test_world_injected_frame_is_heard_as_it_is(void) {
     TEST_ASSERT_EQUAL_UINT8(SIM_PORT_INJECT, history[0].port);
 }
 
-static void test_world_babbling_low_id_fills_the_bus_and_starves_the_others(void) {
+TEST(test_world_babbling_low_id_fills_the_bus_and_starves_the_others) {
     run_until(START_US + SECOND);
     world.babble = (sim_babble_t){START_US + SECOND, 100U, frame_of(1U, 8U)};
     telemetry = 0U;
@@ -264,7 +262,7 @@ static void test_world_babbling_low_id_fills_the_bus_and_starves_the_others(void
     TEST_ASSERT_GREATER_THAN_UINT32(8U, telemetry);
 }
 
-static void test_world_babbling_high_id_delays_the_others_by_one_frame_only(void) {
+TEST(test_world_babbling_high_id_delays_the_others_by_one_frame_only) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     world.babble = (sim_babble_t){START_US + SECOND, 100U, frame_of(0x7FFU, 8U)};
@@ -303,7 +301,7 @@ static void plant_everything(void) {
     sim_world_ack(&world, START_US + SECOND, false);
 }
 
-static void test_world_heal_undoes_every_fault(void) {
+TEST(test_world_heal_undoes_every_fault) {
     run_until(START_US + SECOND);
     plant_everything();
     sim_world_heal(&world, START_US + SECOND);
@@ -346,31 +344,9 @@ static uint64_t fingerprint(uint64_t seed, iw_time_us_t stride_us) {
     return hash_until(hash, START_US + 5U * SECOND);
 }
 
-static void test_world_same_seed_and_times_give_the_same_bytes(void) {
+TEST(test_world_same_seed_and_times_give_the_same_bytes) {
     uint64_t const coarse = fingerprint(5U, 20U * MS);
     TEST_ASSERT_EQUAL_HEX64(coarse, fingerprint(5U, 20U * MS));
     TEST_ASSERT_EQUAL_HEX64(coarse, fingerprint(5U, 100U));
     TEST_ASSERT_NOT_EQUAL(coarse, fingerprint(6U, 20U * MS));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_world_load_of_telemetry_alone_is_five_to_six_percent);
-    RUN_TEST(test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes);
-    RUN_TEST(test_world_client_gets_its_frames_back_within_a_millisecond);
-    RUN_TEST(test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns);
-    RUN_TEST(test_world_queue_of_one_keeps_only_the_controllers_frame);
-    RUN_TEST(test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge);
-    RUN_TEST(test_world_ack_off_holds_clients_frames_while_telemetry_goes_on);
-    RUN_TEST(test_world_disconnected_client_takes_its_queue_along);
-    RUN_TEST(test_world_has_room_for_so_many_clients_and_no_more);
-    RUN_TEST(test_world_bus_off_loses_what_clients_had_and_what_they_send);
-    RUN_TEST(test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obey);
-    RUN_TEST(test_world_foreign_once_is_one_pair);
-    RUN_TEST(test_world_injected_frame_is_heard_as_it_is);
-    RUN_TEST(test_world_babbling_low_id_fills_the_bus_and_starves_the_others);
-    RUN_TEST(test_world_babbling_high_id_delays_the_others_by_one_frame_only);
-    RUN_TEST(test_world_heal_undoes_every_fault);
-    RUN_TEST(test_world_same_seed_and_times_give_the_same_bytes);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 // The one door for reading: what a snapshot shows is what the gateway's parts have, in every state, and nothing is left out.
 #include "gateway_rig.h"
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -140,7 +140,7 @@ static void put(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *as
     fake_bus_put(&rig.bus, &frame);
 }
 
-static void test_snapshot_no_field_is_missing_in_this_test(void) {
+TEST(test_snapshot_no_field_is_missing_in_this_test) {
     size_t end = 0;
     for (size_t i = 0; i < PLACES; i++) {
         TEST_ASSERT_TRUE_MESSAGE(places[i].offset >= end, places[i].name);
@@ -150,7 +150,7 @@ static void test_snapshot_no_field_is_missing_in_this_test(void) {
     TEST_ASSERT_TRUE(sizeof(iw_snapshot_t) - end < sizeof(iw_time_us_t));
 }
 
-static void test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus(void) {
+TEST(test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus) {
     const iw_snapshot_t seen = look();
     for (size_t side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].speed_us);
@@ -175,7 +175,7 @@ static void test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus
     }
 }
 
-static void test_snapshot_listening_shows_what_each_wheel_told_and_when(void) {
+TEST(test_snapshot_listening_shows_what_each_wheel_told_and_when) {
     const iw_codec_wheel_t force = {.force = {0, 200}};
     const iw_codec_wheel_t pose = {.pose = {1, 2, 3, 4}};
     rig.config.invert[IW_RIGHT] = true;
@@ -205,7 +205,7 @@ static void test_snapshot_listening_shows_what_each_wheel_told_and_when(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, seen.bus);
 }
 
-static void test_snapshot_heard_and_at_rest_are_those_of_the_look(void) {
+TEST(test_snapshot_heard_and_at_rest_are_those_of_the_look) {
     gateway_rig_run(&rig, MS(199));
     const iw_time_us_t rest_us = rig.gateway.wheel[IW_LEFT].rest_since_us + MS(rig.config.rest_ms);
     TEST_ASSERT_FALSE(look_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
@@ -215,7 +215,7 @@ static void test_snapshot_heard_and_at_rest_are_those_of_the_look(void) {
     TEST_ASSERT_FALSE(look_at(lost_us).wheel[IW_LEFT].heard);
 }
 
-static void test_snapshot_arming_shows_who_waits_and_since_when(void) {
+TEST(test_snapshot_arming_shows_who_waits_and_since_when) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.echo_delay_us = MS(20);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -231,7 +231,7 @@ static void test_snapshot_arming_shows_who_waits_and_since_when(void) {
     TEST_ASSERT_EQUAL_UINT64(0, seen.confirmed_us);
 }
 
-static void test_snapshot_confirmed_is_the_older_of_both_wheels(void) {
+TEST(test_snapshot_confirmed_is_the_older_of_both_wheels) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.echo_delay_us = MS(2);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -244,7 +244,7 @@ static void test_snapshot_confirmed_is_the_older_of_both_wheels(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, look().state);
 }
 
-static void test_snapshot_armed_shows_command_ramp_and_lease(void) {
+TEST(test_snapshot_armed_shows_command_ramp_and_lease) {
     gateway_rig_arm(&rig);
     const iw_snapshot_t armed = look();
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, armed.state);
@@ -265,7 +265,7 @@ static void test_snapshot_armed_shows_command_ramp_and_lease(void) {
     TEST_ASSERT_UINT32_WITHIN(1, seen.sent->pairs, seen.counters->echoes / 2U);
 }
 
-static void test_snapshot_braking_tells_the_stop_and_what_was_applied(void) {
+TEST(test_snapshot_braking_tells_the_stop_and_what_was_applied) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(400));
     gateway_rig_stop(&rig);
@@ -281,7 +281,7 @@ static void test_snapshot_braking_tells_the_stop_and_what_was_applied(void) {
     TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, seen.holder);
 }
 
-static void test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset(void) {
+TEST(test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset) {
     const uint32_t bit = 1U << IW_CAUSE_ESTOP_SOFTWARE;
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(400));
@@ -302,7 +302,7 @@ static void test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_res
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
 }
 
-static void test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew(void) {
+TEST(test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew) {
     rig.wheel[IW_RIGHT].ticks = 500;
     gateway_rig_run(&rig, MS(100));
     rig.wheel[IW_RIGHT].mute = true;
@@ -321,7 +321,7 @@ static void test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew
     TEST_ASSERT_TRUE(look().at_us - look().wheel[IW_RIGHT].status_us <= MS(1));
 }
 
-static void test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still(void) {
+TEST(test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still) {
     const iw_assumption_entry_t wrong = {IW_CONTRADICTED, IW_SOURCE_OPERATOR, 0};
     const uint32_t changes = look().assumed_changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &wrong);
@@ -334,7 +334,7 @@ static void test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, look().assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
-static void test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind(void) {
+TEST(test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind) {
     const iw_bus_facts_t facts = {false, true};
     iw_gateway_bus_facts(&rig.gateway, &facts);
     gateway_rig_run(&rig, MS(1100));
@@ -350,7 +350,7 @@ static void test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind(void
 }
 
 /// Counters that nothing ordinary moves, each with a value of its own.
-static void test_snapshot_every_count_of_sending_is_its_own(void) {
+TEST(test_snapshot_every_count_of_sending_is_its_own) {
     gateway_rig_arm(&rig);
     rig.gateway.sender.sent.later = 101;
     rig.gateway.sender.sent.clamped = 102;
@@ -374,22 +374,4 @@ static void test_snapshot_every_count_of_sending_is_its_own(void) {
     rig.gateway.rolling.is_fault = true;
     TEST_ASSERT_TRUE(look().rolling_fault);
     TEST_ASSERT_FALSE(look().rolling);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_snapshot_no_field_is_missing_in_this_test);
-    RUN_TEST(test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus);
-    RUN_TEST(test_snapshot_listening_shows_what_each_wheel_told_and_when);
-    RUN_TEST(test_snapshot_heard_and_at_rest_are_those_of_the_look);
-    RUN_TEST(test_snapshot_arming_shows_who_waits_and_since_when);
-    RUN_TEST(test_snapshot_confirmed_is_the_older_of_both_wheels);
-    RUN_TEST(test_snapshot_armed_shows_command_ramp_and_lease);
-    RUN_TEST(test_snapshot_braking_tells_the_stop_and_what_was_applied);
-    RUN_TEST(test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset);
-    RUN_TEST(test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew);
-    RUN_TEST(test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still);
-    RUN_TEST(test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind);
-    RUN_TEST(test_snapshot_every_count_of_sending_is_its_own);
-    return UNITY_END();
 }

@@ -5,7 +5,7 @@
 #include "token.h"
 #include "web_settings.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void add(const char *name, const char *json) {
     TEST_ASSERT_TRUE(web_feed_add(&feed, name, json, strlen(json), strcmp(name, "state") == 0));
 }
 
-static void test_reader_gets_events_in_order_and_then_the_state(void) {
+TEST(test_reader_gets_events_in_order_and_then_the_state) {
     add("state", "{\"a\":1}");
     add("stop", "{\"b\":2}");
     add("fault", "{\"c\":3}");
@@ -48,7 +48,7 @@ static void test_reader_gets_events_in_order_and_then_the_state(void) {
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
 }
 
-static void test_slow_reader_gets_the_newest_state_only(void) {
+TEST(test_slow_reader_gets_the_newest_state_only) {
     for (char i = '0'; i <= '9'; i++) {
         const char json[] = {'{', '"', i, '"', ':', i, '}', '\0'};
         add("state", json);
@@ -57,7 +57,7 @@ static void test_slow_reader_gets_the_newest_state_only(void) {
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest(void) {
+TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest) {
     add("state", "{\"a\":1}");
     TEST_ASSERT_EQUAL_STRING("event", take(5));
     add("state", "{\"a\":2}");
@@ -66,7 +66,7 @@ static void test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newes
     TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", take(1000));
 }
 
-static void test_reader_that_falls_behind_is_told_how_many_it_missed(void) {
+TEST(test_reader_that_falls_behind_is_told_how_many_it_missed) {
     for (unsigned i = 0; i < WEB_FEED_KEPT + 7U; i++) {
         add("bus", "{}");
     }
@@ -77,7 +77,7 @@ static void test_reader_that_falls_behind_is_told_how_many_it_missed(void) {
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_new_reader_begins_with_the_newest_state_and_no_old_event(void) {
+TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event) {
     add("stop", "{}");
     add("state", "{\"a\":1}");
     web_reader_begin(&reader, &feed);
@@ -85,7 +85,7 @@ static void test_new_reader_begins_with_the_newest_state_and_no_old_event(void) 
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-static void test_state_that_is_forgotten_is_told_to_nobody(void) {
+TEST(test_state_that_is_forgotten_is_told_to_nobody) {
     add("state", "{\"a\":1}");
     web_feed_forget(&feed);
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
@@ -107,7 +107,7 @@ static char *metrics_of(const char *json) {
     return text;
 }
 
-static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
+TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown) {
     char *text = metrics_of("{\"state\":\"armed\",\"left\":{\"heard\":true,\"speed_mm_s\":-1234,\"battery_dV\":251,"
                             "\"temperature_degC\":null},"
                             "\"right\":{\"heard\":false,\"speed_mm_s\":null},\"counters\":{\"pairs\":7},"
@@ -135,7 +135,7 @@ static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
     free(text);
 }
 
-static void test_metrics_without_a_gateway_say_so_and_nothing_of_wheels(void) {
+TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels) {
     char *text = metrics_of(NULL);
     TEST_ASSERT_NOT_NULL(strstr(text, "\niwheel_up 0\n"));
     TEST_ASSERT_NULL(strstr(text, "iwheel_wheel"));
@@ -153,7 +153,7 @@ static void expect_line(const char *line) {
     free(text);
 }
 
-static void test_metrics_count_stops_by_cause_once_and_from_the_connection(void) {
+TEST(test_metrics_count_stops_by_cause_once_and_from_the_connection) {
     memset(&tally, 0, sizeof tally);
     expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 0\n");
     stopped("{\"number\":4,\"cause\":\"overspeed\",\"at_us\":9,\"wall_us\":1760000000000007}", false);
@@ -169,7 +169,7 @@ static void test_metrics_count_stops_by_cause_once_and_from_the_connection(void)
     expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
 }
 
-static void test_metrics_count_on_when_the_gateway_begins_anew(void) {
+TEST(test_metrics_count_on_when_the_gateway_begins_anew) {
     memset(&tally, 0, sizeof tally);
     stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
     expect_line("\niwheel_last_stop_number 0\n");
@@ -182,7 +182,7 @@ static void test_metrics_count_on_when_the_gateway_begins_anew(void) {
     expect_line("\niwheel_last_stop_number 2\n");
 }
 
-static void test_metrics_name_the_version(void) {
+TEST(test_metrics_name_the_version) {
     expect_line("\niwheel_build_info{version=\"" IWHEEL_VERSION "\"} 1\n");
 }
 
@@ -200,7 +200,7 @@ static int read_settings(const char *text, web_settings_t *settings) {
     return result;
 }
 
-static void test_settings_that_are_wrong_are_told_with_line_and_cure(void) {
+TEST(test_settings_that_are_wrong_are_told_with_line_and_cure) {
     static const char *const cases[][2] = {
         {"[web]\nport = 0", "f:2: "},
         {"[web]\nlisten = walker\n", "f:2: listen = walker is no address"},
@@ -219,7 +219,7 @@ static void test_settings_that_are_wrong_are_told_with_line_and_cure(void) {
     }
 }
 
-static void test_settings_that_leave_the_machine_are_taken_with_tls(void) {
+TEST(test_settings_that_leave_the_machine_are_taken_with_tls) {
     web_settings_t settings;
     TEST_ASSERT_EQUAL_INT(
         0, read_settings("[web]\nlisten = 0.0.0.0\ncertificate = /a\nkey = /b\nhosts = a b\n", &settings));
@@ -252,7 +252,7 @@ static void end_token(void) {
     (void)fclose(silent);
 }
 
-static void test_token_is_made_for_the_bridge_alone_and_stays(void) {
+TEST(test_token_is_made_for_the_bridge_alone_and_stays) {
     web_token_t token;
     web_token_t other;
     struct stat status;
@@ -271,7 +271,7 @@ static void test_token_is_made_for_the_bridge_alone_and_stays(void) {
     end_token();
 }
 
-static void test_token_that_is_deleted_or_over_is_replaced(void) {
+TEST(test_token_that_is_deleted_or_over_is_replaced) {
     web_token_t token;
     char before[WEB_TOKEN_SIZE];
     bool changed = false;
@@ -289,7 +289,7 @@ static void test_token_that_is_deleted_or_over_is_replaced(void) {
     end_token();
 }
 
-static void test_token_that_others_can_read_is_refused(void) {
+TEST(test_token_that_others_can_read_is_refused) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 0);
@@ -299,7 +299,7 @@ static void test_token_that_others_can_read_is_refused(void) {
     end_token();
 }
 
-static void test_token_that_is_only_read_is_never_made(void) {
+TEST(test_token_that_is_only_read_is_never_made) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 1);
@@ -314,26 +314,4 @@ static void test_token_that_is_only_read_is_never_made(void) {
     TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
     TEST_ASSERT_FALSE(changed);
     end_token();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_reader_gets_events_in_order_and_then_the_state);
-    RUN_TEST(test_slow_reader_gets_the_newest_state_only);
-    RUN_TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest);
-    RUN_TEST(test_reader_that_falls_behind_is_told_how_many_it_missed);
-    RUN_TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event);
-    RUN_TEST(test_state_that_is_forgotten_is_told_to_nobody);
-    RUN_TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown);
-    RUN_TEST(test_metrics_count_stops_by_cause_once_and_from_the_connection);
-    RUN_TEST(test_metrics_count_on_when_the_gateway_begins_anew);
-    RUN_TEST(test_metrics_name_the_version);
-    RUN_TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels);
-    RUN_TEST(test_settings_that_are_wrong_are_told_with_line_and_cure);
-    RUN_TEST(test_settings_that_leave_the_machine_are_taken_with_tls);
-    RUN_TEST(test_token_is_made_for_the_bridge_alone_and_stays);
-    RUN_TEST(test_token_that_is_deleted_or_over_is_replaced);
-    RUN_TEST(test_token_that_others_can_read_is_refused);
-    RUN_TEST(test_token_that_is_only_read_is_never_made);
-    return UNITY_END();
 }

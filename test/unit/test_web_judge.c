@@ -3,7 +3,7 @@
 #include "driver.h"
 #include "web_judge.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <string.h>
 
@@ -15,8 +15,6 @@ void setUp(void) {
     asked = (web_asked_t){.method = "GET", .path = "/api/status", .host = "127.0.0.1:8470", .proof = WEB_PROOF_FULL};
 }
 
-void tearDown(void) {}
-
 static unsigned status(void) {
     const web_verdict_t verdict = web_judge(&rules, &asked);
     TEST_ASSERT_EQUAL(verdict.status == 200, verdict.route != NULL);
@@ -24,12 +22,12 @@ static unsigned status(void) {
     return verdict.status;
 }
 
-static void test_request_with_token_to_an_address_is_taken(void) {
+TEST(test_request_with_token_to_an_address_is_taken) {
     TEST_ASSERT_EQUAL_UINT(200, status());
     TEST_ASSERT_EQUAL(WEB_STATUS, web_judge(&rules, &asked).route->verb);
 }
 
-static void test_host_of_another_name_is_refused(void) {
+TEST(test_host_of_another_name_is_refused) {
     static const char *const ours[] = {"localhost",        "LOCALHOST:1", "walker.lan", "other:8470",
                                        "192.168.1.7:8470", "[::1]:8470",  "[fe80::1]"};
     static const char *const others[] = {"evil.example",
@@ -57,7 +55,7 @@ static void test_host_of_another_name_is_refused(void) {
     TEST_ASSERT_EQUAL_UINT(421, status());
 }
 
-static void test_origin_of_another_site_is_refused(void) {
+TEST(test_origin_of_another_site_is_refused) {
     static const char *const others[] = {"http://evil.example",   "null",
                                          "http://127.0.0.1:8471", "127.0.0.1:8470",
                                          "file://127.0.0.1:8470", "http://127.0.0.1:8470/"};
@@ -71,7 +69,7 @@ static void test_origin_of_another_site_is_refused(void) {
     }
 }
 
-static void test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not(void) {
+TEST(test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not) {
     asked.site = "cross-site";
     TEST_ASSERT_EQUAL_UINT(403, status());
     asked.site = "same-site";
@@ -85,7 +83,7 @@ static void test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link
     TEST_ASSERT_EQUAL_UINT(403, status());
 }
 
-static void test_request_without_proof_is_refused(void) {
+TEST(test_request_without_proof_is_refused) {
     static const web_proof_t wrong[] = {WEB_PROOF_NONE, WEB_PROOF_WRONG, WEB_PROOF_OVER};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         asked.proof = wrong[i];
@@ -106,7 +104,7 @@ static void test_request_without_proof_is_refused(void) {
     }
 }
 
-static void test_secret_for_reading_only_reads(void) {
+TEST(test_secret_for_reading_only_reads) {
     static const char *const commands[] = {"/api/estop", "/api/arm", "/api/drive", "/api/reset"};
     rules.may_drive = true;
     rules.may_reset = true;
@@ -119,7 +117,7 @@ static void test_secret_for_reading_only_reads(void) {
     }
 }
 
-static void test_stop_never_needs_a_proof(void) {
+TEST(test_stop_never_needs_a_proof) {
     asked.method = "POST";
     asked.path = "/api/stop";
     for (int proof = WEB_PROOF_NONE; proof <= WEB_PROOF_FULL; proof++) {
@@ -133,14 +131,14 @@ static void test_stop_never_needs_a_proof(void) {
     TEST_ASSERT_EQUAL_UINT(421, status());
 }
 
-static void test_header_that_is_there_twice_is_refused(void) {
+TEST(test_header_that_is_there_twice_is_refused) {
     asked.is_doubled = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
     asked.has_body = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
 }
 
-static void test_unknown_path_and_other_method_are_refused(void) {
+TEST(test_unknown_path_and_other_method_are_refused) {
     static const char *const nowhere[] = {"/api", "/api/status/", "/../etc/passwd",   "/%2e%2e/token", "//",
                                           "",     "/index.html",  "/uPlot.LICENSE/.."};
     for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++) {
@@ -155,7 +153,7 @@ static void test_unknown_path_and_other_method_are_refused(void) {
     TEST_ASSERT_EQUAL_UINT(413, status());
 }
 
-static void test_driving_and_reset_are_refused_unless_configured(void) {
+TEST(test_driving_and_reset_are_refused_unless_configured) {
     asked.method = "POST";
     asked.path = "/api/arm";
     TEST_ASSERT_EQUAL_UINT(403, status());
@@ -169,7 +167,7 @@ static void test_driving_and_reset_are_refused_unless_configured(void) {
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
-static void test_stop_and_estop_are_always_taken(void) {
+TEST(test_stop_and_estop_are_always_taken) {
     asked.method = "POST";
     asked.path = "/api/stop";
     TEST_ASSERT_EQUAL_UINT(200, status());
@@ -177,7 +175,7 @@ static void test_stop_and_estop_are_always_taken(void) {
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
-static void test_number_with_anything_beside_its_digits_is_refused(void) {
+TEST(test_number_with_anything_beside_its_digits_is_refused) {
     static const char *const wrong[] = {NULL,   "",   "-", "+1", " 1", "1 ", "1.0", "0x1", "1e2", "9223372036854775808",
                                         "-101", "101"};
     int64_t value = 7;
@@ -189,7 +187,7 @@ static void test_number_with_anything_beside_its_digits_is_refused(void) {
     TEST_ASSERT_EQUAL_INT64(-100, value);
 }
 
-static void test_name_of_a_recording_with_a_path_in_it_is_refused(void) {
+TEST(test_name_of_a_recording_with_a_path_in_it_is_refused) {
     static const char *const wrong[] = {
         NULL,      "",
         ".log",    "a",
@@ -227,7 +225,7 @@ static void begin(void) {
     web_driver_begin(&driver, NOW);
 }
 
-static void test_drive_command_of_the_page_that_armed_is_taken_once(void) {
+TEST(test_drive_command_of_the_page_that_armed_is_taken_once) {
     begin();
     TEST_ASSERT_NULL(take(NOW));
     TEST_ASSERT_NOT_NULL(take(NOW)); // The same again.
@@ -238,7 +236,7 @@ static void test_drive_command_of_the_page_that_armed_is_taken_once(void) {
     TEST_ASSERT_EQUAL_UINT64(2, driver.dropped);
 }
 
-static void test_drive_command_that_is_late_or_from_the_future_is_dropped(void) {
+TEST(test_drive_command_that_is_late_or_from_the_future_is_dropped) {
     begin();
     TEST_ASSERT_NOT_NULL(strstr(take(4900000U + 300001U), "too old"));
     TEST_ASSERT_NOT_NULL(strstr(take(4900000U - WEB_AHEAD_US - 1U), "future"));
@@ -248,7 +246,7 @@ static void test_drive_command_that_is_late_or_from_the_future_is_dropped(void) 
     TEST_ASSERT_NULL(take(4900000U - WEB_AHEAD_US));
 }
 
-static void test_drive_command_of_another_page_is_dropped(void) {
+TEST(test_drive_command_of_another_page_is_dropped) {
     begin();
     command.is_holders = false;
     TEST_ASSERT_NOT_NULL(take(NOW));
@@ -257,7 +255,7 @@ static void test_drive_command_of_another_page_is_dropped(void) {
     TEST_ASSERT_NOT_NULL(take(NOW));
 }
 
-static void test_command_that_turns_a_wheel_is_noticed_beyond_limits_too(void) {
+TEST(test_command_that_turns_a_wheel_is_noticed_beyond_limits_too) {
     begin();
     command.is_holders = false;
     TEST_ASSERT_TRUE(web_command_moves(&command));
@@ -273,7 +271,7 @@ static void test_command_that_turns_a_wheel_is_noticed_beyond_limits_too(void) {
     TEST_ASSERT_FALSE(web_command_moves(&command));
 }
 
-static void test_age_of_arm_and_reset_has_two_ends(void) {
+TEST(test_age_of_arm_and_reset_has_two_ends) {
     static const char *const wrong[] = {NULL, "", "x", "-1", "3999999", "5100001", "0", "9223372036854775807"};
     static const char *const good[] = {"4000000", "5000000", "5100000"};
     int64_t t_us = 7;
@@ -287,7 +285,7 @@ static void test_age_of_arm_and_reset_has_two_ends(void) {
     TEST_ASSERT_EQUAL_INT64(5100000, t_us);
 }
 
-static void test_drive_command_beyond_the_configured_speed_is_dropped(void) {
+TEST(test_drive_command_beyond_the_configured_speed_is_dropped) {
     begin();
     command.v_mm_s = "301";
     TEST_ASSERT_NOT_NULL(take(NOW));
@@ -298,7 +296,7 @@ static void test_drive_command_beyond_the_configured_speed_is_dropped(void) {
     TEST_ASSERT_NOT_NULL(take(NOW));
 }
 
-static void test_driver_that_says_nothing_is_silent_and_nobody_is_not(void) {
+TEST(test_driver_that_says_nothing_is_silent_and_nobody_is_not) {
     begin();
     TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_FIRST_US - 1U));
     TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_FIRST_US));
@@ -307,29 +305,4 @@ static void test_driver_that_says_nothing_is_silent_and_nobody_is_not(void) {
     TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_SILENT_US));
     web_driver_end(&driver);
     TEST_ASSERT_FALSE(web_driver_silent(&driver, UINT64_MAX));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_request_with_token_to_an_address_is_taken);
-    RUN_TEST(test_host_of_another_name_is_refused);
-    RUN_TEST(test_origin_of_another_site_is_refused);
-    RUN_TEST(test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not);
-    RUN_TEST(test_request_without_proof_is_refused);
-    RUN_TEST(test_secret_for_reading_only_reads);
-    RUN_TEST(test_stop_never_needs_a_proof);
-    RUN_TEST(test_header_that_is_there_twice_is_refused);
-    RUN_TEST(test_unknown_path_and_other_method_are_refused);
-    RUN_TEST(test_driving_and_reset_are_refused_unless_configured);
-    RUN_TEST(test_stop_and_estop_are_always_taken);
-    RUN_TEST(test_number_with_anything_beside_its_digits_is_refused);
-    RUN_TEST(test_name_of_a_recording_with_a_path_in_it_is_refused);
-    RUN_TEST(test_drive_command_of_the_page_that_armed_is_taken_once);
-    RUN_TEST(test_drive_command_that_is_late_or_from_the_future_is_dropped);
-    RUN_TEST(test_drive_command_of_another_page_is_dropped);
-    RUN_TEST(test_command_that_turns_a_wheel_is_noticed_beyond_limits_too);
-    RUN_TEST(test_age_of_arm_and_reset_has_two_ends);
-    RUN_TEST(test_drive_command_beyond_the_configured_speed_is_dropped);
-    RUN_TEST(test_driver_that_says_nothing_is_silent_and_nobody_is_not);
-    return UNITY_END();
 }

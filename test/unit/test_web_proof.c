@@ -2,7 +2,7 @@
 // Who has the token, without the token on the line. The MACs were made by Python's hmac.
 #include "proof.h"
 
-#include "unity.h"
+#include "unit.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -31,8 +31,6 @@ void setUp(void) {
     proofs.renew_us = NOW + WEB_NONCE_US;
 }
 
-void tearDown(void) {}
-
 static web_proof_t judge(const char *method, const char *target, const char *authorization) {
     const web_claim_t claim = {method, target, authorization};
     return web_proofs_judge(&proofs, token, &claim, now_us, &session);
@@ -45,7 +43,7 @@ static web_proof_t arm(unsigned sequence) {
     return judge("POST", "/api/arm?t_us=1", text);
 }
 
-static void test_proof_with_the_token_is_full_and_counts_once(void) {
+TEST(test_proof_with_the_token_is_full_and_counts_once) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     TEST_ASSERT_EQUAL_UINT64(1, session);
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(1));
@@ -57,7 +55,7 @@ static void test_proof_with_the_token_is_full_and_counts_once(void) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(3));
 }
 
-static void test_proof_behind_the_window_is_wrong(void) {
+TEST(test_proof_behind_the_window_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     proofs.sessions[0].newest = 65;
     proofs.sessions[0].seen = 1;
@@ -65,7 +63,7 @@ static void test_proof_behind_the_window_is_wrong(void) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(2));
 }
 
-static void test_proof_of_another_request_is_wrong(void) {
+TEST(test_proof_of_another_request_is_wrong) {
     char text[200];
     (void)snprintf(text, sizeof text, "IWheel aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa %s 1 %s", nonce, macs[1]);
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("GET", "/api/arm?t_us=1", text));
@@ -76,7 +74,7 @@ static void test_proof_of_another_request_is_wrong(void) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, judge("POST", "/api/arm?t_us=1", text));
 }
 
-static void test_proof_in_another_form_is_wrong(void) {
+TEST(test_proof_in_another_form_is_wrong) {
     static const char *const forms[] = {"IWheel %s %s %u %s x",  "IWheel %s %s %u %s ", "IWheel %.31s %s %u %s",
                                         "IWheel %s %.31s %u %s", "IWheel %s %s -%u %s", "IWheel %s %s %u %.63s",
                                         "iwheel %s %s %u %s",    "Bearer %s %s %u %s"};
@@ -90,7 +88,7 @@ static void test_proof_in_another_form_is_wrong(void) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("POST", "/api/arm?t_us=1", "IWheel "));
 }
 
-static void test_session_begins_only_with_a_nonce_in_force(void) {
+TEST(test_session_begins_only_with_a_nonce_in_force) {
     now_us = proofs.renew_us + WEB_NONCE_US - 1U; // The one before.
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     setUp();
@@ -99,14 +97,14 @@ static void test_session_begins_only_with_a_nonce_in_force(void) {
     TEST_ASSERT_EQUAL_UINT64(0, proofs.begun);
 }
 
-static void test_session_lasts_longer_than_its_nonce(void) {
+TEST(test_session_lasts_longer_than_its_nonce) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     now_us += 100U * WEB_NONCE_US;
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(2));
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(1));
 }
 
-static void test_full_table_forgets_no_session_that_could_come_again(void) {
+TEST(test_full_table_forgets_no_session_that_could_come_again) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     for (unsigned i = 1; i < WEB_SESSIONS; i++) {
         (void)snprintf(proofs.sessions[i].id, sizeof proofs.sessions[i].id, "%032x", i);
@@ -119,7 +117,7 @@ static void test_full_table_forgets_no_session_that_could_come_again(void) {
     TEST_ASSERT_EQUAL_UINT64(proofs.begun, proofs.sessions[7].number);
 }
 
-static void test_nonce_is_renewed_and_the_one_before_counts_once_more(void) {
+TEST(test_nonce_is_renewed_and_the_one_before_counts_once_more) {
     char first[BRIDGE_SECRET_SIZE];
     memset(&proofs, 0, sizeof proofs);
     (void)snprintf(first, sizeof first, "%s", web_proofs_nonce(&proofs, now_us));
@@ -130,7 +128,7 @@ static void test_nonce_is_renewed_and_the_one_before_counts_once_more(void) {
     TEST_ASSERT_EQUAL_STRING("", proofs.nonce[1]);
 }
 
-static void test_secret_for_reading_is_made_from_the_token(void) {
+TEST(test_secret_for_reading_is_made_from_the_token) {
     char text[64];
     char secret[BRIDGE_SECRET_SIZE];
     web_read_secret(token, secret);
@@ -143,7 +141,7 @@ static void test_secret_for_reading_is_made_from_the_token(void) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("GET", "/metrics", text));
 }
 
-static void test_empty_token_lets_nobody_in(void) {
+TEST(test_empty_token_lets_nobody_in) {
     char text[64];
     char secret[BRIDGE_SECRET_SIZE];
     token = "";
@@ -151,19 +149,4 @@ static void test_empty_token_lets_nobody_in(void) {
     (void)snprintf(text, sizeof text, "Bearer %s", secret);
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("GET", "/metrics", text));
     token = "00112233445566778899aabbccddeeff";
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_proof_with_the_token_is_full_and_counts_once);
-    RUN_TEST(test_proof_behind_the_window_is_wrong);
-    RUN_TEST(test_proof_of_another_request_is_wrong);
-    RUN_TEST(test_proof_in_another_form_is_wrong);
-    RUN_TEST(test_session_begins_only_with_a_nonce_in_force);
-    RUN_TEST(test_session_lasts_longer_than_its_nonce);
-    RUN_TEST(test_full_table_forgets_no_session_that_could_come_again);
-    RUN_TEST(test_nonce_is_renewed_and_the_one_before_counts_once_more);
-    RUN_TEST(test_secret_for_reading_is_made_from_the_token);
-    RUN_TEST(test_empty_token_lets_nobody_in);
-    return UNITY_END();
 }

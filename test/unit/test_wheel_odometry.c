@@ -3,7 +3,7 @@
 #include "fixture.h"
 #include "iwheel/private/wheel.h"
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 static iw_config_t config;
@@ -20,8 +20,6 @@ void setUp(void) {
     fixture_config(&config);
     begin_side(IW_LEFT);
 }
-
-void tearDown(void) {}
 
 static void hear_ticks(int32_t ticks) {
     const message_t message = {IW_CODEC_STATUS, wheel.side, {.status = {ticks, 255, 30, 20}}};
@@ -57,14 +55,14 @@ static int64_t distance_nm(void) {
     return wheel.ticks * wheel.nm_per_tick;
 }
 
-static void test_wheel_first_status_frame_is_no_distance(void) {
+TEST(test_wheel_first_status_frame_is_no_distance) {
     hear_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
     TEST_ASSERT_EQUAL_INT64(0, distance_nm());
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_ticks_add_up_in_both_directions(void) {
+TEST(test_wheel_ticks_add_up_in_both_directions) {
     hear_ticks(100);
     hear_ticks(110);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
@@ -72,7 +70,7 @@ static void test_wheel_ticks_add_up_in_both_directions(void) {
     TEST_ASSERT_EQUAL_INT64(-15, wheel.ticks);
 }
 
-static void test_wheel_ticks_unwrap_in_both_directions(void) {
+TEST(test_wheel_ticks_unwrap_in_both_directions) {
     hear_ticks(INT32_MAX - 4);
     hear_ticks(INT32_MIN + 5);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
@@ -83,7 +81,7 @@ static void test_wheel_ticks_unwrap_in_both_directions(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_ticks_go_on_beyond_32_bits(void) {
+TEST(test_wheel_ticks_go_on_beyond_32_bits) {
     config.radius_mm = 20;
     config.gear_turns = 100;
     begin_side(IW_LEFT);
@@ -95,7 +93,7 @@ static void test_wheel_ticks_go_on_beyond_32_bits(void) {
     TEST_ASSERT_TRUE(distance_nm() == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
 }
 
-static void test_wheel_ticks_end_at_their_limit_in_both_directions(void) {
+TEST(test_wheel_ticks_end_at_their_limit_in_both_directions) {
     hear_ticks(0);
     wheel.ticks = IW_WHEEL_TICKS_MAX;
     hear_ticks(1);
@@ -109,14 +107,14 @@ static void test_wheel_ticks_end_at_their_limit_in_both_directions(void) {
     TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
 }
 
-static void test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel(void) {
+TEST(test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel) {
     config.radius_mm = 500;
     begin_side(IW_LEFT);
     wheel.ticks = IW_WHEEL_TICKS_MAX;
     TEST_ASSERT_EQUAL_INT64(5236000000000000000, distance_nm());
 }
 
-static void test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance(void) {
+TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(1000, MS(40)));
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
@@ -129,7 +127,7 @@ static void test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance(void) {
 }
 
 /// 10 m/s are 0.4973 ticks in a millisecond.
-static void test_wheel_jump_is_judged_by_the_time_it_took(void) {
+TEST(test_wheel_jump_is_judged_by_the_time_it_took) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(30, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(-30, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(49, MS(40)));
@@ -142,7 +140,7 @@ static void test_wheel_jump_is_judged_by_the_time_it_took(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-5050, MS(10000)));
 }
 
-static void test_wheel_small_jump_is_believed_whatever_the_time(void) {
+TEST(test_wheel_small_jump_is_believed_whatever_the_time) {
     const message_t first = {IW_CODEC_STATUS, IW_LEFT, {.status = {0, 0, 0, 0}}};
     const message_t second = {IW_CODEC_STATUS, IW_LEFT, {.status = {30, 0, 0, 0}}};
     const message_t third = {IW_CODEC_STATUS, IW_LEFT, {.status = {61, 0, 0, 0}}};
@@ -154,19 +152,19 @@ static void test_wheel_small_jump_is_believed_whatever_the_time(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_jump_after_hours_without_status_is_still_judged(void) {
+TEST(test_wheel_jump_after_hours_without_status_is_still_judged) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MAX - 5000, MS(4294967 + 100000)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(2000000, MS(4294967 + 100000)));
 }
 
 /// One tick of a wheel of 192 mm is 20.10619 mm, 1 rpm is 20.10619 mm/s.
-static void test_wheel_jump_is_judged_to_the_microsecond(void) {
+TEST(test_wheel_jump_is_judged_to_the_microsecond) {
     config.radius_mm = 500; // 5236 us per tick at 10 m/s.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(40, 52360));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(40, 52359));
 }
 
-static void test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick(void) {
+TEST(test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick) {
     config.radius_mm = 20;
     config.gear_turns = 100; // 2 us per tick at 10 m/s: in 71 minutes as far as the counter reaches.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump_from(0, INT32_MAX, 4294967233U));
@@ -176,7 +174,7 @@ static void test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick(void) {
     TEST_ASSERT_EQUAL_INT64(INT32_MIN, wheel.ticks);
 }
 
-static void test_wheel_distance_and_speed_of_the_documented_wheel(void) {
+TEST(test_wheel_distance_and_speed_of_the_documented_wheel) {
     hear_ticks(0);
     hear_ticks(10);
     TEST_ASSERT_INT64_WITHIN(1000, 201061930, distance_nm());
@@ -192,7 +190,7 @@ static void test_wheel_distance_and_speed_of_the_documented_wheel(void) {
     TEST_ASSERT_EQUAL_INT(0, wheel.speed_mm_s);
 }
 
-static void test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only(void) {
+TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only) {
     config.gear_turns = 25;
     config.gear_per = 2;
     begin_side(IW_LEFT);
@@ -212,7 +210,7 @@ static int64_t nm_per_turn_60th(uint32_t radius_mm) {
     return (int64_t)radius_mm * 1000000 * 355 / (113 * 30);
 }
 
-static void test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere(void) {
+TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere) {
     static const uint16_t radii_mm[] = {20, 33, 192, 499, 500};
     static const uint16_t gears[][2] = {{1, 1}, {3, 2}, {7, 3}, {100, 1}, {1000, 10}, {999, 998}};
     for (size_t r = 0; r < 5; r++) {
@@ -230,7 +228,7 @@ static void test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere(void
     }
 }
 
-static void test_wheel_speed_extremes_do_not_overflow(void) {
+TEST(test_wheel_speed_extremes_do_not_overflow) {
     static const int16_t extremes[] = {32767, -32768};
     for (int rotor = 0; rotor < 2; rotor++) {
         config.radius_mm = 500;
@@ -244,7 +242,7 @@ static void test_wheel_speed_extremes_do_not_overflow(void) {
     }
 }
 
-static void test_wheel_inverted_negates_what_the_machine_sees_only(void) {
+TEST(test_wheel_inverted_negates_what_the_machine_sees_only) {
     config.invert[IW_RIGHT] = true;
     begin_side(IW_RIGHT);
     hear_ticks(0);
@@ -258,34 +256,11 @@ static void test_wheel_inverted_negates_what_the_machine_sees_only(void) {
     TEST_ASSERT_EQUAL_INT(2010, wheel.speed_mm_s);
 }
 
-static void test_wheel_distance_survives_reboots(void) {
+TEST(test_wheel_distance_survives_reboots) {
     hear_ticks(1000);
     hear_ticks(1010);
     hear_ticks(0);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
     hear_ticks(7);
     TEST_ASSERT_EQUAL_INT64(17, wheel.ticks);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_wheel_first_status_frame_is_no_distance);
-    RUN_TEST(test_wheel_ticks_add_up_in_both_directions);
-    RUN_TEST(test_wheel_ticks_unwrap_in_both_directions);
-    RUN_TEST(test_wheel_ticks_go_on_beyond_32_bits);
-    RUN_TEST(test_wheel_ticks_end_at_their_limit_in_both_directions);
-    RUN_TEST(test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel);
-    RUN_TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance);
-    RUN_TEST(test_wheel_jump_is_judged_by_the_time_it_took);
-    RUN_TEST(test_wheel_small_jump_is_believed_whatever_the_time);
-    RUN_TEST(test_wheel_jump_after_hours_without_status_is_still_judged);
-    RUN_TEST(test_wheel_jump_is_judged_to_the_microsecond);
-    RUN_TEST(test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick);
-    RUN_TEST(test_wheel_distance_and_speed_of_the_documented_wheel);
-    RUN_TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only);
-    RUN_TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere);
-    RUN_TEST(test_wheel_speed_extremes_do_not_overflow);
-    RUN_TEST(test_wheel_inverted_negates_what_the_machine_sees_only);
-    RUN_TEST(test_wheel_distance_survives_reboots);
-    return UNITY_END();
 }

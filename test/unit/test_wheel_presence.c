@@ -3,7 +3,7 @@
 #include "fixture.h"
 #include "iwheel/private/wheel.h"
 #include "message.h"
-#include "unity.h"
+#include "unit.h"
 #include <string.h>
 
 #define SILENT_US MS(50)
@@ -22,8 +22,6 @@ void setUp(void) {
     fixture_config(&config);
     begin();
 }
-
-void tearDown(void) {}
 
 static void hear_as(int16_t rpm, bool fresh) {
     const message_t message = {IW_CODEC_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
@@ -60,7 +58,7 @@ static bool rests(iw_time_us_t at_us, uint32_t for_us) {
     return iw_wheel_rest_us(&wheel, at_us + 1U) > for_us;
 }
 
-static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
+TEST(test_wheel_never_heard_is_lost_and_not_at_rest) {
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_FALSE(rests(now_us, 0));
@@ -71,14 +69,14 @@ static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(100)));
 }
 
-static void test_wheel_never_heard_is_not_heard_when_time_has_just_begun(void) {
+TEST(test_wheel_never_heard_is_not_heard_when_time_has_just_begun) {
     iw_wheel_init(&wheel, &config, IW_LEFT, 0);
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 0));
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 1000));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, 1000));
 }
 
-static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
+TEST(test_wheel_is_heard_for_exactly_its_silence_limit) {
     static const uint16_t limits_ms[] = {20, 50, 200};
     for (size_t i = 0; i < 3; i++) {
         config.wheel_silent_ms = limits_ms[i];
@@ -93,7 +91,7 @@ static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
     }
 }
 
-static void test_wheel_is_kept_alive_by_speed_frames_only(void) {
+TEST(test_wheel_is_kept_alive_by_speed_frames_only) {
     static const iw_codec_kind_t others[] = {IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_OFFSET, IW_CODEC_POSE};
     hear(0);
     for (uint32_t n = 0; n < 40; n++) {
@@ -104,7 +102,7 @@ static void test_wheel_is_kept_alive_by_speed_frames_only(void) {
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
 }
 
-static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
+TEST(test_wheel_is_not_found_by_frames_of_unknown_age) {
     hear_as(7, false);
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
@@ -118,7 +116,7 @@ static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
     TEST_ASSERT_TRUE(iw_wheel_online(&wheel, now_us + 1U));
 }
 
-static void test_wheel_silence_during_our_stall_is_excused_once(void) {
+TEST(test_wheel_silence_during_our_stall_is_excused_once) {
     hear(0);
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
@@ -132,7 +130,7 @@ static void test_wheel_silence_during_our_stall_is_excused_once(void) {
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
 }
 
-static void test_wheel_is_excused_again_after_a_fresh_frame(void) {
+TEST(test_wheel_is_excused_again_after_a_fresh_frame) {
     hear(0);
     now_us += MS(300);
     iw_wheel_excuse(&wheel, now_us);
@@ -142,7 +140,7 @@ static void test_wheel_is_excused_again_after_a_fresh_frame(void) {
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
 }
 
-static void test_wheel_at_rest_counts_an_unbroken_run(void) {
+TEST(test_wheel_at_rest_counts_an_unbroken_run) {
     hear(0);
     const iw_time_us_t start_us = now_us;
     hear_for(MS(200), 0);
@@ -159,7 +157,7 @@ static void test_wheel_at_rest_counts_an_unbroken_run(void) {
     TEST_ASSERT_TRUE(rests(now_us + 1U, 1));
 }
 
-static void test_wheel_at_rest_has_its_limit_in_both_directions(void) {
+TEST(test_wheel_at_rest_has_its_limit_in_both_directions) {
     static const struct {
         int16_t rpm;
         bool rest;
@@ -176,7 +174,7 @@ static void test_wheel_at_rest_has_its_limit_in_both_directions(void) {
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
-static void test_wheel_rest_is_broken_by_a_gap(void) {
+TEST(test_wheel_rest_is_broken_by_a_gap) {
     hear(0);
     hear_for(MS(400), 0);
     now_us += SILENT_US - 4000U;
@@ -189,7 +187,7 @@ static void test_wheel_rest_is_broken_by_a_gap(void) {
     TEST_ASSERT_FALSE(rests(now_us, 1));
 }
 
-static void test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age(void) {
+TEST(test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age) {
     hear_as(0, false);
     hear(5);
     hear_as(0, false);
@@ -200,7 +198,7 @@ static void test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_a
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
-static void test_wheel_silent_for_a_second_has_rebooted(void) {
+TEST(test_wheel_silent_for_a_second_has_rebooted) {
     hear(0);
     now_us += MS(1000) - 1U;
     hear(0);
@@ -213,7 +211,7 @@ static void test_wheel_silent_for_a_second_has_rebooted(void) {
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
 
-static void test_wheel_that_sends_anything_is_not_silent(void) {
+TEST(test_wheel_that_sends_anything_is_not_silent) {
     hear(0);
     for (uint32_t n = 0; n < 30; n++) {
         now_us += MS(40);
@@ -223,7 +221,7 @@ static void test_wheel_that_sends_anything_is_not_silent(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_silence_of_our_own_stall_is_no_reboot(void) {
+TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
     hear(0);
     now_us += MS(5000);
     iw_wheel_excuse(&wheel, now_us);
@@ -233,7 +231,7 @@ static void test_wheel_silence_of_our_own_stall_is_no_reboot(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen(void) {
+TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen) {
     now_us += MS(1000) - 1U;
     hear(0);
     TEST_ASSERT_FALSE(wheel.boot_seen);
@@ -255,20 +253,20 @@ static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
     }
 }
 
-static void test_wheel_offset_frames_that_never_stop_tell_of_no_reboot(void) {
+TEST(test_wheel_offset_frames_that_never_stop_tell_of_no_reboot) {
     hear(0);
     hear_for(IW_WHEEL_OFFSET_LEARN_US, 0);
     hear_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-static void test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot(void) {
+TEST(test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot) {
     hear(0);
     hear_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-static void test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted(void) {
+TEST(test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted) {
     static const uint32_t ages_s[] = {3, 30, 59};
     for (size_t i = 0; i < 3; i++) {
         begin();
@@ -280,7 +278,7 @@ static void test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted
     }
 }
 
-static void test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond(void) {
+TEST(test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond) {
     static const uint32_t heard_s[] = {1, 10, 58, 61,
                                        300}; // Also long before a gateway that started late could know of 60 s.
     for (size_t i = 0; i < 5; i++) {
@@ -297,7 +295,7 @@ static void test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_micr
     }
 }
 
-static void test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames(void) {
+TEST(test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames) {
     hear(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
     hear_other(IW_CODEC_OFFSET); // So soon it may just have started.
@@ -311,7 +309,7 @@ static void test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends
 }
 
 /// What the offset frames of a reboot within the wheel's first minute no longer tell, its silence or its odometry do.
-static void test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry(void) {
+TEST(test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry) {
     hear(0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_REBOOT_SILENCE_US;
@@ -329,7 +327,7 @@ static void test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odom
 }
 
 /// Nothing else may tell of what started anew while we did not run: silence then is excused.
-static void test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot(void) {
+TEST(test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot) {
     hear(0);
     hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_OFFSET_BACK_US;
@@ -338,7 +336,7 @@ static void test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot(v
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
 }
 
-static void test_wheel_other_frames_tell_of_no_reboot_however_late(void) {
+TEST(test_wheel_other_frames_tell_of_no_reboot_however_late) {
     static const iw_codec_kind_t others[] = {IW_CODEC_SPEED, IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_POSE};
     hear_for(MS(70000), 0);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
@@ -347,7 +345,7 @@ static void test_wheel_other_frames_tell_of_no_reboot_however_late(void) {
     }
 }
 
-static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(void) {
+TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew) {
     hear(0);
     hear_status(1000000);
     now_us += MS(10000);
@@ -360,41 +358,11 @@ static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(voi
     TEST_ASSERT_TRUE(wheel.ticks == 1);
 }
 
-static void test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit(void) {
+TEST(test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit) {
     const iw_time_us_t hours_us = (iw_time_us_t)UINT32_MAX + 5U;
     hear_for(MS(20), 0);
     wheel.rest_since_us = now_us - hours_us;
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, iw_wheel_rest_us(&wheel, now_us));
     wheel.rest_since_us = now_us - (hours_us - 6U);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX - 1U, iw_wheel_rest_us(&wheel, now_us));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit);
-    RUN_TEST(test_wheel_never_heard_is_lost_and_not_at_rest);
-    RUN_TEST(test_wheel_never_heard_is_not_heard_when_time_has_just_begun);
-    RUN_TEST(test_wheel_is_heard_for_exactly_its_silence_limit);
-    RUN_TEST(test_wheel_is_kept_alive_by_speed_frames_only);
-    RUN_TEST(test_wheel_is_not_found_by_frames_of_unknown_age);
-    RUN_TEST(test_wheel_silence_during_our_stall_is_excused_once);
-    RUN_TEST(test_wheel_is_excused_again_after_a_fresh_frame);
-    RUN_TEST(test_wheel_at_rest_counts_an_unbroken_run);
-    RUN_TEST(test_wheel_at_rest_has_its_limit_in_both_directions);
-    RUN_TEST(test_wheel_rest_is_broken_by_a_gap);
-    RUN_TEST(test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age);
-    RUN_TEST(test_wheel_silent_for_a_second_has_rebooted);
-    RUN_TEST(test_wheel_that_sends_anything_is_not_silent);
-    RUN_TEST(test_wheel_silence_of_our_own_stall_is_no_reboot);
-    RUN_TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen);
-    RUN_TEST(test_wheel_offset_frames_that_never_stop_tell_of_no_reboot);
-    RUN_TEST(test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot);
-    RUN_TEST(test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted);
-    RUN_TEST(test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond);
-    RUN_TEST(test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames);
-    RUN_TEST(test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry);
-    RUN_TEST(test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot);
-    RUN_TEST(test_wheel_other_frames_tell_of_no_reboot_however_late);
-    RUN_TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew);
-    return UNITY_END();
 }

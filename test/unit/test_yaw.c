@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How fast the pair may turn the machine: what is commanded, how it grows in a ramp, and that it slows no stop.
 #include "setpoint_rig.h"
-#include "unity.h"
+#include "unit.h"
 
 #include <stdlib.h>
 
@@ -13,13 +13,11 @@ void setUp(void) {
     setpoint_rig_begin(&rig);
 }
 
-void tearDown(void) {}
-
 static int32_t turn_of(const iw_pair_t *pair) {
     return pair->wheel[IW_RIGHT].speed_mm_s - pair->wheel[IW_LEFT].speed_mm_s;
 }
 
-static void test_yaw_bounds_are_those_of_the_real_machine(void) {
+TEST(test_yaw_bounds_are_those_of_the_real_machine) {
     static const struct {
         uint16_t max_mrad_s, accel_mrad_s2, track_mm, radius_mm;
         int32_t most_mm_s;
@@ -44,7 +42,7 @@ static void test_yaw_bounds_are_those_of_the_real_machine(void) {
     }
 }
 
-static void test_yaw_limit_scales_both_wheels_by_one_factor(void) {
+TEST(test_yaw_limit_scales_both_wheels_by_one_factor) {
     static const struct {
         int32_t asked[IW_SIDES];
         int32_t applied[IW_SIDES];
@@ -73,7 +71,7 @@ static void test_yaw_limit_scales_both_wheels_by_one_factor(void) {
     }
 }
 
-static void test_yaw_limit_never_is_faster_or_moves_another_way(void) {
+TEST(test_yaw_limit_never_is_faster_or_moves_another_way) {
     fixture_random_t random;
     fixture_random_init(&random, 21);
     for (uint32_t n = 0; n < 200000; n++) {
@@ -92,7 +90,7 @@ static void test_yaw_limit_never_is_faster_or_moves_another_way(void) {
     }
 }
 
-static void test_yaw_bound_is_the_growth_up_to_the_limit(void) {
+TEST(test_yaw_bound_is_the_growth_up_to_the_limit) {
     static const struct {
         int32_t from;
         uint32_t growth;
@@ -108,7 +106,7 @@ static void test_yaw_bound_is_the_growth_up_to_the_limit(void) {
 }
 
 /// 2 um/s are left for the rounding of both wheels.
-static void test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change(void) {
+TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change) {
     static const struct {
         int32_t bound, from, change;
         uint32_t room;
@@ -121,7 +119,7 @@ static void test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change(void) {
     }
 }
 
-static void test_yaw_grows_by_its_acceleration_and_to_its_end(void) {
+TEST(test_yaw_grows_by_its_acceleration_and_to_its_end) {
     setpoint_rig_follow(&rig);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, -270, 270, 2000);
@@ -134,14 +132,14 @@ static void test_yaw_grows_by_its_acceleration_and_to_its_end(void) {
     TEST_ASSERT_EQUAL_INT(-270, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
 }
 
-static void test_yaw_late_call_is_granted_two_periods_of_growth(void) {
+TEST(test_yaw_late_call_is_granted_two_periods_of_growth) {
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, -270, 270, 2000);
     const iw_pair_t pair = setpoint_rig_take_after(&rig, 500000);
     TEST_ASSERT_INT_WITHIN(1, 42, turn_of(&pair));
 }
 
-static void test_yaw_of_a_faster_curve_keeps_the_curve(void) {
+TEST(test_yaw_of_a_faster_curve_keeps_the_curve) {
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 300, 840, 2000);
     for (uint32_t n = 0; n < 100; n++) {
@@ -152,7 +150,7 @@ static void test_yaw_of_a_faster_curve_keeps_the_curve(void) {
 }
 
 /// One wheel that alone slows down turns the machine: that is growth of yaw too.
-static void test_yaw_growth_by_one_braking_wheel_is_bounded(void) {
+TEST(test_yaw_growth_by_one_braking_wheel_is_bounded) {
     setpoint_rig_cruise(&rig, 900, 900, 2000);
     const iw_time_us_t start_us = rig.setpoint.last_us;
     setpoint_rig_command(&rig, 400, 900, 2000);
@@ -167,7 +165,7 @@ static void test_yaw_growth_by_one_braking_wheel_is_bounded(void) {
 
 /// From 0/0 to 64 mm/s of the right wheel, which it could reach in one step: growth of 1000 mm/s2 gives it 20 mm/s, and as
 /// a current that is a setpoint it gets the same share of the way.
-static void test_yaw_that_holds_up_a_speed_holds_up_its_current(void) {
+TEST(test_yaw_that_holds_up_a_speed_holds_up_its_current) {
     static const iw_pair_t target = {{{0, 0}, {64, 640}}};
     rig.config.track_mm = 500;
     rig.config.accel_mm_s2 = 20000;
@@ -183,7 +181,7 @@ static void test_yaw_that_holds_up_a_speed_holds_up_its_current(void) {
 }
 
 /// The same where a wheel brakes: its current falls by the share that its speed falls by.
-static void test_yaw_that_holds_up_braking_holds_up_its_current(void) {
+TEST(test_yaw_that_holds_up_braking_holds_up_its_current) {
     static const iw_pair_t target = {{{400, 400}, {900, 900}}};
     rig.config.current_role = IW_ROLE_SETPOINT;
     rig.config.max_current_mA = 1000;
@@ -199,7 +197,7 @@ static void test_yaw_that_holds_up_braking_holds_up_its_current(void) {
 }
 
 /// Braking that alone leads exactly to the bound is not held up: only the wheel that would become faster waits.
-static void test_yaw_braking_up_to_its_bound_goes_all_the_way(void) {
+TEST(test_yaw_braking_up_to_its_bound_goes_all_the_way) {
     rig.config.track_mm = 500;
     rig.config.max_yaw_mrad_s = 2000;
     rig.config.decel_mm_s2 = 1000;
@@ -212,7 +210,7 @@ static void test_yaw_braking_up_to_its_bound_goes_all_the_way(void) {
 }
 
 /// Nothing but the slope towards zero: in a stop, at a command of 0/0, and where yaw falls.
-static void test_yaw_slows_no_stop_and_no_fall(void) {
+TEST(test_yaw_slows_no_stop_and_no_fall) {
     static const struct {
         bool command;
         int16_t left_mm_s, right_mm_s;
@@ -239,7 +237,7 @@ static void test_yaw_slows_no_stop_and_no_fall(void) {
 }
 
 /// Out of any curve 0/0 is reached as early as the slope of the faster wheel allows, however slowly yaw may grow.
-static void test_yaw_slows_no_stop_out_of_any_curve(void) {
+TEST(test_yaw_slows_no_stop_out_of_any_curve) {
     static const int16_t curves[][IW_SIDES] = {{300, 800},   {800, 300},   {-270, 270}, {0, 540},
                                                {-700, -701}, {1000, 1000}, {-100, 400}};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
@@ -265,7 +263,7 @@ static void test_yaw_slows_no_stop_out_of_any_curve(void) {
 }
 
 /// One wheel has a long way to brake through zero, the other would become faster at once: it waits, and both get there.
-static void test_yaw_at_its_limit_waits_and_gets_there(void) {
+TEST(test_yaw_at_its_limit_waits_and_gets_there) {
     rig.config.max_yaw_mrad_s = 278; // 150 mm/s.
     rig.config.accel_mm_s2 = 20000;
     rig.config.decel_mm_s2 = 100;
@@ -302,7 +300,7 @@ static void command_anything(fixture_random_t *random, iw_pair_t *target) {
     iw_setpoint_command(&rig.setpoint, rig.now_us, target);
 }
 
-static void test_yaw_stays_bounded_and_every_target_is_reached(void) {
+TEST(test_yaw_stays_bounded_and_every_target_is_reached) {
     fixture_random_t random;
     fixture_random_init(&random, 22);
     for (uint32_t run = 0; run < 300; run++) {
@@ -330,25 +328,4 @@ static void test_yaw_stays_bounded_and_every_target_is_reached(void) {
         TEST_ASSERT_EQUAL_INT16(target.wheel[IW_LEFT].speed_mm_s, before.wheel[IW_LEFT].speed_mm_s);
         TEST_ASSERT_EQUAL_INT16(target.wheel[IW_RIGHT].speed_mm_s, before.wheel[IW_RIGHT].speed_mm_s);
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_yaw_bounds_are_those_of_the_real_machine);
-    RUN_TEST(test_yaw_limit_scales_both_wheels_by_one_factor);
-    RUN_TEST(test_yaw_limit_never_is_faster_or_moves_another_way);
-    RUN_TEST(test_yaw_bound_is_the_growth_up_to_the_limit);
-    RUN_TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change);
-    RUN_TEST(test_yaw_grows_by_its_acceleration_and_to_its_end);
-    RUN_TEST(test_yaw_late_call_is_granted_two_periods_of_growth);
-    RUN_TEST(test_yaw_of_a_faster_curve_keeps_the_curve);
-    RUN_TEST(test_yaw_growth_by_one_braking_wheel_is_bounded);
-    RUN_TEST(test_yaw_that_holds_up_a_speed_holds_up_its_current);
-    RUN_TEST(test_yaw_that_holds_up_braking_holds_up_its_current);
-    RUN_TEST(test_yaw_braking_up_to_its_bound_goes_all_the_way);
-    RUN_TEST(test_yaw_slows_no_stop_and_no_fall);
-    RUN_TEST(test_yaw_slows_no_stop_out_of_any_curve);
-    RUN_TEST(test_yaw_at_its_limit_waits_and_gets_there);
-    RUN_TEST(test_yaw_stays_bounded_and_every_target_is_reached);
-    return UNITY_END();
 }

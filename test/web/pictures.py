@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Makes the pictures of docs/web.md, with a machine that drives.
+"""Makes the pictures of docs/user/web.md, with a machine that drives.
 
 usage: test/web/pictures.py BUILD FOLDER
 """
@@ -30,7 +30,7 @@ def take_pictures(build, folder):
                     for speed in (300, 150, 350, 250):
                         driver.speed = speed
                         time.sleep(2)
-                    page.evaluate("goLive(); for (const plot of allPlots()) plot.move(0.35, 0.2)")
+                    page.evaluate("goLive(); moveView(0.35, 0.2)")
                     time.sleep(0.5)
                     page.screenshot(path=folder / f"web-{size}-{scheme}.png")
                 driver.end()

@@ -2,6 +2,8 @@
 """The bridge without a browser: who is let in, what hostile peers get, what reaches the gateway and the bus."""
 
 import contextlib
+import gzip
+import http.client
 import json
 import os
 import re
@@ -13,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.parse
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
@@ -186,10 +189,42 @@ def test_answers_forbid_frames_foreign_sources_and_caches(rig):
         rig.ask("GET", path)
         policy = rig.headers["Content-Security-Policy"]
         assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy, policy
-        assert rig.headers["Cache-Control"] == "no-store" and rig.headers["X-Content-Type-Options"] == "nosniff"
+        assert rig.headers["Cache-Control"] == ("no-cache" if path == "/" else "no-store") and rig.headers["X-Content-Type-Options"] == "nosniff"
         assert "Access-Control-Allow-Origin" not in rig.headers and "Set-Cookie" not in rig.headers
     page = rig.ask("GET", "/")[1] + rig.ask("GET", "/page.js")[1]
     assert not re.search(r"(src|href)=\"(https?:)?//", page) and 'onclick="' not in page
+
+
+def ask_bytes(rig, path, **headers):
+    """(status, headers, body) of a request that may come back compressed."""
+    connection = http.client.HTTPConnection("127.0.0.1", rig.port, timeout=5)
+    try:
+        connection.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+        answer = connection.getresponse()
+        return answer.status, dict(answer.getheaders()), answer.read()
+    finally:
+        connection.close()
+
+
+def test_page_files_are_compressed_and_cached_until_they_change(rig):
+    rig.start()
+    page = rig.ask("GET", "/", token="")[1]
+    files = ["/", *("/" + name for name in re.findall(r'(?:src|href)="([\w.]+\.(?:js|css))"', page))]
+    assert len(files) > 10
+    sent = whole = 0
+    for path in files:
+        status, plain_headers, plain = ask_bytes(rig, path)
+        assert status == 200 and "Content-Encoding" not in plain_headers
+        status, headers, packed = ask_bytes(rig, path, Accept_Encoding="gzip, deflate, br")
+        assert status == 200 and headers["Content-Encoding"] == "gzip" and headers["Vary"] == "Accept-Encoding" and gzip.decompress(packed) == plain, path
+        assert headers["ETag"] != plain_headers["ETag"]
+        whole, sent = whole + len(plain), sent + len(packed)
+        status, again, body = ask_bytes(rig, path, Accept_Encoding="gzip", If_None_Match=headers["ETag"])
+        assert status == 304 and body == b"" and again["ETag"] == headers["ETag"] and again["Cache-Control"] == "no-cache", (path, status)
+        assert ask_bytes(rig, path, If_None_Match=headers["ETag"])[0] == 200, "the tag of the other form"
+    print(f"        the page: {sent} bytes compressed, {whole} as it is", flush=True)
+    assert sent < 70_000 and sent < whole * 0.45, (sent, whole)
+    assert ask_bytes(rig, "/api/challenge", Accept_Encoding="gzip")[1].get("Content-Encoding") is None
 
 
 def test_paths_lead_nowhere_but_to_the_routes(rig):
@@ -961,6 +996,45 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
             assert code == web.wait(5) == 78 and about in words and about in web.text(), (code, words, web.text())
 
 
+def start_lan(rig):
+    """The bridge by `--lan`, and the address that it prints."""
+    rig.write_web()
+    rig.web = Process([rig.program("iwheel-web"), "-c", rig.path("web.conf"), "--lan"], rig.path("web.out"))
+    rig.processes.append(rig.web)
+    found = until(lambda: re.search(r"https://([\d.]+):(\d+)/#token=([0-9a-f]{32})", rig.web.text()), what="the address is printed")
+    assert int(found[2]) == rig.port and found[3] == rig.token
+    return found[0], found[1]
+
+
+def test_lan_serves_by_https_with_its_own_certificate_and_never_drives(rig):
+    rig.start_gateway()
+    _, address = start_lan(rig)
+    files = {name: Path(rig.path(name)) for name in ("lan-certificate.pem", "lan-key.pem", "token")}
+    assert all(path.stat().st_mode & 0o077 == 0 for path in files.values())
+    made = files["lan-certificate.pem"].read_bytes()
+    trust = ssl.create_default_context(cafile=str(files["lan-certificate.pem"]))
+    for host in (address, "localhost", socket.gethostname()):
+        with socket.create_connection((address, rig.port), timeout=5) as one, trust.wrap_socket(one, server_hostname=host) as tls:
+            tls.sendall(f"POST /api/stop HTTP/1.1\r\nHost: {host}:{rig.port}\r\nConnection: close\r\n\r\n".encode())
+            assert tls.recv(100).startswith(b"HTTP/1.1 200"), host
+    secret = urllib.request.Request(f"https://{address}:{rig.port}/health", headers={"Authorization": f"Bearer {rig.read_secret}"})
+
+    def health():
+        with contextlib.suppress(urllib.error.HTTPError):  # 503: it does not know the gateway's state yet.
+            return json.loads(urllib.request.urlopen(secret, context=trust).read())
+
+    assert until(health, what="the gateway's state is known")["may_drive"] is False
+    rig.web.signal(15)
+    assert rig.web.wait(5) == 0
+    start_lan(rig)
+    assert files["lan-certificate.pem"].read_bytes() == made, "made once"
+    rig.web.signal(15)
+    rig.web.wait(5)
+    files["lan-certificate.pem"].write_text("no certificate")
+    start_lan(rig)
+    assert files["lan-certificate.pem"].read_bytes() not in (made, b"no certificate")
+
+
 def test_tls_is_new_and_authenticated_only(rig):
     certificate(rig, "ours")
     rig.start_gateway()
@@ -1139,9 +1213,9 @@ def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
 
 
 def test_words_of_the_page_are_those_of_iwheelctl(rig):
-    """The cures of causes, and what to do next, stand once more in strings.js: letter for letter."""
+    """The cures of causes, and what to do next, stand once more in strings.en.js: letter for letter."""
     advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
-    strings = (ROOT / "app/bridge/web/page/strings.js").read_text(encoding="utf-8")
+    strings = (ROOT / "app/bridge/web/page/strings.en.js").read_text(encoding="utf-8")
     cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
     ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {") :], re.MULTILINE))
     assert cures and cures == ours, set(cures.items()) ^ set(ours.items())

@@ -2,6 +2,7 @@
 """The page in a real browser: each element against the snapshot of the same moment, STOP against the bus log, keyboard, contrast, hiding."""
 
 import contextlib
+import csv
 import json
 import os
 import shutil
@@ -64,7 +65,7 @@ def decimal(value, digits, unit):
 
 
 def wheel_words(wheel):
-    """Written here once more, from docs/northbound.md, not from the page."""
+    """Written here once more, from docs/user/northbound.md, not from the page."""
     words = {
         "heard": "NOT HEARD" if not wheel["heard"] else "at rest" if wheel["at_rest"] else "turning",
         "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"),
@@ -124,9 +125,9 @@ def test_every_element_shows_the_snapshot_of_the_same_moment(rig):
         rig.sim.ask("estop press")
         seen(page, "document.querySelector('#state').textContent.startsWith('latched')")
         compare(*page.evaluate(READ))
-        assert "then: iwheelctl reset" in page.inner_text("#advice")
+        assert "then: iwheelctl reset" in page.text_content("#advice")
         driver.end()
-        seen(page, "document.querySelectorAll('#stops details').length === 1 && document.querySelectorAll('#recordings tbody tr').length === 1")
+        seen(page, "document.querySelectorAll('#stops details').length === 1 && document.querySelectorAll('#recordings li').length === 1")
         page.click("#stops summary")
         seen(page, "document.querySelectorAll('#stops svg .rx').length > 5 && document.querySelectorAll('#stops svg .tx').length > 1")
         assert page.locator("#stops table tbody tr").count() >= 40
@@ -315,13 +316,19 @@ def test_recording_is_opened_played_and_opened_again_from_its_files(rig):
         live(page)
         page.wait_for_selector("#recordings button")
         files = []
-        for ending in (".log", ".jsonl", ".conf"):
+        for ending in ("log", "jsonl", "conf"):
             with page.expect_download() as download:
-                page.click(f"#recordings button:text-is('{ending}')")
+                page.click(f"#recordings [data-ending='{ending}']")
             path = rig.path(download.value.suggested_filename)
             download.value.save_as(path)
             assert Path(path).stat().st_size > 100
             files.append(path)
+        with page.expect_download() as download:
+            page.click("#recordings [data-ending='csv']")
+        download.value.save_as(rig.path("recording.csv"))
+        table = list(csv.DictReader(Path(rig.path("recording.csv")).read_text(encoding="ascii").splitlines()))
+        assert {row["wheel"] for row in table} == {"left", "right"} and [float(row["t_s"]) for row in table] == sorted(float(row["t_s"]) for row in table)
+        assert 150 < max(float(row["measured_mm_s"] or 0) for row in table) < 260 and any(row["force_raw_N"] for row in table)
         page.click("#recordings button:text-is('Open')")
         page.wait_for_selector("#player:not([hidden])")
         fastest = "Math.max(...page.recording.wheels[0].speed.data[3].filter((v) => v !== null))"
@@ -423,7 +430,7 @@ def write_fleet(rig, age_s=0.0):
 
 def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
     axe = ASSETS / "axe-core-4.14.1/axe.min.js"
-    rig.web_settings["fleet"]["source"] = rig.path("fleet.json")
+    rig.web_settings["fleet"] = {"source": rig.path("fleet.json"), "machine_page": "https://{machine}.local:8470/"}
     rig.start()
     url = rig.url.replace("/#", "/fleet#")
     write_fleet(rig)
@@ -433,6 +440,8 @@ def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
             seen(page, "document.querySelector('#news').className === 'good'")
             cells = page.evaluate("[...document.querySelectorAll('#machines tr')].map((row) => [...row.children].map((cell) => cell.textContent))")
             assert [row[0] for row in cells] == ["walker-1", "walker-2", "walker-3", "walker-4"]
+            links = page.evaluate("[...document.querySelectorAll('#machines th a')].map((one) => one.href)")
+            assert links[0] == "https://walker-1.local:8470/" and len(links) == 4, links
             assert cells[0][1:] == ["listening", "none known", "24.8 V / 24.7 V", "operator / operator", "0.2.0"], cells[0]
             assert cells[1][1] == "latched" and "wheel_lost. left wheel not heard for 204 ms" in cells[1][2] and cells[1][4] == "operator / doubted", cells[1]
             assert cells[2][1:] == ["offline", "none known", "unknown", "unknown", "unknown"], cells[2]
@@ -490,6 +499,7 @@ def press_stop(page, rig):
     page.context.new_cdp_session(page).send("Input.dispatchMouseEvent", {"type": "mouseReleased", "x": at[0], "y": at[1], "button": "left", "clickCount": 1})
     assert late < 1000, f"{late} ms"
     driver.end()
+    driver.client.close()
     until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
 
 
@@ -622,7 +632,7 @@ def test_page_stays_smooth_at_50_hz(rig):
             session.send("HeapProfiler.collectGarbage")
             heap.append(page.evaluate("performance.memory.usedJSHeapSize") / 1e6)
         times = sorted(page.evaluate("frames_ms.splice(0)"))
-        # A sentence for docs/web.md.
+        # A sentence for docs/user/web.md.
         print(
             f"{minutes:g} minutes at 50 Hz, 390 x 844: a frame every {times[len(times) // 2]:.1f} ms (median; 99 %: {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms, "
             f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.",

@@ -28,7 +28,7 @@ def free_port():
 
 
 class Person:
-    """A sender with a token, as docs/web.md writes it down: a session of its own, and a proof with each request."""
+    """A sender with a token, as docs/user/web.md writes it down: a session of its own, and a proof with each request."""
 
     def __init__(self, rig, token=None):
         self.rig, self.token, self.session, self.sequence, self.challenge = rig, token, secrets.token_hex(16), 0, None

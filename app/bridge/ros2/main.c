@@ -32,7 +32,7 @@ static void tell_reach(const ros_settings_t *settings) {
         (void)fprintf(
             stderr,
             "iwheel-ros2: info: %u sockets receive from every address (%s); the unit lets other machines through only "
-            "if it was edited as docs/ros2.md shows\n",
+            "if it was edited as docs/user/ros2.md shows\n",
             bridge_reach_count(NULL, 0, text), text);
     }
 }

@@ -150,11 +150,9 @@ static void carry_out(void *context, sock_client_t *client, const char *line, si
     relay_channel_t *channel = channel_of(self, client);
     iwn_request_t request;
     iwn_refusal_t refusal;
-    iwn_json_t root;
     if (channel == NULL || sock_client_is_closing(client)) {
         return;
     }
-    iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
     if (!iwn_request_read(line, length, &self->work, &request, &refusal)) {
         answer_here(channel, &request.id, refusal.error, refusal.message);
     } else if (channel->watch && !iwn_cmd_watches(request.cmd)) {
@@ -162,9 +160,9 @@ static void carry_out(void *context, sock_client_t *client, const char *line, si
             channel, &request.id, IWN_DENIED,
             "this socket is for watching; to drive connect to [northbound] socket of iwheel-serial, as a member "
             "of its group");
-    } else if (iwn_json_check(line, length, &self->work, &root, &fault)) {
+    } else {
         const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
-        forward(self, channel, &request, root, sock_client_sent_us(client, self->now_us, since_us));
+        forward(self, channel, &request, iwn_json_root(line), sock_client_sent_us(client, self->now_us, since_us));
     }
     client->held = serial_queue_is_full(&channel->queue); // The next line stays where it is.
 }

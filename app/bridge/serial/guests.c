@@ -54,11 +54,8 @@ static bool forward_stop(relay_t *self, sock_client_t *client, const iwn_request
 void relay_guest_carry_out(relay_t *self, sock_client_t *client, const char *line, size_t length) {
     iwn_request_t request;
     iwn_refusal_t refusal;
-    iwn_json_t root;
-    iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
-    const bool stops = iwn_request_read(line, length, &self->work, &request, &refusal) && iwn_cmd_stops(request.cmd) &&
-                       iwn_json_check(line, length, &self->work, &root, &fault);
-    if (!stops || !forward_stop(self, client, &request, root)) {
+    const bool stops = iwn_request_read(line, length, &self->work, &request, &refusal) && iwn_cmd_stops(request.cmd);
+    if (!stops || !forward_stop(self, client, &request, iwn_json_root(line))) {
         sock_service_refuse_crowd(&self->clients, client, &refusal);
         sock_clients_refuse(&self->clients, client, &request.id, &refusal);
     }

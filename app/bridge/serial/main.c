@@ -37,7 +37,8 @@ static int check(const serial_settings_t *settings, relay_t *relay) {
     }
     serial_port_close(&port);
     if (link->state == SERIAL_SILENT) {
-        serial_link_explain(link, settings->board.port, settings->board.baud, words, sizeof words);
+        serial_trouble_write(&link->noise, &(serial_place_t){settings->board.port, settings->board.baud}, words,
+                             sizeof words);
         (void)printf("fail  %s\n", words);
         return 1;
     }

@@ -21,9 +21,6 @@
 /// Of opening the port again.
 #define BACKOFF_MIN_US 100000U
 #define BACKOFF_MAX_US 2000000U
-/// Of saying what is wrong: first after this, and then seldom.
-#define EXPLAIN_US       2500000U
-#define EXPLAIN_AGAIN_US 600000000U
 /// As rarely the loop comes round when there is nothing to do.
 #define IDLE_US 1000000U
 
@@ -33,6 +30,7 @@ static void watch_port(relay_t *self, int operation) {
     (void)epoll_ctl(self->clients.epoll_fd, operation, self->port.fd, &interest);
 }
 
+/// For clients that come, and for the log unless it has been said.
 static void set_trouble(relay_t *self, const char *words) {
     if (strcmp(self->trouble, words) != 0) {
         (void)snprintf(self->trouble, sizeof self->trouble, "%s", words);
@@ -62,7 +60,7 @@ static int open_port(relay_t *self) {
         return error;
     }
     serial_link_init(&self->link, self->now_us);
-    self->explained_us = self->now_us + EXPLAIN_US;
+    serial_trouble_begin(&self->judged, self->now_us);
     self->asked_us = 0;
     self->free_us = self->now_us;
     memcpy(self->out, "\n", 1); // Ends half a line of whoever wrote before.
@@ -92,6 +90,7 @@ static void take_news(relay_t *self, serial_news_t news, const iwn_line_t *line)
     case SERIAL_NEWS_LOST:
         set_trouble(self, "the board has started anew");
         relay_drop_clients(self);
+        serial_trouble_begin(&self->judged, self->now_us);
         self->asked_us = 0;
         break;
     case SERIAL_NEWS_NONE:
@@ -118,16 +117,27 @@ static void read_port(relay_t *self) {
     }
 }
 
+/// Why no board answers, by the bytes since the last time. The log gets each loss of a board that was there.
+static void explain(relay_t *self, bool fell_silent) {
+    const serial_place_t place = {self->settings->board.port, self->settings->board.baud};
+    const serial_report_t report = serial_trouble_judge(&self->judged, &self->link.noise, self->now_us);
+    if (report != SERIAL_REPORT_KEEP) {
+        serial_trouble_write(&self->link.noise, &place, self->trouble, sizeof self->trouble);
+    }
+    if (report == SERIAL_REPORT_LOG || fell_silent) {
+        sock_log(&self->log, SOCK_LOG_WARNING, "%s", self->trouble);
+    }
+    serial_link_forget_noise(&self->link);
+}
+
 static void poll_link(relay_t *self) {
-    char words[sizeof self->trouble];
     const bool fell_silent = serial_link_fell_silent(&self->link, self->now_us);
     if (fell_silent) {
-        self->explained_us = 0;
+        serial_trouble_begin(&self->judged, self->now_us);
     }
-    if (self->link.state == SERIAL_SILENT && self->now_us >= self->explained_us) {
-        self->explained_us = self->now_us + EXPLAIN_AGAIN_US;
-        serial_link_explain(&self->link, self->settings->board.port, self->settings->board.baud, words, sizeof words);
-        set_trouble(self, words);
+    if (fell_silent ||
+        (self->port.fd >= 0 && self->link.state == SERIAL_SILENT && self->now_us >= self->judged.judge_us)) {
+        explain(self, fell_silent);
     }
     if (fell_silent) { // Its clients are told why.
         relay_drop_clients(self);
@@ -216,7 +226,7 @@ static uint64_t next_us(const relay_t *self) {
     }
     then_us = earlier(then_us, relay_channels_next_us(self));
     if (self->link.state == SERIAL_SILENT) {
-        return earlier(then_us, earlier(self->asked_us + RELAY_ASK_US, self->explained_us));
+        return earlier(then_us, earlier(self->asked_us + RELAY_ASK_US, self->judged.judge_us));
     }
     const bool waits = self->out_length == 0U && self->free_us > self->now_us + AHEAD_US;
     return waits ? earlier(then_us, self->free_us - AHEAD_US) : then_us;

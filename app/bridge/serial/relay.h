@@ -19,6 +19,7 @@
 #include "serial_port.h"
 #include "serial_queue.h"
 #include "serial_settings.h"
+#include "serial_trouble.h"
 
 #include "common/bridge_service.h"
 #include "sockets/log.h"
@@ -80,8 +81,8 @@ typedef struct {
     uint64_t asked_us;   ///< For the link.
     uint64_t retry_us;   ///< The port is opened again then.
     uint64_t backoff_us;
-    uint64_t explained_us; ///< What is wrong is said next time not before.
-    char trouble[512];     ///< Why there is no board, for clients that come.
+    serial_trouble_t judged; ///< What comes while no board answers.
+    char trouble[512];       ///< Why there is no board, for clients that come.
     size_t out_length;
     size_t out_sent;
     char out[IWN_LINE_BOARD_MAX];

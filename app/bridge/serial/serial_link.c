@@ -14,7 +14,7 @@ void serial_link_init(serial_link_t *self, uint64_t now_us) {
     self->boot[0] = '\0';
     self->version[0] = '\0';
     self->received_us = now_us;
-    self->noise = (serial_noise_t){.bytes = 0};
+    serial_link_forget_noise(self);
     iwn_receiver_init(&self->receiver, self->buffer, sizeof self->buffer, true);
 }
 
@@ -99,7 +99,7 @@ static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t n
         return SERIAL_NEWS_NONE;
     }
     self->received_us = now_us;
-    self->noise = (serial_noise_t){.bytes = 0};
+    serial_link_forget_noise(self);
     // A board's time falls when it starts anew, whatever it says of itself.
     const bool fell = self->state == SERIAL_LINKED && self->stamps > 0U && line->t_us < newest(self)->t_us;
     if (fell) {
@@ -147,33 +147,6 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us) {
     return true;
 }
 
-void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size) {
-    const serial_noise_t *noise = &self->noise;
-    const uint64_t unchecked = noise->lines[IWN_LINE_UNCHECKED];
-    if (noise->bytes == 0U) {
-        (void)snprintf(out, size,
-                       "nothing comes from %s: is the board powered, is it running the image `gateway`, and are "
-                       "both lines (TX, RX) and ground connected?",
-                       port);
-    } else if (noise->odd * 8U > noise->bytes) {
-        (void)snprintf(out, size,
-                       "%llu bytes came from %s that are no text: the baud rate is another than %u; set baud to "
-                       "that of the image, or the lines are disturbed",
-                       (unsigned long long)noise->bytes, port, baud);
-    } else if (noise->lines[IWN_LINE_CORRUPT] > 0U || noise->lines[IWN_LINE_LOST] > 0U) {
-        (void)snprintf(out, size,
-                       "lines come damaged from %s (%llu with a wrong CRC): a bad cable, ground, or two programs "
-                       "reading the port",
-                       port, (unsigned long long)noise->lines[IWN_LINE_CORRUPT]);
-    } else if (unchecked + noise->lines[IWN_LINE_MISFORMED] > 0U) {
-        (void)snprintf(out, size,
-                       "another protocol is spoken on %s (such as \"%s\"): it is another device, or the board runs "
-                       "another image than `gateway`",
-                       port, noise->sample);
-    } else {
-        (void)snprintf(out, size,
-                       "%llu bytes came from %s and no whole line: another protocol or baud rate, or a board that "
-                       "hangs",
-                       (unsigned long long)noise->bytes, port);
-    }
+void serial_link_forget_noise(serial_link_t *self) {
+    self->noise = (serial_noise_t){.bytes = 0};
 }

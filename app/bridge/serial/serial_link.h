@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// What is known of the board at the other end of the line: is it there, which start of it, which stamps came when, and if it is not
-/// understood, what is wrong.
+/// What is known of the board at the other end of the line: is it there, which start of it, which stamps came when, and what came
+/// that was not understood (serial_trouble.h judges it).
 ///
 ///     SILENT --event link--> LINKED --no good line for SERIAL_SILENT_US--> SILENT
 ///                              '--another boot, a stamp that falls--> SILENT (and at once LINKED with the other boot)
 ///
-/// Pure: bytes and time in, lines and words out.
+/// Pure: bytes and time in, lines out.
 #ifndef SERIAL_LINK_H
 #define SERIAL_LINK_H
 
@@ -29,7 +29,7 @@ typedef struct {
     uint64_t t_us;        ///< By the board's.
 } serial_stamp_t;
 
-/// What came over the line since it was opened or last understood.
+/// What came over the line since it was opened, last understood or last judged.
 typedef struct {
     uint64_t bytes;
     uint64_t odd;                      ///< Of them neither printable ASCII nor a newline.
@@ -75,7 +75,7 @@ bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us);
 /// The newest stamp that had been heard at that time; false if none had.
 bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us);
 
-/// Why there is no board on this line, with the cure; `port` and `baud` are for the words.
-void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size);
+/// Begins to count anew what is not understood.
+void serial_link_forget_noise(serial_link_t *self);
 
 #endif

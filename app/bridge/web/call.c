@@ -31,12 +31,13 @@ void web_call_resume(web_call_t *self) {
     }
 }
 
-/// Nothing is loaded from elsewhere, nothing frames the page, nothing is kept, and nobody is told where a reader came from.
-static void add_headers(struct MHD_Response *response, const char *type) {
+/// Nothing is loaded from elsewhere, nothing frames the page, and nobody is told where a reader came from. Of what the machine does
+/// nothing is kept; the page's files may be, but are asked for each time.
+static void add_headers(struct MHD_Response *response, const char *type, bool is_file) {
     static const char *const headers[][2] = {
-        {"Cache-Control", "no-store"},
         {"Content-Security-Policy",
          "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
+         "manifest-src 'self'; "
          "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
         {"Cross-Origin-Opener-Policy", "same-origin"},
         {"Cross-Origin-Resource-Policy", "same-origin"},
@@ -44,6 +45,7 @@ static void add_headers(struct MHD_Response *response, const char *type) {
         {"X-Content-Type-Options", "nosniff"},
     };
     (void)MHD_add_response_header(response, "Content-Type", type);
+    (void)MHD_add_response_header(response, "Cache-Control", is_file ? "no-cache" : "no-store");
     for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
         (void)MHD_add_response_header(response, headers[i][0], headers[i][1]);
     }
@@ -54,7 +56,7 @@ static enum MHD_Result send_response(const web_call_t *self, unsigned status, st
     if (response == NULL) {
         return MHD_NO;
     }
-    add_headers(response, type);
+    add_headers(response, type, self->verdict.route != NULL && self->verdict.route->verb == WEB_FILE);
     if (status == 401U) {
         (void)MHD_add_response_header(response, "WWW-Authenticate", "IWheel");
     }
@@ -86,11 +88,22 @@ enum MHD_Result web_call_refuse(web_call_t *self, unsigned status, const char *e
 }
 
 static enum MHD_Result send_file(web_call_t *self) {
-    const web_file_t *file = &self->server->files[self->verdict.route - web_routes()];
-    if (file->text == NULL) {
+    const page_file_t *file = &self->server->files[self->verdict.route - web_routes()];
+    const page_body_t *body = page_file_choose(file, header(self->connection, "Accept-Encoding"));
+    const bool known = page_body_is_known(body, header(self->connection, "If-None-Match"));
+    if (body->text == NULL) {
         return web_call_refuse(self, 404, "not_there", "this file is not installed");
     }
-    return send_text(self, file->text, file->length, MHD_RESPMEM_PERSISTENT);
+    struct MHD_Response *response =
+        MHD_create_response_from_buffer(known ? 0U : body->length, body->text, MHD_RESPMEM_PERSISTENT);
+    if (response != NULL) {
+        (void)MHD_add_response_header(response, "Vary", "Accept-Encoding");
+        (void)MHD_add_response_header(response, "ETag", body->tag);
+        if (body == &file->packed && !known) {
+            (void)MHD_add_response_header(response, "Content-Encoding", "gzip");
+        }
+    }
+    return send_response(self, known ? 304U : 200U, response, self->verdict.route->type);
 }
 
 static enum MHD_Result send_challenge(web_call_t *self) {
@@ -115,17 +128,18 @@ static enum MHD_Result send_status(web_call_t *self) {
 static enum MHD_Result send_health(web_call_t *self) {
     const web_server_t *server = self->server;
     const web_settings_t *settings = server->settings;
-    char text[384];
+    char text[640];
     iwc_message_t state;
     const bool good = web_link_state(&server->link, server->now_us, &state);
-    const int length = snprintf(
-        text, sizeof text,
-        "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
-        "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s}\n",
-        good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
-        settings->drive.enabled ? "true" : "false",
-        (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false", settings->drive.max_speed_mm_s,
-        settings->drive.ttl_ms, settings->gateway.rate_hz, web_settings_has_fleet(settings) ? "true" : "false");
+    const int length =
+        snprintf(text, sizeof text,
+                 "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
+                 "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s,\"machine_page\":\"%s\"}\n",
+                 good ? "true" : "false", (server->link.gateway.state == BRIDGE_LINK_HERE) ? "connected" : "away",
+                 settings->drive.enabled ? "true" : "false",
+                 (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false",
+                 settings->drive.max_speed_mm_s, settings->drive.ttl_ms, settings->gateway.rate_hz,
+                 web_settings_has_fleet(settings) ? "true" : "false", web_settings_machine_page(settings));
     self->status = good ? 200U : 503U;
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "common/bridge_service.h"
 #include "common/program.h"
+#include "lan.h"
 #include "web_server.h"
 
 #include "web_texts.h"
@@ -14,6 +15,7 @@
 
 #define PRINT_URL  BRIDGE_OWN
 #define PRINT_READ (BRIDGE_OWN + 1)
+#define RUN_LAN    (BRIDGE_OWN + 2)
 
 #ifdef IWHEEL_WEB_QR
 static bool is_dark(const QRcode *code, int x, int y) {
@@ -66,7 +68,7 @@ static int print_url(const web_settings_t *settings) {
         return 0;
     }
     (void)snprintf(name, sizeof name, "%s", settings->web.listen);
-    if (wild && gethostname(name, sizeof name - 1U) != 0) {
+    if (wild && !web_lan_address(name) && gethostname(name, sizeof name - 1U) != 0) {
         (void)snprintf(name, sizeof name, "localhost");
     }
     const bool v6 = strchr(name, ':') != NULL;
@@ -75,6 +77,7 @@ static int print_url(const web_settings_t *settings) {
                    v6 ? "[" : "", name, v6 ? "]" : "", settings->web.port, token.text);
     (void)printf("%s\n", url);
     print_qr(url);
+    (void)fflush(stdout);
     return 0;
 }
 
@@ -114,13 +117,15 @@ static int loop(web_server_t *server) {
     }
 }
 
-static int run(const web_settings_t *settings) {
+/// `shows`: the address for a phone, with the token, as soon as it can be reached there.
+static int run(const web_settings_t *settings, bool shows) {
     static web_server_t server;
     bridge_service_take_signals();
     int code = web_server_open(&server, settings);
+    code = (code == 0 && shows) ? print_url(settings) : code;
     if (code == 0) {
-        (void)fprintf(stderr, "iwheel-web: on %s port %u; its address with the token: iwheel-web --url\n",
-                      settings->web.listen, settings->web.port);
+        (void)fprintf(stderr, "iwheel-web: on %s port %u%s\n", settings->web.listen, settings->web.port,
+                      shows ? "" : "; its address with the token: iwheel-web --url");
         code = loop(&server);
     }
     web_server_close(&server);
@@ -133,7 +138,7 @@ int main(int count, char **arguments) {
         .form = &web_settings_form,
         .path = WEB_SETTINGS_PATH,
         .help = web_help,
-        .own = {{"url", NULL}, {"read-secret", NULL}},
+        .own = {{"url", NULL}, {"read-secret", NULL}, {"lan", NULL}},
         .settings = &settings,
         .standard = &web_settings_standard,
     };
@@ -149,5 +154,9 @@ int main(int count, char **arguments) {
     if (action == PRINT_READ) {
         return print_read(&settings);
     }
-    return (action == BRIDGE_CHECK) ? check(&settings) : run(&settings);
+    if (action == RUN_LAN) {
+        const int prepared = web_lan_prepare(&settings);
+        return (prepared == 0) ? run(&settings, true) : prepared;
+    }
+    return (action == BRIDGE_CHECK) ? check(&settings) : run(&settings, false);
 }

@@ -19,9 +19,16 @@ static const web_route_t routes[] = {
     {"GET", "/proof.js", WEB_FILE, "proof.js", JS},
     {"GET", "/plots.js", WEB_FILE, "plots.js", JS},
     {"GET", "/recordings.js", WEB_FILE, "recordings.js", JS},
+    {"GET", "/link.js", WEB_FILE, "link.js", JS},
+    {"GET", "/state.js", WEB_FILE, "state.js", JS},
+    {"GET", "/stop.js", WEB_FILE, "stop.js", JS},
+    {"GET", "/drive.js", WEB_FILE, "drive.js", JS},
+    {"GET", "/player.js", WEB_FILE, "player.js", JS},
     {"GET", "/page.js", WEB_FILE, "page.js", JS},
     {"GET", "/fleet", WEB_FILE, "fleet.html", "text/html; charset=utf-8"},
     {"GET", "/fleet.js", WEB_FILE, "fleet.js", JS},
+    {"GET", "/manifest.webmanifest", WEB_FILE, "manifest.webmanifest", "application/manifest+json"},
+    {"GET", "/icon.svg", WEB_FILE, "icon.svg", "image/svg+xml"},
     {"GET", "/uPlot.iife.min.js", WEB_FILE, "uPlot.iife.min.js", JS},
     {"GET", "/uPlot.min.css", WEB_FILE, "uPlot.min.css", "text/css; charset=utf-8"},
     {"GET", "/uPlot.LICENSE", WEB_FILE, "uPlot.LICENSE", TEXT},
@@ -187,11 +194,11 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
                    ? refuse(401, "bad_session", "the session is not known; begin another one: GET /api/challenge")
                    : refuse(401, "bad_token",
                             "no valid proof of the token; open the address that `iwheelctl web` prints. Programs: see "
-                            "docs/web.md");
+                            "docs/user/web.md");
     }
     if (route == NULL) {
-        return other_method ? refuse(405, "bad_method", "another method: see docs/web.md")
-                            : refuse(404, "not_there", "there is nothing here: see docs/web.md");
+        return other_method ? refuse(405, "bad_method", "another method: see docs/user/web.md")
+                            : refuse(404, "not_there", "there is nothing here: see docs/user/web.md");
     }
     if ((route->verb == WEB_ARM || route->verb == WEB_DRIVE) && !rules->may_drive) {
         return refuse(403, "denied", "driving is not configured: set enabled = yes under [drive] in web.conf");

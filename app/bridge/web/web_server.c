@@ -15,7 +15,6 @@
 
 #define LOOK_US         1000000U
 #define LONGEST_WAIT_MS 250
-#define FILE_MAX        1000000L
 #define NEWCOMERS_MAX   16U
 /// Of a fleet's table: a thousand machines are some 500 kB.
 #define FLEET_BYTES_MAX 1048576
@@ -25,24 +24,6 @@
 static int complain(int code, const char *what, const char *cure) {
     (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, cure);
     return code;
-}
-
-/// The whole file, ended by a NUL; NULL: it cannot be read.
-static char *read_all(const char *path, size_t *out_length) {
-    FILE *file = fopen(path, "re");
-    char *text = (file != NULL) ? malloc((size_t)FILE_MAX) : NULL;
-    *out_length = (text != NULL) ? fread(text, 1, (size_t)FILE_MAX - 1U, file) : 0U;
-    const bool good = text != NULL && ferror(file) == 0 && feof(file) != 0;
-    if (file != NULL) {
-        (void)fclose(file);
-    }
-    if (!good) {
-        free(text);
-        return NULL;
-    }
-    text[*out_length] = '\0';
-    char *fitting = realloc(text, *out_length + 1U);
-    return (fitting != NULL) ? fitting : text;
 }
 
 char *web_server_fleet(const web_server_t *self, size_t *out_length) {
@@ -68,8 +49,7 @@ static int read_page(web_server_t *self) {
     const web_route_t *routes = web_routes();
     for (size_t i = 0; routes[i].path != NULL && routes[i].verb == WEB_FILE && i < WEB_FILES; i++) {
         (void)snprintf(path, sizeof path, "%s/%s", self->settings->web.page, routes[i].file);
-        self->files[i].text = read_all(path, &self->files[i].length);
-        if (self->files[i].text == NULL) {
+        if (!page_file_read(&self->files[i], path)) {
             return complain(EX_CONFIG, path,
                             "cannot be read; let page under [web] name the folder of the page's files");
         }
@@ -88,7 +68,7 @@ static int read_certificate(web_server_t *self) {
     if (!web_settings_has_tls(self->settings)) {
         return 0;
     }
-    self->certificate = read_all(self->settings->web.certificate, &length);
+    self->certificate = page_read_all(self->settings->web.certificate, &length);
     if (self->certificate == NULL) {
         return complain(EX_CONFIG, self->settings->web.certificate,
                         "cannot be read; give a PEM file that the bridge's user may read");
@@ -98,7 +78,7 @@ static int read_certificate(web_server_t *self) {
             EX_NOPERM, self->settings->web.key,
             "may be read by others, or written by its group; chmod 0640, and let its group be the bridge's");
     }
-    self->key = read_all(self->settings->web.key, &length);
+    self->key = page_read_all(self->settings->web.key, &length);
     return (self->key != NULL) ? 0
                                : complain(EX_CONFIG, self->settings->web.key,
                                           "cannot be read; give a PEM file that the bridge's user may read");
@@ -219,7 +199,7 @@ void web_server_close(web_server_t *self) {
         web_listen_end(self->settings);
     }
     for (size_t i = 0; i < WEB_FILES; i++) {
-        free(self->files[i].text);
+        page_file_free(&self->files[i]);
     }
     free(self->certificate);
     free(self->key);

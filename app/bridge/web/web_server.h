@@ -9,6 +9,7 @@
 #include "door.h"
 #include "driver.h"
 #include "metrics.h"
+#include "page_file.h"
 #include "proof.h"
 #include "token.h"
 #include "web_link.h"
@@ -20,7 +21,7 @@
 #define WEB_HEADER_US 5000000U
 /// A stream on which nothing happens says so this often.
 #define WEB_PULSE_US 1000000U
-#define WEB_FILES    16U
+#define WEB_FILES    24U
 
 /// IDLE --complete request--> ASKING --answered--> IDLE; IDLE, ASKING --shut down--> LEAVING: the library forgets it in its next round.
 typedef enum { WEB_PEER_IDLE, WEB_PEER_ASKING, WEB_PEER_LEAVING } web_peer_state_t;
@@ -57,11 +58,6 @@ typedef struct web_call {
     struct web_call *next;
 } web_call_t;
 
-typedef struct {
-    char *text;
-    size_t length;
-} web_file_t;
-
 struct web_server {
     const web_settings_t *settings;
     web_link_t link;
@@ -72,7 +68,7 @@ struct web_server {
     uint64_t driver_session; ///< Of the page that holds the lease.
     bridge_movers_t movers;
     web_own_t own;
-    web_file_t files[WEB_FILES]; ///< By their place among the routes.
+    page_file_t files[WEB_FILES]; ///< By their place among the routes.
     struct MHD_Daemon *daemon;
     web_door_t door;
     web_peer_t *peers; ///< The newest first.

@@ -24,6 +24,14 @@ static const char *wrong_listen(const char *text) {
     return good ? NULL : "is no address; write one, such as 127.0.0.1, or unix:PATH";
 }
 
+/// It becomes part of JSON and of a link: an address of https or http, and nothing that needs an escape.
+static const char *wrong_page(const char *text) {
+    static const char permitted[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789:/._-{}[]";
+    const bool is_address = strncmp(text, "https://", 8) == 0 || strncmp(text, "http://", 7) == 0;
+    const bool good = strcmp(text, "none") == 0 || (is_address && text[strspn(text, permitted)] == '\0');
+    return good ? NULL : "is no address of a page; write one, such as https://{machine}.local:8470/, or none";
+}
+
 static const settings_key_t keys[] = {
     {"gateway", "socket", "", TEXT(gateway.socket), .wrong = settings_wrong_socket},
     {"gateway", "rate_hz", " Hz", NUMBER(gateway.rate_hz, 1, 100)},
@@ -37,6 +45,7 @@ static const settings_key_t keys[] = {
     {"web", "certificate", "", TEXT(web.certificate)},
     {"web", "key", "", TEXT(web.key)},
     {"fleet", "source", "", TEXT(fleet.source)},
+    {"fleet", "machine_page", "", TEXT(fleet.machine_page), .wrong = wrong_page},
     {"drive", "enabled", "", SWITCH(drive.enabled)},
     {"drive", "allow_reset", "", SWITCH(drive.allow_reset)},
     {"drive", "max_speed_mm_s", " mm/s", NUMBER(drive.max_speed_mm_s, 10, 2000)},
@@ -53,7 +62,7 @@ const web_settings_t web_settings_standard = {
             .page = IWHEEL_WEB_PAGE_DIR,
             .certificate = "none",
             .key = "none"},
-    .fleet = {"none"},
+    .fleet = {"none", "none"},
     .drive = {.max_speed_mm_s = 300, .ttl_ms = 300},
 };
 
@@ -71,6 +80,10 @@ bool web_settings_has_tls(const web_settings_t *settings) {
 
 bool web_settings_has_fleet(const web_settings_t *settings) {
     return is_given(settings->fleet.source);
+}
+
+const char *web_settings_machine_page(const web_settings_t *settings) {
+    return is_given(settings->fleet.machine_page) ? settings->fleet.machine_page : "";
 }
 
 const char *web_settings_hosts(const web_settings_t *settings) {

@@ -26,7 +26,8 @@ typedef struct {
         char key[108];
     } web;
     struct {
-        char source[108]; ///< What iwheel-fleet writes; none: there is no page of a fleet.
+        char source[108];       ///< What iwheel-fleet writes; none: there is no page of a fleet.
+        char machine_page[128]; ///< Address of a machine's own page, with `{machine}` for its name; none.
     } fleet;
     struct {
         bool enabled;
@@ -47,6 +48,9 @@ bool web_settings_is_unix(const web_settings_t *settings);
 bool web_settings_has_tls(const web_settings_t *settings);
 
 bool web_settings_has_fleet(const web_settings_t *settings);
+
+/// Empty if there is none.
+const char *web_settings_machine_page(const web_settings_t *settings);
 
 /// Empty if there are none.
 const char *web_settings_hosts(const web_settings_t *settings);

@@ -52,12 +52,38 @@ typedef struct {
     trial_t trial;
 } bringup_t;
 
+/// Why a count is not complete. A stall of this program or of the gateway is none: the wheels go on counting.
+typedef enum {
+    HAND_COMPLETE = 0,
+    HAND_OFFLINE,   ///< The gateway answered, and received nothing of a wheel for HAND_OFFLINE_US.
+    HAND_RESTARTED, ///< The gateway saw a wheel restart, or away for so long that it may have.
+    HAND_UNSEEN,    ///< No answer of the gateway for HAND_UNSEEN_US: a turn there and back would not have been seen.
+} hand_gap_t;
+
+#define HAND_OFFLINE_US 500000
+#define HAND_UNSEEN_US  2000000
+/// A longer time between two answers is a stall of ours, and says nothing of the wheels.
+#define HAND_STALL_US 200000
+
+/// One answer of the gateway.
+typedef struct {
+    long long ticks[IW_SIDES];
+    int rpm[IW_SIDES];
+    long long reboots; ///< Of both wheels.
+    bool heard;        ///< Both wheels.
+} hand_look_t;
+
 /// What the wheels counted while hands moved them, in their own sense.
 typedef struct {
     long long ticks[IW_SIDES];
-    long long way[IW_SIDES];    ///< Back and forth, all added.
-    double rpm_turns[IW_SIDES]; ///< The rpm they told, summed up over time.
-    bool heard;                 ///< All the time, but for moments.
+    long long way[IW_SIDES];     ///< Back and forth, all added.
+    double rpm_turns[IW_SIDES];  ///< The rpm they told, summed up over time,
+    long long rpm_way[IW_SIDES]; ///< and the ticks of just that time: without stalls.
+    hand_gap_t gap;              ///< The first one.
+    hand_look_t last;            ///< The last answer with both wheels,
+    int64_t heard_us;            ///< and when it came.
+    int64_t looked_us;
+    int64_t offline_us; ///< Since then, without stalls.
 } hand_t;
 
 /// The two wheels turn so for a moment.
@@ -126,11 +152,20 @@ bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 /// The same; ends bringup if it was not done.
 void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 
-// --- by hand (bringup_hand.c) ------------------------------------------------------------------------------------
+// --- by hand (bringup_hand.c, bringup_sum.c) ------------------------------------------------------------------------------------
 
 /// Waits until both wheels stand, prompts, and adds up what they count until Enter. Ends bringup if they do not stand, or the
 /// operator wants to quit.
 void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
+
+/// The sum begins with this answer.
+void hand_begin(hand_t *out_hand, const hand_look_t *first, int64_t now_us);
+/// The next answer.
+void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us);
+/// False after reporting why not all was counted.
+bool hand_is_complete(const hand_t *hand);
+/// How much of the rotor's turns the rpm made; 0: too little of it was seen.
+double hand_rpm_share(const hand_t *hand, iw_side_t side);
 
 /// Hardly any of its way was back again.
 bool hand_went_one_way(const hand_t *hand, iw_side_t side);

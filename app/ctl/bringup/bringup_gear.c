@@ -26,9 +26,10 @@ typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
     const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
     const char *name = text_side(side);
-    if (!hand->heard) {
-        talk_say("  The wheels were not heard all the time.");
-    } else if (hand->way[other] > hand->way[side]) {
+    if (!hand_is_complete(hand)) {
+        return true;
+    }
+    if (hand->way[other] > hand->way[side]) {
         talk_say("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
                  "exchanged?",
                  text_side(other), hand->ticks[other], name, hand->ticks[side]);
@@ -53,9 +54,8 @@ static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     do {
         hand_follow(self, prompt, &hand);
         const double rotor = (double)llabs(hand.ticks[side]) / IW_TICKS_PER_TURN;
-        *out_turned = (turned_t){.ticks = llabs(hand.ticks[side]),
-                                 .gear = rotor / TURNS,
-                                 .share = (rotor > 0.0) ? hand.rpm_turns[side] / rotor : 0.0};
+        *out_turned =
+            (turned_t){.ticks = llabs(hand.ticks[side]), .gear = rotor / TURNS, .share = hand_rpm_share(&hand, side)};
         if (!is_no_turn(&hand, side, out_turned)) {
             return true;
         }

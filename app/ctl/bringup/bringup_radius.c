@@ -40,8 +40,7 @@ static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
 }
 
 static bool is_usable(const bringup_t *self, const hand_t *hand) {
-    if (!hand->heard) {
-        talk_say("  The wheels were not heard all the way. Once more, please.");
+    if (!hand_is_complete(hand)) {
         return false;
     }
     if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {

@@ -29,9 +29,10 @@ static double rolled(const bringup_t *self, const hand_t *hand, iw_side_t side) 
 static bool is_turn(const bringup_t *self, const hand_t *hand) {
     const double left = rolled(self, hand, IW_LEFT);
     const double right = rolled(self, hand, IW_RIGHT);
-    if (!hand->heard) {
-        talk_say("  The wheels were not heard all the time.");
-    } else if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {
+    if (!hand_is_complete(hand)) {
+        return false;
+    }
+    if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {
         talk_say("  Too few ticks (left %lld, right %lld): both wheels must stand on the ground and roll.",
                  hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
     } else if ((left > 0.0) == (right > 0.0)) {

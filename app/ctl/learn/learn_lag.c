@@ -18,7 +18,7 @@
 /// What the configuration takes.
 #define LAG_MIN_MS 10
 #define LAG_MAX_MS 300
-/// Margins of the rule of the pair were computed for this much around its value (docs/pair.md).
+/// Margins of the rule of the pair were computed for this much around its value (docs/user/pair.md).
 #define RANGE_PERCENT 30
 
 void learn_lag_init(learn_lag_t *self) {

@@ -2,7 +2,7 @@
 /// How far the machine turns from its commanded path, at most, when one wheel does something else: a figure for each class.
 ///
 /// Computed from the configuration with decelerations that are assumed, as bringup measures none: of a wheel that is sent
-/// zero, and of one that coasts. Both are the simulator's. docs/pair.md has what the simulator shows.
+/// zero, and of one that coasts. Both are the simulator's. docs/user/pair.md has what the simulator shows.
 #ifndef GW_ANGLES_H
 #define GW_ANGLES_H
 

@@ -12,40 +12,40 @@
 
 /// The iWheel's bus, from its document: 1 Mbit/s, sampled at 62.5 % of the bit.
 #define IW_BUS_BITRATE_HZ            1000000U
-#define IW_BUS_SAMPLE_POINT_PERMILLE 625U ///< Of the bit.
+#define IW_BUS_SAMPLE_POINT_PERMILLE 625U ///< Sample point in permille of the bit.
 
-/// What a controller can be set to, inclusive.
+/// Limits of a controller, inclusive.
 typedef struct {
-    uint16_t prescaler_max; ///< From 1.
-    uint16_t tseg1_min;     ///< A tseg1 of 0 is never chosen.
-    uint16_t tseg1_max;     ///< Quanta.
-    uint16_t tseg2_min;     ///< Quanta.
-    uint16_t tseg2_max;     ///< Quanta.
+    uint16_t prescaler_max; ///< Largest prescaler. The smallest is 1.
+    uint16_t tseg1_min;     ///< Smallest tseg1 in quanta. The solver never chooses 0.
+    uint16_t tseg1_max;     ///< Largest tseg1 in quanta.
+    uint16_t tseg2_min;     ///< Smallest tseg2 in quanta.
+    uint16_t tseg2_max;     ///< Largest tseg2 in quanta.
 } iw_bit_timing_limits_t;
 
 /// bxCAN (STM32F1/F4 reference manuals, CAN_BTR): prescaler 1..1024, BS1 1..16, BS2 1..8.
 #define IW_BIT_TIMING_BXCAN ((iw_bit_timing_limits_t){1024U, 1U, 16U, 1U, 8U})
 
-/// A setting of the controller.
+/// Bit timing of a controller.
 typedef struct {
     uint16_t prescaler; ///< Clock periods in a quantum.
     uint16_t tseg1;     ///< Quanta between the first one and the sample point.
     uint16_t tseg2;     ///< Quanta from the sample point to the end of the bit.
 } iw_bit_timing_t;
 
-/// What a setting comes to on a clock.
+/// Bit rate and sample point of a bit timing on a clock.
 typedef struct {
     uint32_t bitrate_hz;            ///< Rounded to the nearest.
     uint16_t sample_point_permille; ///< Rounded to the nearest.
 } iw_bit_timing_achieved_t;
 
-/// Finds segments that give `bitrate_hz` exactly and the sample point nearest to the wanted one; of equals, the one
-/// with the most quanta, and of these the one that samples later. IW_ERR_RANGE, `*out_timing` untouched, if no setting
-/// gives that rate exactly or an argument is 0. The caller judges the sample point with `iw_bit_timing_achieved`.
+/// Finds the bit timing with exactly the wanted bit rate and the nearest sample point. Of equally good ones it returns
+/// the one with the most quanta, then the one that samples later. Returns IW_ERR_RANGE and leaves `*out_timing`
+/// unchanged if there is none or an argument is 0. The caller checks the sample point with `iw_bit_timing_achieved`.
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
                                 const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing);
 
-/// What the given segments do on that clock. A prescaler of 0 gives {0, 0}, and so does a bit of
+/// Returns the bit rate and the sample point of a bit timing. Returns {0, 0} if the prescaler is 0, or if a bit has
 /// more than UINT32_MAX clock periods.
 iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing);
 

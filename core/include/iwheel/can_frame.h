@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// A classic CAN frame as a value.
+/// A classic CAN frame.
 ///
-/// The id word carries the frame's format in its upper bits, so that one comparison with an 11-bit number refuses
-/// every remote, extended, error and FD frame that happens to bear the same number.
+/// The upper bits of the id word are the format of the frame. One comparison with an 11-bit id therefore refuses every
+/// remote, extended, error and FD frame with the same number.
 #ifndef IW_CAN_FRAME_H
 #define IW_CAN_FRAME_H
 
@@ -16,16 +16,16 @@
 #define IW_CAN_ID_MASK  0x000007FFU ///< An 11-bit id. All other bits of a usable frame's id word are zero.
 #define IW_CAN_DATA_MAX 8U          ///< Bytes of a classic frame.
 
-/// Where a frame came from.
+/// Source of a frame.
 typedef enum {
     IW_CAN_RECEIVED = 0, ///< Another node sent it.
-    IW_CAN_ECHO = 1,     ///< We sent it and the controller says that it is on the bus.
+    IW_CAN_ECHO = 1,     ///< This node sent it, and the controller confirms that it was on the bus.
 } iw_can_kind_t;
 
-/// A frame of the bus, or one for it.
+/// A frame that was received or is to be sent.
 typedef struct {
     uint32_t id;                   ///< 11-bit id, or'ed with IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD.
-    uint8_t data[IW_CAN_DATA_MAX]; ///< At a multiple of four bytes: read and written a word at a time.
+    uint8_t data[IW_CAN_DATA_MAX]; ///< Data, aligned to four bytes: the codec reads and writes words.
     uint8_t dlc;                   ///< Number of bytes in `data`, 0..8.
     uint8_t kind;                  ///< An iw_can_kind_t. Ignored when sending.
 } iw_can_frame_t;

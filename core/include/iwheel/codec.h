@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// The eleven messages of the iWheel: one table of rows, frames to values and back.
+/// Codec of the eleven iWheel messages: a table of the messages, and conversion between frames and values.
 ///
 /// Source of every id, layout, unit and range: the document "CAN Frames for controlling the iWheel". Integers are
-/// two's complement, most significant byte first. Pure functions: no state, callable from anywhere, also from an
-/// interrupt.
+/// two's complement, most significant byte first. The functions have no state and may be called from any context,
+/// including an interrupt.
 ///
 /// | id          | message  | DLC | bytes                                                                | period  |
 /// |-------------|----------|-----|----------------------------------------------------------------------|---------|
@@ -20,8 +20,8 @@
 /// | 513 (0x201) | offset   | 2   | 0-1 force offset i16 dN (left), in the wheel's first 60 s only       | 1000 ms |
 /// | 545 (0x221) | offset   | 2   | same, right                                                          | 1000 ms |
 ///
-/// To read a bus, keep two `iw_codec_wheel_t` and give every frame to `iw_codec_decode`: they hold the latest of
-/// each message, and the kind that it returns says which one has just come.
+/// To read a bus, pass every frame to `iw_codec_decode` with an array of two `iw_codec_wheel_t`. The array then has the
+/// last values of each message, and the returned kind is that of the new message.
 #ifndef IW_CODEC_H
 #define IW_CODEC_H
 
@@ -40,25 +40,25 @@
 #define IW_ID_RIGHT_FORCE    544U ///< 0x220
 #define IW_ID_RIGHT_OFFSET   545U ///< 0x221
 
-#define IW_DLC_SETPOINT 5U ///< Least length of a setpoint, bytes.
-#define IW_DLC_SPEED    4U ///< Of a speed.
-#define IW_DLC_STATUS   7U ///< Of a status.
-#define IW_DLC_POSE     8U ///< Of a pose.
-#define IW_DLC_FORCE    4U ///< Of a force.
-#define IW_DLC_OFFSET   2U ///< Of an offset.
+#define IW_DLC_SETPOINT 5U ///< Minimum length of a setpoint in bytes.
+#define IW_DLC_SPEED    4U ///< Minimum length of a speed message in bytes.
+#define IW_DLC_STATUS   7U ///< Minimum length of a status message in bytes.
+#define IW_DLC_POSE     8U ///< Minimum length of a pose in bytes.
+#define IW_DLC_FORCE    4U ///< Minimum length of a force message in bytes.
+#define IW_DLC_OFFSET   2U ///< Minimum length of an offset in bytes.
 
-/// The document's range of the current setpoint is +/- this.
+/// Limit of the current in a setpoint, from the document: +/- this value.
 #define IW_CURRENT_LIMIT_mA 2000
 /// Odometry ticks in one turn of the rotor.
 #define IW_TICKS_PER_TURN 60U
-/// The wheel stops by itself this long after the last setpoint it received.
+/// A wheel stops on its own after this time without a setpoint.
 #define IW_WHEEL_WATCHDOG_US 1000000U
-/// Temperatures above this are not believed: an unsigned byte cannot show one below 0 degC.
+/// Higher temperatures are not valid: the unsigned byte cannot represent a temperature below 0 degC.
 #define IW_TEMPERATURE_MAX_degC 200U
-/// A battery byte of 255 means "at least 25.5 V".
+/// A battery byte with this value means at least 25.5 V.
 #define IW_BATTERY_SATURATED_dV 255U
 
-/// Which message a frame is, or why it is none.
+/// Message of a frame, or the reason why the frame is not a message.
 typedef enum {
     IW_CODEC_SPEED,
     IW_CODEC_STATUS,
@@ -66,101 +66,103 @@ typedef enum {
     IW_CODEC_OFFSET,
     IW_CODEC_SETPOINT,
     IW_CODEC_POSE,
-    IW_CODEC_UNKNOWN,    ///< No message: not one of the eleven numbers, whatever the format.
-    IW_CODEC_BAD_FORMAT, ///< No message: one of the numbers on a remote, extended, error or FD frame.
-    IW_CODEC_BAD_LENGTH, ///< No message: shorter than the table, or dlc > 8.
+    IW_CODEC_UNKNOWN,    ///< No message: the id is not one of the eleven, in any format.
+    IW_CODEC_BAD_FORMAT, ///< No message: one of the ids on a remote, extended, error or FD frame.
+    IW_CODEC_BAD_LENGTH, ///< No message: shorter than in the table, or dlc > 8.
 } iw_codec_kind_t;
 
-/// So many kinds of message: what is below this is one.
+/// Number of message kinds. Smaller values of iw_codec_kind_t are messages.
 #define IW_CODEC_KINDS IW_CODEC_UNKNOWN
 
 /// One message of the table.
 typedef struct {
     uint16_t id;        ///< 11 bits.
-    uint16_t period_ms; ///< As documented; of a setpoint the longest allowed.
-    uint8_t length;     ///< The least number of bytes.
-    uint8_t kind;       ///< An iw_codec_kind_t. Only IW_CODEC_SETPOINT goes to a wheel; all others come from one.
-    uint8_t side;       ///< An iw_side_t: the wheel that sends it, or for a setpoint the wheel it is for.
+    uint16_t period_ms; ///< Documented period; for a setpoint the longest allowed period.
+    uint8_t length;     ///< Minimum number of bytes.
+    uint8_t kind;       ///< An iw_codec_kind_t. Only IW_CODEC_SETPOINT is sent to a wheel; wheels send all others.
+    uint8_t side;       ///< An iw_side_t: the wheel that sends the message, or that receives the setpoint.
 } iw_codec_row_t;
 
 #define IW_CODEC_ROWS 11U ///< Messages in the table.
 
-/// All messages, by kind, the left wheel's before the right one's.
+/// All messages, ordered by kind, left before right.
 extern const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS];
 
-/// How fast a wheel turns.
+/// Speed message.
 typedef struct {
-    int16_t acceleration_raw; ///< Unit unknown ("???" in the document): shown, never used.
-    int16_t speed_rpm;        ///< Of the wheel or the rotor: see `iw_config_t::rpm_of_rotor`.
+    int16_t acceleration_raw; ///< The unit is unknown ("???" in the document). Shown, never used.
+    int16_t speed_rpm;        ///< Speed of the wheel or of its rotor: see `iw_config_t::rpm_of_rotor`.
 } iw_codec_speed_t;
 
-/// How a wheel is.
+/// Status message.
 typedef struct {
-    int32_t odometry_ticks;   ///< Wraps.
-    uint8_t battery_dV;       ///< Saturates at IW_BATTERY_SATURATED_dV.
-    uint8_t temperature_degC; ///< Believed up to IW_TEMPERATURE_MAX_degC.
+    int32_t odometry_ticks;   ///< Odometry. Wraps.
+    uint8_t battery_dV;       ///< Battery voltage. Saturates at IW_BATTERY_SATURATED_dV.
+    uint8_t temperature_degC; ///< Temperature. Valid up to IW_TEMPERATURE_MAX_degC.
     uint8_t cpu_percent;      ///< Load of the wheel's processor.
 } iw_codec_status_t;
 
-/// What the sensor on the shaft shows.
+/// Force message: the sensor on the shaft.
 typedef struct {
-    int16_t debug_raw; ///< "Debugging (not important)".
-    int16_t force_raw; ///< cN on the left, dN on the right, says the document. See force_offset.h.
+    int16_t debug_raw; ///< "Debugging (not important)" in the document.
+    int16_t force_raw; ///< Normal force. Document: cN on the left, dN on the right. See force_offset.h.
 } iw_codec_force_t;
 
-/// Where the machine is, as the right wheel reckons it.
+/// Pose message: pose of the machine as the right wheel computes it.
 typedef struct {
-    int16_t x_mm;     ///< Wraps.
-    int16_t y_mm;     ///< Wraps.
-    int16_t z_mm;     ///< Wraps.
-    int16_t psi_mrad; ///< Wraps at 65536 mrad, which is no multiple of a turn.
+    int16_t x_mm;     ///< X position. Wraps.
+    int16_t y_mm;     ///< Y position. Wraps.
+    int16_t z_mm;     ///< Z position. Wraps.
+    int16_t psi_mrad; ///< Heading. Wraps at 65536 mrad, which is not a multiple of a turn.
 } iw_codec_pose_t;
 
-/// The force without a load, as the wheel found it at its start.
+/// Offset message: force without a load, measured by the wheel at its start.
 typedef struct {
-    int16_t offset_dN; ///< In dN for both wheels, says the document.
+    int16_t offset_dN; ///< Offset. Document: dN for both wheels.
 } iw_codec_offset_t;
 
-/// What a wheel is told.
+/// Setpoint message.
 typedef struct {
-    int16_t speed_mm_s; ///< In the wheel's own sense.
-    int16_t current_mA; ///< Within +/- IW_CURRENT_LIMIT_mA.
-    uint8_t type;       ///< Opaque: the document lists no values.
+    int16_t speed_mm_s; ///< Speed as on the bus: positive is the wheel's own forward.
+    int16_t current_mA; ///< Current within +/- IW_CURRENT_LIMIT_mA.
+    uint8_t type;       ///< Setpoint type. The document lists no values.
 } iw_codec_setpoint_t;
 
-/// The values of one wheel's messages, each as the last frame of its kind had them. Only the right wheel has a pose.
+/// Last values of each message of one wheel. Only the right wheel sends a pose.
 typedef struct {
-    iw_codec_speed_t speed;       ///< Every 4 ms.
-    iw_codec_status_t status;     ///< Every 40 ms.
-    iw_codec_force_t force;       ///< Every 50 ms.
-    iw_codec_pose_t pose;         ///< Every 40 ms, of the right wheel.
-    iw_codec_setpoint_t setpoint; ///< The last one that was seen for it.
-    iw_codec_offset_t offset;     ///< In the first 60 s of its run.
+    iw_codec_speed_t speed;       ///< Sent every 4 ms.
+    iw_codec_status_t status;     ///< Sent every 40 ms.
+    iw_codec_force_t force;       ///< Sent every 50 ms.
+    iw_codec_pose_t pose;         ///< Sent every 40 ms by the right wheel.
+    iw_codec_setpoint_t setpoint; ///< Last setpoint on the bus for this wheel.
+    iw_codec_offset_t offset;     ///< Sent in the first 60 s after the wheel's start.
 } iw_codec_wheel_t;
 
-/// The least length of that kind of message.
+/// Returns the minimum length of a message in bytes. `kind` < IW_CODEC_KINDS.
 uint8_t iw_codec_length(iw_codec_kind_t kind);
 
-/// The row of a number of 11 bits; NULL if it is not one of the eleven.
+/// Returns the table row of an id, or NULL if the id is not one of the eleven.
 const iw_codec_row_t *iw_codec_find(uint32_t id);
 
-/// What the message is called: "speed", "status", "force", "offset", "setpoint", "pose". Not for a refusal.
+/// Returns the name of a message: "speed", "status", "force", "offset", "setpoint" or "pose". `kind` < IW_CODEC_KINDS.
 const char *iw_codec_name(iw_codec_kind_t kind);
 
-/// Which wheel one of the eleven numbers belongs to.
+/// Returns the wheel of one of the eleven ids.
 iw_side_t iw_codec_side(uint32_t id);
 
-/// Reads any of the eleven messages into the values of its wheel and tells its kind, or why it was refused: then the
-/// values are as they were. Bytes behind the table's length are ignored (a longer frame is accepted).
+/// Decodes a frame into the values of its wheel and returns the kind of the message. If the frame is not a message, it
+/// returns the reason and leaves the values unchanged. It accepts a frame that is longer than the table says, and
+/// ignores the bytes after that length.
 iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]);
 
-/// Writes the message of that kind with the wheel's values, with the table's length, bytes behind it zero, kind
-/// IW_CAN_RECEIVED. IW_ERR_ID if there is none (a pose of the left wheel). A setpoint's current is clamped as below.
+/// Encodes the message `kind` of `side` from the values of `*wheel`. The frame has the table's length, zero bytes after
+/// it, and kind IW_CAN_RECEIVED. Returns IW_ERR_ID if there is no such message (a pose of the left wheel). Clamps the
+/// current of a setpoint like `iw_codec_encode_setpoint`.
 iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *wheel,
                             iw_can_frame_t *out_frame);
 
-/// Writes a setpoint of `dlc` 5..8 bytes, zero padded. The last line of defence for the current: it is clamped to
-/// +/- IW_CURRENT_LIMIT_mA. Returns true if it had to be, which the caller counts.
+/// Encodes a setpoint of `dlc` bytes (5..8), padded with zeros. Clamps the current to +/- IW_CURRENT_LIMIT_mA, which is
+/// the last check before the bus. Returns true if it clamped the current; the caller counts that.
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame);
 

@@ -1,71 +1,72 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Do both wheels together go where they are commanded? Each rule of follow.h judges one wheel; a machine on two wheels
-/// turns when only one of them does something else.
+/// Compares the path of the pair with the commanded path. The rules of follow.h judge each wheel alone, but a machine
+/// on two wheels turns when only one of them deviates.
 ///
 ///     applied --lag--> expected;   measured - expected, less what is ordinary, of each wheel
 ///     right - left --integral, leaking--> deviation from the commanded path;   beyond pair_mm: it diverges
 ///
-/// The expected speed follows the applied one as a first-order system with the time constant `wheel_lag_ms`. Ordinary
-/// is what a loaded wheel stays below its setpoint, and a step of its telemetry: so much of the
-/// difference does not count. A steady difference of `pair_mm` in `pair_leak_ms` on top of it is never noticed.
+/// The expected speed follows the applied speed as a first-order system with the time constant `wheel_lag_ms`. Ordinary
+/// differences do not count: the droop of a loaded wheel, and one step of its telemetry. A steady difference of
+/// `pair_mm` in `pair_leak_ms` beyond them is never detected.
 ///
 /// Millimetres and mm/s are those of setpoints, at IW_SETPOINT_RADIUS_MM.
 ///
-/// The best reaction depends on what happened. A wheel that is blocked turns the machine for as long as the other one
-/// goes on: zero at once. A wheel that runs on turns it for as long as it is faster: common ramp.
+/// The best reaction depends on the fault. A blocked wheel turns the machine as long as the other wheel runs: the core
+/// commands zero immediately. A wheel that runs on turns the machine as long as it is faster: the core ramps both down.
 #ifndef IW_DIVERGE_H
 #define IW_DIVERGE_H
 
 #include "iwheel/config.h"
 
-/// What a wheel may stay below or above its expected speed without counting. Ours.
+/// A difference from the expected speed of up to this share does not count. Chosen by us.
 #define IW_DIVERGE_DROOP_PERCENT 4
-/// A wheel below this share of its expected speed has hardly any: zero at once. Ours: docs/pair.md has the table.
+/// A wheel below this share of its expected speed is slow: zero immediately. Chosen by us: docs/user/pair.md has the
+/// table.
 #define IW_DIVERGE_SLOW_PERCENT 80
-/// A wheel below this share of its expected speed is as good as blocked, and its difference counts double: no kerb does
-/// that. Ours.
+/// A wheel below this share of its expected speed is practically blocked, and its difference counts double: a kerb does
+/// not slow a wheel so much. Chosen by us.
 #define IW_DIVERGE_GONE_PERCENT 25
-/// Not where the wheel is expected to be slower than this: one rpm is 20 mm/s.
+/// That rule applies only above this expected speed, because one rpm is 20 mm/s.
 #define IW_DIVERGE_GONE_UM_S 50000
-/// Time is taken in steps of at least this, so that roundings do not add up.
+/// Shortest time step of the comparison, so that rounding errors do not add up.
 #define IW_DIVERGE_STEP_US 1000U
 
-/// What the comparison shows.
+/// Result of the comparison.
 typedef enum {
-    IW_DIVERGE_NOT = 0, ///< The pair goes where it is commanded.
-    IW_DIVERGE_AWAY,    ///< It does not: one wheel is too fast, or somewhat slow.
-    IW_DIVERGE_SLOW,    ///< It does not: one wheel has hardly any of its speed, or turns backwards.
+    IW_DIVERGE_NOT = 0, ///< The pair follows the commanded path.
+    IW_DIVERGE_AWAY,    ///< The pair leaves the path: one wheel is too fast, or somewhat slow.
+    IW_DIVERGE_SLOW,    ///< The pair leaves the path: one wheel is below IW_DIVERGE_SLOW_PERCENT or turns backwards.
 } iw_diverge_verdict_t;
 
-/// The pair, compared.
+/// State of the comparison.
 typedef struct {
-    const iw_config_t *config;       ///< The owner's.
-    uint8_t side;                    ///< An iw_side_t: whose speed differs more. Of the last step that compared.
-    int32_t applied_mm_s[IW_SIDES];  ///< For the next step, written by the owner.
-    int32_t measured_mm_s[IW_SIDES]; ///< The same, by `iw_diverge_receive`.
-    int32_t um_s_per_rpm;            ///< Speed in um/s at 1 rpm of telemetry, a step of it.
-    int32_t expected_um_s[IW_SIDES]; ///< Where each wheel should be by now.
-    int32_t path_um;                 ///< Right minus left: how far the pair has left its path, leaking.
-    int32_t largest_um;              ///< The largest |path_um| since the drive began.
-    iw_time_us_t at_us;              ///< Compared up to here.
-    iw_time_us_t begun_us;           ///< When the drive began.
+    const iw_config_t *config;       ///< Configuration of the owner.
+    uint8_t side;                    ///< An iw_side_t: the wheel with the larger difference in the last comparison.
+    int32_t applied_mm_s[IW_SIDES];  ///< Applied speeds for the next step. The owner writes them.
+    int32_t measured_mm_s[IW_SIDES]; ///< Measured speeds for the next step, from `iw_diverge_receive`.
+    int32_t um_s_per_rpm;            ///< Speed in um/s at 1 rpm of telemetry, which is its resolution.
+    int32_t expected_um_s[IW_SIDES]; ///< Expected speed of each wheel.
+    int32_t path_um;                 ///< Leaking integral of the deviation from the path, right minus left.
+    int32_t largest_um;              ///< Largest |path_um| since the drive began.
+    iw_time_us_t at_us;              ///< Time of the last comparison.
+    iw_time_us_t begun_us;           ///< Time at which the drive began.
 } iw_diverge_t;
 
-/// `config` must be checked and outlive it.
+/// Initializes `self`. `config` must be checked, and must exist as long as `self`.
 void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config);
 
-/// The drive that began at that time is going on: with a new one the deviation, and the largest of it, begin from zero.
+/// Reports the start time of the present drive. If it is a new drive, sets the deviation and the largest one to zero.
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us);
 
-/// The deviation is forgotten: nothing is compared (not ours, a wheel not heard, our loop late, zero at once). What is
-/// expected goes on from what is measured.
+/// Sets the deviation to zero while nothing is compared: the core does not drive, a wheel sends no telemetry, a step is
+/// late, or a stop without ramp is active. The expected speeds continue from the measured ones.
 void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us);
 
-/// How fast a wheel turns, in the machine's frame.
+/// Sets the measured speed of a wheel, in the machine's frame.
 void iw_diverge_receive(iw_diverge_t *self, size_t side, int32_t measured_mm_s);
 
-/// Compares what is applied and measured since the last step.
+/// Compares the applied and measured speeds since the last step, and returns the result.
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us);
 
 #endif

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// A pair of wheels: everything of the core wired together.
+/// The controller of a pair of wheels. It connects all modules of the core.
 ///
 ///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> envelope -> send -> bus
 ///
-/// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as
-/// it likes. Requests may come between steps, from the same thread of execution; a step right after one sends what
-/// follows from it. What the wheels do is a pure function of configuration, times, frames and requests: the same
-/// recording gives the same bytes on every port.
+/// The owner calls `iw_gateway_step` when a frame arrives, when the e-stop line has an edge, and at the latest at the
+/// time that the last step returned; more calls do no harm. Requests are calls between steps in the same thread of
+/// execution. A step directly after a request sends its result without delay. The commands to the wheels depend only on
+/// configuration, times, frames and requests: the same recording gives the same bytes on every port.
 ///
-/// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
+/// The core uses no heap, no floating point and no file-scope state. docs/developer/sizes.md has the size of
+/// `iw_gateway_t`.
 ///
-/// R1 to R19 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R19 in the comments of the core are the rules of docs/developer/safety-case.md. Fault numbers are rows of its
+/// catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
@@ -29,123 +31,123 @@
 #include "iwheel/private/wheel.h"
 #include "iwheel/snapshot.h"
 
-/// In a step later than this the time of reception is unknown: its frames neither refresh nor fail a wheel's liveness.
+/// In a step that is later than this, reception times are unknown: its frames neither refresh a wheel nor time it out.
 #define IW_GATEWAY_LATE_US 20000U
-/// Later than this, or in one late step after another for this long: STOPPING without ramp.
+/// A step that is later than this, or a run of late steps of this length, causes STOPPING without a ramp.
 #define IW_GATEWAY_STOP_US 100000U
-/// Later than this: LATCHED.
+/// A step that is later than this causes LATCHED.
 #define IW_GATEWAY_HUNG_US 500000U
-/// While nothing is sent and a setpoint still lacks its TX confirmation, the port is asked to purge at once, then this
-/// often.
+/// If a setpoint has no TX confirmation while nothing is sent, the core calls `purge` immediately and then at this
+/// interval.
 #define IW_GATEWAY_LOST_ECHO_US 1000000U
-/// Frames taken in one step at the most. A full bus brings 21 in a millisecond.
+/// Largest number of frames that one step receives. A full bus carries 21 in a millisecond.
 #define IW_GATEWAY_DRAIN_MAX 512U
 
-/// What the port found out about the bus. All zero: nothing known, nothing contradicted.
+/// Facts about the bus that the port has found. All zero if the port knows none.
 typedef struct {
-    bool timing_contradicted; ///< Rate or sample point differ from the configured ones: arm is refused.
+    bool timing_contradicted; ///< Bit rate or sample point differ from the configuration: the core refuses arm.
     bool echo_proven;         ///< An echo proves that the frame was on the bus (IFF_ECHO; bxCAN).
 } iw_bus_facts_t;
 
-/// A drive request. Values are taken as they come: what does not fit is refused here.
+/// A drive request. The core checks the values and refuses a request with a value out of range.
 typedef struct {
     int32_t speed_mm_s[IW_SIDES]; ///< In the machine's frame: positive is forward. -32768..32767.
     int32_t current_mA[IW_SIDES]; ///< +/- IW_CURRENT_LIMIT_mA; not negative with IW_ROLE_LIMIT.
-    bool has_current;             ///< False: the configured maximum, allowed with IW_ROLE_LIMIT only.
+    bool has_current;             ///< False requests the configured maximum. Allowed with IW_ROLE_LIMIT only.
 } iw_drive_t;
 
-/// What a drive request came to.
+/// Result of a drive request.
 typedef struct {
-    iw_pair_t pair; ///< The target after limits; ramps come on top.
-    bool limited;   ///< It differs from the request: both wheels scaled by one factor, or a current limit raised.
+    iw_pair_t pair; ///< The target after limits. The scheduler reaches it by ramps.
+    bool limited; ///< The target differs from the request: both speeds scaled by one factor, or a current limit raised.
 } iw_applied_t;
 
-/// The whole of it. Members are the core's own: what may be known of them, snapshot.h tells. What is short stands
-/// first: a Cortex-M reaches it by shorter instructions.
+/// State of the controller. Only the core may use its members; snapshot.h has the values that others may read. Short
+/// members come first, because a Cortex-M reaches them by shorter instructions.
 typedef struct iw_gateway {
-    iw_bus_state_t bus;   ///< As the port reported it in this step.
-    iw_bus_facts_t facts; ///< As the port told them last.
-    bool backlog;         ///< The last step left frames behind.
-    bool stalled;         ///< This step does not know when its frames came: nothing is judged by age.
-    /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
-    /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
+    iw_bus_state_t bus;   ///< State of the bus in this step.
+    iw_bus_facts_t facts; ///< The last facts from the port.
+    bool backlog;         ///< The last step left received frames in the port.
+    bool stalled;         ///< The reception times of this step are unknown: no age is judged.
+    /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or has not
+    /// purged it within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when the wheels get power.
     bool left_behind;
-    uint32_t purged_stop;              ///< Number of the stop in whose zeros a purge was tried.
-    iw_counters_t counters;            ///< Since init.
-    iw_config_t config;                ///< Copied at init.
-    iw_hal_t hal;                      ///< Copied at init.
-    iw_time_us_t now_us;               ///< Of the present step.
-    iw_time_us_t promised_us;          ///< When the last step asked to be called again.
-    iw_time_us_t suspended_us;         ///< Reported by `iw_gateway_suspended` since the last step.
-    iw_time_us_t stalled_since_us;     ///< When the first of an unbroken run of stalled steps was due.
-    iw_time_us_t pose_us;              ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t purged_us;            ///< When a purge was last tried in this silence; IW_NEVER: not yet.
-    iw_setpoint_t setpoint;            ///< Which pair is due.
-    iw_permit_t permit;                ///< Whether the wheels may move.
-    iw_sender_t sender;                ///< How a pair gets to the bus.
-    iw_wheel_t wheel[IW_SIDES];        ///< What is known of each wheel.
-    iw_follow_t follow[IW_SIDES];      ///< Whether it does as told.
-    iw_diverge_t diverge;              ///< Whether both together do.
-    iw_rolling_t rolling;              ///< Whether they turn without a command.
-    iw_codec_wheel_t told[IW_SIDES];   ///< Each wheel's last telemetry, message by message.
-    iw_force_t force[IW_SIDES];        ///< Its normal force.
-    iw_assumption_store_t assumptions; ///< What is assumed of the wheels.
+    uint32_t purged_stop;              ///< Number of the last stop during whose zeros the core called `purge`.
+    iw_counters_t counters;            ///< Counters since init.
+    iw_config_t config;                ///< Copy of the configuration.
+    iw_hal_t hal;                      ///< Copy of the HAL.
+    iw_time_us_t now_us;               ///< Time of this step.
+    iw_time_us_t promised_us;          ///< Time at which the next step is due.
+    iw_time_us_t suspended_us;         ///< Suspended time from `iw_gateway_suspended` since the last step.
+    iw_time_us_t stalled_since_us;     ///< Due time of the first step in a run of stalled steps.
+    iw_time_us_t pose_us;              ///< Time of the last pose; IW_NEVER if there is none.
+    iw_time_us_t purged_us;            ///< Time of the last purge while nothing is sent; IW_NEVER if there is none.
+    iw_setpoint_t setpoint;            ///< Scheduler of setpoint pairs.
+    iw_permit_t permit;                ///< Permission to move.
+    iw_sender_t sender;                ///< Transmission of pairs and their echoes.
+    iw_wheel_t wheel[IW_SIDES];        ///< State of each wheel.
+    iw_follow_t follow[IW_SIDES];      ///< Comparison of each wheel's speed with its command.
+    iw_diverge_t diverge;              ///< Comparison of the pair's path with the commanded path.
+    iw_rolling_t rolling;              ///< Detection of wheels that turn without a command.
+    iw_codec_wheel_t told[IW_SIDES];   ///< Last telemetry of each wheel, by message.
+    iw_force_t force[IW_SIDES];        ///< Normal force on each wheel.
+    iw_assumption_store_t assumptions; ///< Assumptions about the wheels.
 } iw_gateway_t;
 
-/// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:
-/// the process before us died while armed. On a fault the gateway is left untouched and must not be used. The gateway
-/// must not be moved or copied afterwards: its parts point to its configuration.
+/// Checks the configuration, copies it and the HAL, and enters LISTENING. `restarted`: the previous process died while
+/// armed, so the gateway first sends zeros. Returns IW_CONFIG_OK, or the first fault; then `*self` is unchanged and
+/// must not be used. The gateway must not be moved or copied later, because its parts point to its configuration.
 iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal,
                                   iw_time_us_t now_us, bool restarted);
 
-/// One complete cycle: e-stop, bus, everything received, judgement, and what is due is sent. Returns when to call
-/// again at the latest (never later than one period from now). `now_us` must not go back.
+/// Runs one cycle: reads the e-stop, the bus state and all received frames, applies the safety rules, and sends the
+/// pair that is due. Returns the latest time of the next call, at most one period from now. `now_us` must not decrease.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us);
 
-/// The whole system was suspended for that long, which the clock of `now_us` did not count: the next step counts it as
-/// its own lateness.
+/// Reports that the system was suspended for `for_us` that the clock of `now_us` did not count. The next step adds it
+/// to its lateness.
 void iw_gateway_suspended(iw_gateway_t *self, iw_time_us_t for_us);
 
-/// What the port knows of the bus, whenever it changes.
+/// Sets the facts about the bus. The port calls it when they change.
 void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 
-/// Asks to be armed. IW_REFUSE_NONE: poll `iw_gateway_arming` after each step; when false, the state is ARMED with
-/// this client as holder, or `iw_gateway_arm_refusal` tells why not.
+/// Requests ARMED for `client`. After IW_REFUSE_NONE the caller polls `iw_gateway_arming` after each step. When it is
+/// false, the state is ARMED and the client holds the lease, or `iw_gateway_arm_refusal` returns why not.
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
-/// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE. `sent_us`: when the
-/// command was sent, as far as is known, not later than now. The lease runs from then, and a command from before ARMED
-/// began is refused as IW_REFUSE_STALE_COMMAND. Commands are passed on in the order in which they were sent: an older
-/// one shortens the lease.
+/// Commands both wheels. Writes `*out_applied` only if it returns IW_REFUSE_NONE; a refused command changes neither
+/// wheel. `sent_us`: time at which the client sent the command, not later than now. The lease starts at that time. A
+/// command from before ARMED is refused as IW_REFUSE_STALE_COMMAND. The caller passes commands in the order of
+/// `sent_us`, because an older one shortens the lease.
 iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_client_t client, const iw_drive_t *request,
                               iw_applied_t *out_applied);
 
-/// Ramps down. Needs no lease. `cause`: IW_CAUSE_CLIENT_STOP or IW_CAUSE_SHUTDOWN.
+/// Stops the wheels by a ramp. Any client may call it. `cause`: IW_CAUSE_CLIENT_STOP or IW_CAUSE_SHUTDOWN.
 void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);
 
-/// Zero without ramp, latched. Needs no lease.
+/// Stops the wheels by zero without a ramp and enters LATCHED. Any client may call it.
 void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
-/// Leaves the latch, if nothing speaks against it.
+/// Leaves LATCHED, or returns the reason why it must not.
 iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
 
-/// Ends a hold (`iw_config_t::hold`): from now on time ends the zeros, as without it. It permits motion: on a slope the
-/// machine rolls. Refused as IW_REFUSE_NOT_AT_REST while the wheels are driven, ramp down, or wait to be armed.
+/// Ends a hold (`iw_config_t::hold`): the zeros then end after `zero_hold_ms`, as without a hold. A machine on a slope
+/// may then roll. Refused as IW_REFUSE_NOT_AT_REST while the wheels are driven, ramp down, or wait to be armed.
 iw_refusal_t iw_gateway_release(iw_gateway_t *self);
 
-/// A client's connection ended.
+/// Reports that the connection of `client` has ended.
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
-/// Makes the present force of these wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) their zero: all of them, or none if one
-/// refuses, which `*out_side` then names.
+/// Makes the present force of these wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) their zero. If one wheel refuses, none
+/// is changed and `*out_side` is that wheel.
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side);
 
-/// Puts a force offset of an earlier run in force, unless this run has a better one: see `iw_force_restore`.
+/// Restores a force offset of an earlier run, unless this run has a better one: see `iw_force_restore`.
 void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_provenance_t provenance,
                                int32_t offset_mN);
 
-/// Enters what is known of an assumption from elsewhere: the operator's word, what an earlier run found, or
-/// observation.h. What the bus shows directly the core enters itself. An entry that is only ASSUMED changes nothing.
+/// Sets an assumption from a source outside the core: the operator, an earlier run, or observation.h. The core sets on
+/// its own those that the bus shows directly. An entry with IW_ASSUMED changes nothing.
 void iw_gateway_set_assumption(iw_gateway_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry);
 
 #endif

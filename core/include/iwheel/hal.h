@@ -1,96 +1,98 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// What a port provides: five functions and a context.
+/// Interface that a port implements: five functions and a context.
 ///
-/// None may block, and none may call back into the core. All are called from `iw_gateway_step` only, so from one
-/// thread of execution and never from an interrupt. Unless said otherwise a result > 0 means done, 0 means later or
-/// none, < 0 means broken.
+/// The functions must not block and must not call the core. Only `iw_gateway_step` calls them, so they run in one
+/// thread of execution and never in an interrupt. Results, if a function does not define its own: > 0 is done, 0 is
+/// later or none, < 0 is broken.
 #ifndef IW_HAL_H
 #define IW_HAL_H
 
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
-/// What the controller says of the bus.
+/// State of the bus as the controller reports it.
 typedef enum {
-    IW_BUS_DOWN = 0, ///< Interface absent, down, or not opened.
-    IW_BUS_OFF,      ///< Bus-off: nothing is sent or received.
-    IW_BUS_PASSIVE,  ///< Error passive: takes frames, but something is wrong.
+    IW_BUS_DOWN = 0, ///< The interface is absent, down, or not open.
+    IW_BUS_OFF,      ///< Bus-off: the controller neither sends nor receives.
+    IW_BUS_PASSIVE,  ///< Error passive: the controller accepts frames, but it has seen many errors.
     IW_BUS_ACTIVE,   ///< Error active: the normal state.
 } iw_bus_state_t;
 
-/// An answer of `estop_pressed`: two contacts of one button said different for too long, and have not both been seen
-/// pressed and then both released since. A port without a second contact never answers this.
+/// Result of `estop_pressed`: the two contacts of one button differed for longer than the limit, and since then they
+/// have not both been pressed and then both been released. A port without a second contact never returns it.
 #define IW_ESTOP_DISAGREES 2
 
-/// Where the core gets frames from and gives them to.
+/// The functions through which the core receives and sends frames and reads the e-stop.
 typedef struct {
-    /// Accepts `count` frames (1..IW_SIDES) of different ids, as a whole: the setpoints of both wheels arrive in one
-    /// call, the left one first, and one must not leave long before the other. A port with one call of its system for
-    /// several frames uses it; a driver fills every mailbox before it requests the first.
+    /// Sends `count` frames (1..IW_SIDES) with different ids. The core passes the setpoints of both wheels in one call,
+    /// the left one first. The port must send them close together: it uses one system call for both if there is one,
+    /// and a driver fills every mailbox before it requests the first transmission.
     ///
-    ///     > 0  So many frames were accepted, from the first on; the rest was refused. That proves nothing: only the
-    ///          echo does.
-    ///     0    None was accepted; there is no room for the first one now.
-    ///     < 0  None was accepted; the bus is lost.
+    ///     > 0  Number of accepted frames, counted from the first; the port refused the rest. Only the echo proves that
+    ///          a frame was sent.
+    ///     0    The port accepted none: there is no room for the first frame now.
+    ///     < 0  The port accepted none: the bus is lost.
     ///
-    /// The port never retries what it refused, and stores none of it. One of two counts as a refused pair: the core
-    /// collapses the ramp, so that the next pair is zero, and the echo that is missing ends in IW_CAUSE_SEND_STALLED.
-    /// Of a zero pair the core passes what stands behind a refused frame again, alone: a zero never waits for the other
-    /// wheel.
+    /// The port neither retries nor stores a refused frame. If it accepts one frame of two, the core treats the pair as
+    /// refused: it sets the ramp to zero, so that the next pair is zero, and the missing echo ends in
+    /// IW_CAUSE_SEND_STALLED. If it refuses the first frame of a zero pair, the core passes the second one again alone:
+    /// a zero for one wheel never waits for the other wheel.
     int (*send)(void *context, const iw_can_frame_t *frames, uint32_t count);
 
-    /// Takes the oldest frame received, or the echo of one of ours with its bytes, in the order of the bus. Frames that
-    /// are not for us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are
-    /// counted. Lost frames may be reported by one frame with the id IW_CAN_ERROR: it is counted as unknown.
+    /// Returns the oldest received frame, or the echo of a sent frame with its bytes, in the order of the bus. The port
+    /// may filter out other ids, but it must pass the eleven ids in every format (remote, extended, FD), because the
+    /// core counts them. The port may report lost frames by one frame with the id IW_CAN_ERROR, which counts as
+    /// unknown.
     int (*receive)(void *context, iw_can_frame_t *out_frame);
 
-    /// The state of the bus. A loss of the bus, however short, is reported by at least one call after it. When that
-    /// call returns, no frame sent before the loss is queued any more.
+    /// Returns the state of the bus. At least one call must report each loss of the bus, however short. When that call
+    /// returns, no frame from before the loss may be queued.
     iw_bus_state_t (*bus_state)(void *context);
 
-    /// Purges every setpoint that was handed over and is not on the bus yet, from every queue and mailbox that may hold
-    /// one: without acknowledgement a controller repeats it for ever, and sends it when wheels get power again.
+    /// Removes every setpoint that is not on the bus yet from every queue and mailbox. Without acknowledgement a
+    /// controller repeats a frame without end, and the frame reaches the wheels when they get power again.
     ///
-    ///     > 0  Surely none is left. None of them reaches the bus after the call, and `receive` brings no echo of any:
-    ///          not of one that was sent during the purge, nor one that was received already.
-    ///     0    Begun, or not done within the call (an abort that does not end in bounded time is left alone). A purged
-    ///          frame gives no echo, one that was not purged still does. A loss of the bus, or the next call that
-    ///          returns > 0, reports that the rest is gone.
-    ///     < 0  Cannot be done here.
+    ///     > 0  Done. None of these setpoints reaches the bus after the call, and `receive` returns no echo of them:
+    ///          neither of a frame that was sent during the purge, nor one that was received before it.
+    ///     0    Not finished within the call (the port does not wait for an abort without a time limit). A purged frame
+    ///          has no echo; a frame that was not purged has one. The rest is gone after a loss of the bus, or after
+    ///          the next call that returns > 0.
+    ///     < 0  The port cannot purge.
     ///
-    /// Called once in the zeros of a stop, if a setpoint is not echoed in time; once when the zeros have ended and it
-    /// still is not; then every IW_GATEWAY_LOST_ECHO_US. Whether a wheel is heard does not matter.
+    /// The core calls it once during the zeros of a stop if a setpoint is not echoed in time, once after these zeros if
+    /// the echo is still missing, and then every IW_GATEWAY_LOST_ECHO_US, with or without telemetry from the wheels.
     int (*purge)(void *context);
 
-    /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last
-    /// call; IW_ESTOP_DISAGREES is one of these. < 0: unreadable or gone, which counts as pressed.
+    /// Reads the e-stop. 0: released since the last call, without interruption. > 0: pressed, or an edge since the last
+    /// call, or IW_ESTOP_DISAGREES. < 0: unreadable or absent, which counts as pressed.
     int (*estop_pressed)(void *context);
 
-    void *context; ///< Passed to each of them.
+    void *context; ///< Passed to each function.
 } iw_hal_t;
 
-/// What is known of two contacts of one e-stop button, for a port that has them: pressed if either says so, released
-/// only if both do.
+/// State of an e-stop button with two contacts. The button is pressed if either contact is pressed, and released only
+/// if both are released.
 ///
 ///     AGREES --they differ for longer than the limit--> DISAGREES --both pressed, then both released--> AGREES
 ///
-/// A contact that is shorted reads released for ever: the other one still stops the wheels, and the difference tells.
+/// A shorted contact always reads released. The other contact still stops the wheels, and the difference reveals the
+/// fault.
 typedef struct {
-    iw_time_us_t differ_us; ///< Since when they differ; IW_NEVER: they do not.
-    uint32_t limit_us;      ///< They may differ for so long.
-    bool disagrees;         ///< They differed for longer ...
-    bool proven;            ///< ... and both have been seen pressed since.
+    iw_time_us_t differ_us; ///< Time at which the difference began; IW_NEVER if the contacts agree.
+    uint32_t limit_us;      ///< Longest difference that is not a fault.
+    bool disagrees;         ///< A difference was longer than that.
+    bool proven;            ///< Both contacts have been pressed since `disagrees` became true.
 } iw_estop_pair_t;
 
-/// Begins with contacts that agree.
+/// Initializes `self` with contacts that agree. `limit_us`: longest difference that is not a fault.
 void iw_estop_pair_init(iw_estop_pair_t *self, uint32_t limit_us);
 
-/// One answer out of two, each as of `estop_pressed` of iw_hal_t, and so is the result. A contact that cannot be read
-/// says nothing: it makes the button unreadable, but it neither begins nor ends a disagreement.
+/// Combines the readings of two contacts. Arguments and result have the values of `iw_hal_t::estop_pressed`. An
+/// unreadable contact makes the button unreadable, but it neither begins nor ends a disagreement.
 int iw_estop_pair_see(iw_estop_pair_t *self, iw_time_us_t now_us, int first, int second);
 
-/// When the answer will change by time alone; IW_NEVER if it will not.
+/// Returns the time at which the result changes without a new reading, or IW_NEVER.
 iw_time_us_t iw_estop_pair_next_us(const iw_estop_pair_t *self);
 
 #endif

@@ -1,73 +1,73 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force
-/// units, offset, feedback signs, lengths of frames).
+/// Observations of the wheels' motion for the assumption store. The core itself observes force units, offset, feedback
+/// signs and lengths of frames.
 ///
-/// Optional: it reads through the snapshot and writes through `iw_gateway_set_assumption`, and is linked only where it
-/// is called. No safety rule needs it: a controller without it drives as well.
+/// This module is optional. It reads the snapshot and writes through `iw_gateway_set_assumption`; a program that does
+/// not call it does not link it. No safety rule depends on it.
 ///
-/// - gear ratio: ticks moved against the turns that the rpm say, while a wheel turns one way, not too slowly
-/// - byte order of the pose: read the right way round it moves in small steps, the other way round in large ones
-/// - setpoint type: a wheel runs at the speed it was told, steadily
+/// - Gear ratio: compares the ticks with the turns by rpm while a wheel turns in one direction, not too slowly.
+/// - Byte order of the pose: in the right byte order the pose moves in small steps, in the wrong one in large steps.
+/// - Setpoint type: a wheel runs steadily at its commanded speed.
 ///
-/// Reads no clock, keeps no frame. Thresholds are ours.
+/// It reads no clock and stores no frame. We chose the thresholds.
 #ifndef IW_OBSERVATION_H
 #define IW_OBSERVATION_H
 
 #include "iwheel/snapshot.h"
 
-/// A wheel slower than this (geometric mean of two frames) says too little about its ratio: 1 rpm of resolution is 10
-/// %.
+/// The gear ratio is judged only above this speed (geometric mean of two frames): the resolution of 1 rpm is 10 % of
+/// it.
 #define IW_OBSERVATION_RPM 10
-/// One rotor turn: no shorter stretch is judged.
+/// Shortest stretch for the gear ratio: one rotor turn.
 #define IW_OBSERVATION_TICKS 60
-/// So many turns of the rpm (x us) without an end: status frames are missing, and the stretch begins anew. 100000
-/// ticks.
+/// Longest stretch without a status message, in rpm x us (100000 ticks). After it the stretch begins again.
 #define IW_OBSERVATION_TURNED_MAX 100000000000
-/// Ticks within this share of what the rpm say: the ratio fits. Up to the next: nothing.
+/// The gear ratio fits if the ticks are within this share of the turns by rpm ...
 #define IW_OBSERVATION_FITS_PERMILLE  120
-#define IW_OBSERVATION_FAILS_PERMILLE 250 ///< Further off than this: it does not fit.
-/// That often in a row it must not fit: a frame may be lost.
+#define IW_OBSERVATION_FAILS_PERMILLE 250 ///< ... and does not fit beyond this share. Between them there is no result.
+/// Number of stretches in a row that must not fit: a frame may be lost.
 #define IW_OBSERVATION_MISSES 3U
-/// A gap longer than this between two frames begins anew.
+/// A longer gap between two frames starts the stretch again.
 #define IW_OBSERVATION_GAP_US 100000U
-/// So many steps of the pose in which it moved are judged.
+/// Number of pose steps with motion that are judged ...
 #define IW_OBSERVATION_POSE_STEPS 25U
-#define IW_OBSERVATION_POSE_FAR   1000000 ///< Fewer steps do, if read both ways they add up to this, mm and mrad.
-/// So many times as far it must move, read the wrong way round.
+#define IW_OBSERVATION_POSE_FAR   1000000 ///< ... or fewer, if both byte orders together moved by this, in mm and mrad.
+/// In the wrong byte order the pose must move by this factor more.
 #define IW_OBSERVATION_POSE_FACTOR 8
-/// At least so fast a wheel must run to speak for the setpoint type.
+/// The setpoint type is confirmed by a wheel that runs at least this fast ...
 #define IW_OBSERVATION_TYPE_MM_S 150
-#define IW_OBSERVATION_TYPE_US   1000000U ///< For so long, within 15 % of what it is told (and 1 rpm).
+#define IW_OBSERVATION_TYPE_US   1000000U ///< ... for this time within 15 % (and 1 rpm) of its commanded speed.
 
-/// One wheel.
+/// State of one wheel.
 typedef struct {
-    iw_time_us_t speed_us;  ///< Of the last speed frame that was added.
-    iw_time_us_t status_us; ///< Of the last status frame that was looked at.
-    iw_time_us_t steady_us; ///< When it was last seen not to run as told, or was told something else.
+    iw_time_us_t speed_us;  ///< Time of the last speed message that was added.
+    iw_time_us_t status_us; ///< Time of the last status message that was read.
+    iw_time_us_t steady_us; ///< Last time at which it did not run as commanded, or the command changed.
     int64_t turned;         ///< |rpm| x us since the stretch began.
-    int64_t ticks;          ///< Where it began.
-    uint32_t reboots;       ///< As seen: a change begins the stretch anew.
-    uint32_t misses;        ///< Stretches in a row that did not fit.
-    int16_t rpm;            ///< Of the last speed frame.
-    int16_t applied_mm_s;   ///< What it is told since `steady_us`.
+    int64_t ticks;          ///< Ticks at the beginning of the stretch.
+    uint32_t reboots;       ///< Number of reboots at the beginning; a change starts the stretch again.
+    uint32_t misses;        ///< Number of stretches in a row that did not fit.
+    int16_t rpm;            ///< Speed in the last speed message.
+    int16_t applied_mm_s;   ///< Applied speed since `steady_us`.
     bool open;              ///< A stretch has begun.
 } iw_observation_wheel_t;
 
-/// What has been gathered. The caller's, and the only state of this module.
+/// State of the observations. It belongs to the caller and is the only state of this module.
 typedef struct {
-    iw_observation_wheel_t wheel[IW_SIDES]; ///< By iw_side_t.
-    iw_time_us_t pose_us;                   ///< Of the last pose that was looked at; IW_NEVER: none yet.
+    iw_observation_wheel_t wheel[IW_SIDES]; ///< The wheels, indexed by iw_side_t.
+    iw_time_us_t pose_us;                   ///< Time of the last pose that was read; IW_NEVER if there is none.
     iw_codec_pose_t pose;                   ///< That pose.
-    uint32_t pose_steps;                    ///< Steps in which it moved.
-    int32_t moved;                          ///< In those steps, as it is read.
-    int32_t reversed;                       ///< Read the other way round.
+    uint32_t pose_steps;                    ///< Number of steps with motion.
+    int32_t moved;                          ///< Motion in these steps, in the assumed byte order.
+    int32_t reversed;                       ///< Motion in these steps, in the other byte order.
 } iw_observation_t;
 
-/// Nothing gathered yet.
+/// Initializes `self` without observations.
 void iw_observation_init(iw_observation_t *self);
 
-/// After each step: what it has brought, into what the gateway assumes. `seen`: looked at since the step.
+/// Observes the last step and sets assumptions of the gateway. Call it after each step; `seen`: snapshot since that
+/// step.
 void iw_observation_step(iw_observation_t *self, struct iw_gateway *gateway, const iw_snapshot_t *seen);
 
 #endif

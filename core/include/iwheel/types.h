@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Types that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
-/// refusals; what is assumed of the wheels.
+/// Types that every module shares: time, sides, status codes, commands for a pair of wheels, states, causes of a stop,
+/// refusals, and assumptions about the wheels.
 ///
-/// Units stand at the end of a name: `_mm_s _mm_s2 _mA _mN _rpm _dV _degC _ms _us _permille`. Everything is an
-/// integer. Programmer errors (a null pointer, an enumerator that does not exist) are not reported: they are the
-/// caller's contract. Bad arguments come back as a status; trouble on the wire is counted.
+/// All quantities are integers. Each name ends with its unit: `_mm_s _mm_s2 _mA _mN _rpm _dV _degC _ms _us _permille`.
+/// The core does not check for programmer errors (a null pointer, an enumerator that does not exist): the caller must
+/// avoid them. A function returns a status for a bad argument, and counts a bad frame.
 #ifndef IW_TYPES_H
 #define IW_TYPES_H
 
@@ -13,67 +13,67 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/// A relation between constants that must hold, or the file does not compile. `name` must be unique in its file.
+/// Stops the compilation if `condition` (a constant expression) is false. `name` must be unique in its file.
 #define IW_STATIC_ASSERT(condition, name) typedef char iw_static_assert_##name[(condition) ? 1 : -1]
 
-/// Monotonic time in microseconds since any fixed instant. 64 bits do not wrap in the life of a device.
+/// Monotonic time in microseconds since any fixed instant. It does not wrap in the life of a device.
 typedef uint64_t iw_time_us_t;
 
-/// Later than every time; "no wake-up wanted" and "never happened".
+/// Later than every time. It stands for "no wake-up needed" and "never happened".
 #define IW_NEVER UINT64_MAX
 
 #define IW_US_PER_MS 1000U ///< Microseconds in a millisecond.
 
-/// The two wheels. Usable as an array index.
+/// The two wheels. The values are array indices.
 typedef enum { IW_LEFT = 0, IW_RIGHT = 1 } iw_side_t;
-#define IW_SIDES 2 ///< So many wheels.
+#define IW_SIDES 2 ///< Number of wheels.
 
-/// What a function made of its arguments. Outputs are untouched unless the status is IW_OK.
+/// Result of a function that checks its arguments. It writes its outputs only if the status is IW_OK.
 typedef enum {
     IW_OK = 0,
     IW_ERR_RANGE, ///< A value is outside its documented range.
-    IW_ERR_ID,    ///< There is no such message.
+    IW_ERR_ID,    ///< The protocol has no such message.
 } iw_status_t;
 
-/// What one wheel is told: bytes 1-4 of its setpoint frame.
+/// Command for one wheel: bytes 1-4 of its setpoint frame.
 typedef struct {
-    int16_t speed_mm_s; ///< Positive is forward, of the machine; on the bus, of the wheel.
-    int16_t current_mA; ///< A limit or a setpoint: the document does not say, `iw_config_t::current_role` does.
+    int16_t speed_mm_s; ///< Positive is forward: for the machine, or on the bus for the wheel.
+    int16_t current_mA; ///< Limit or setpoint, by `iw_config_t::current_role`: the document does not specify it.
 } iw_command_t;
 
-/// What both wheels are told, indexed by `iw_side_t`. They leave together or not at all.
+/// Commands for both wheels, indexed by `iw_side_t`. The core sends both or neither.
 typedef struct {
     iw_command_t wheel[IW_SIDES]; ///< By side.
 } iw_pair_t;
 
-/// What was sent: counted since the start.
+/// Counters of sent frames since the start.
 typedef struct {
-    uint32_t pairs;      ///< Whole pairs taken by the port.
-    uint32_t later;      ///< Setpoints that the port did not take.
-    uint32_t clamped;    ///< Currents that the encoder had to clamp. Nonzero means an error of ours.
-    uint32_t gap_us;     ///< Between the last two pairs; 0: the last one was the first after silence.
-    uint32_t gap_max_us; ///< The largest since the last silence ended.
+    uint32_t pairs;      ///< Pairs that the port accepted as a whole.
+    uint32_t later;      ///< Setpoints that the port did not accept.
+    uint32_t clamped;    ///< Currents that the encoder clamped. A nonzero value is an error of the core.
+    uint32_t gap_us;     ///< Time between the last two pairs; 0 if the last pair was the first one after a pause.
+    uint32_t gap_max_us; ///< Largest `gap_us` since the last pause.
 } iw_sent_t;
 
-/// What the current beside the speed means to the wheel. The document does not say, so there is no default and the
-/// wheels do not move until it is set.
+/// Meaning of the current in a setpoint. The document does not specify it, so there is no default, and the core does
+/// not move the wheels until it is configured.
 typedef enum {
     IW_ROLE_UNSET = 0,
-    IW_ROLE_LIMIT,    ///< Zero is speed 0 with the configured maximum current; its sign is never inverted.
-    IW_ROLE_SETPOINT, ///< Zero is 0/0; current ramps with the speed; `invert` negates it too.
+    IW_ROLE_LIMIT,    ///< A limit. A zero command is speed 0 with the maximum current. `invert` does not negate it.
+    IW_ROLE_SETPOINT, ///< A setpoint. A zero command is 0/0. The current ramps with the speed, and `invert` negates it.
 } iw_current_role_t;
 
 /// Unit of a wheel's raw normal force. The document says cN for the left and dN for the right wheel.
 typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
 
-/// Who asks: chosen by the owner, never reused for another connection. 0 is nobody.
+/// Id of a client. The owner of the gateway chooses it and never reuses it for another connection.
 typedef uint32_t iw_client_t;
 #define IW_CLIENT_NONE 0U ///< No client.
 
-/// What a client is told.
+/// State that the gateway reports to clients.
 typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
 
-/// What the scheduler aims at.
+/// Target of the scheduler.
 typedef enum {
     IW_DEMAND_SILENCE = 0, ///< Send nothing.
     IW_DEMAND_ZERO,        ///< Zero without ramp.
@@ -81,46 +81,46 @@ typedef enum {
     IW_DEMAND_FOLLOW,      ///< Ramp to the client's command.
 } iw_demand_t;
 
-/// Why the wheels were stopped. `iw_stop_t::detail` is given with each. Those that latch come first; of several that
-/// are present the first one refuses arm and reset.
+/// Cause of a stop. Each entry describes its `iw_stop_t::detail`. The causes that latch come first. If several are
+/// present, the first one in this order refuses arm and reset.
 typedef enum {
     IW_CAUSE_NONE = 0,
-    IW_CAUSE_ESTOP_LINE,      ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
-    IW_CAUSE_ESTOP_DISAGREES, ///< Two contacts of one button: see IW_ESTOP_DISAGREES. Detail: 1.
-    IW_CAUSE_ESTOP_SOFTWARE,  ///< A client said estop. Detail: which iw_client_t.
-    IW_CAUSE_BUS_DOWN,        ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
-    IW_CAUSE_SECOND_MASTER,   ///< Somebody else sends setpoints. Detail: their id.
-    IW_CAUSE_SEND_STALLED,    ///< A setpoint was not echoed. Detail: ms waited.
-    IW_CAUSE_WHEEL_REBOOTED,  ///< Detail: an iw_reboot_t.
-    IW_CAUSE_WHEEL_LOST,      ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
-    IW_CAUSE_FEEDBACK_SIGN,   ///< Turns against its command. Detail: |measured| mm/s.
-    IW_CAUSE_OVERSPEED,       ///< Faster than applied. Detail: |measured| mm/s.
-    IW_CAUSE_LOOP_HUNG,       ///< Our own loop was late by more than 500 ms. Detail: ms.
+    IW_CAUSE_ESTOP_LINE,      ///< The e-stop is pressed or had an edge (detail 1), or is unreadable (detail 2).
+    IW_CAUSE_ESTOP_DISAGREES, ///< The two contacts of the button disagree: see IW_ESTOP_DISAGREES. Detail: 1.
+    IW_CAUSE_ESTOP_SOFTWARE,  ///< A client sent an e-stop request. Detail: its iw_client_t.
+    IW_CAUSE_BUS_DOWN,        ///< The bus is down, absent or bus-off. Detail: an iw_bus_state_t.
+    IW_CAUSE_SECOND_MASTER,   ///< Another node sends setpoints. Detail: the id of its frame.
+    IW_CAUSE_SEND_STALLED,    ///< A setpoint was not echoed. Detail: waiting time in ms.
+    IW_CAUSE_WHEEL_REBOOTED,  ///< A wheel restarted. Detail: an iw_reboot_t.
+    IW_CAUSE_WHEEL_LOST,      ///< A wheel sends no telemetry. Detail: age of the last frame in ms, or UINT32_MAX: none.
+    IW_CAUSE_FEEDBACK_SIGN,   ///< A wheel turns against its command. Detail: |measured| mm/s.
+    IW_CAUSE_OVERSPEED,       ///< A wheel is faster than the applied speed. Detail: |measured| mm/s.
+    IW_CAUSE_LOOP_HUNG,       ///< A step was late by more than 500 ms. Detail: lateness in ms.
     IW_CAUSE_INTERNAL,        ///< An internal check failed. Detail: an iw_envelope_verdict_t.
-    IW_CAUSE_LOOP_LATE,       ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
-    IW_CAUSE_WHEEL_BLOCKED,   ///< Below 20 % of its command. Detail: |measured| mm/s.
-    IW_CAUSE_PAIR_DIVERGES,   ///< The pair leaves its path. Detail: by so many mm, right against left.
+    IW_CAUSE_LOOP_LATE,       ///< A step was late by 100 to 500 ms: zero without ramp. Detail: lateness in ms.
+    IW_CAUSE_WHEEL_BLOCKED,   ///< A wheel is below 20 % of its command. Detail: |measured| mm/s.
+    IW_CAUSE_PAIR_DIVERGES,   ///< The pair leaves its path. Detail: deviation in mm, right minus left.
     IW_CAUSE_LEASE_LOST,  ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
     IW_CAUSE_CLIENT_GONE, ///< The holder disconnected. Detail: 0.
-    IW_CAUSE_CLIENT_STOP, ///< A client said stop or disarm. Detail: 0.
-    IW_CAUSE_SHUTDOWN,    ///< The gateway is ending. Detail: 0.
-    IW_CAUSE_RESTART,     ///< The gateway began anew after a crash while armed. Detail: 0.
+    IW_CAUSE_CLIENT_STOP, ///< A client sent stop or disarm. Detail: 0.
+    IW_CAUSE_SHUTDOWN,    ///< The gateway ends. Detail: 0.
+    IW_CAUSE_RESTART,     ///< The gateway restarted after a crash while armed. Detail: 0.
     IW_CAUSES,
 } iw_cause_t;
 
-/// Bits for `sides`: which wheel a cause speaks of.
+/// Bits for `sides`: the wheels that a cause refers to.
 #define IW_SIDES_NONE  0U ///< Neither.
 #define IW_SIDES_LEFT  1U ///< The left one.
 #define IW_SIDES_RIGHT 2U ///< The right one.
 #define IW_SIDES_BOTH  3U ///< Both.
 
-/// Why a request was refused. Each has one name in the northbound protocol.
+/// Reason why a request was refused. Each has one name in the northbound protocol.
 typedef enum {
     IW_REFUSE_NONE = 0, ///< Not refused.
     IW_REFUSE_OUT_OF_RANGE,
-    IW_REFUSE_MISSING_FIELD, ///< Currents omitted although the current is a setpoint.
-    IW_REFUSE_NOT_HOLDER,    ///< Somebody else holds the lease.
-    IW_REFUSE_BUSY,          ///< Somebody else holds the lease, and no takeover was asked for.
+    IW_REFUSE_MISSING_FIELD, ///< The request has no currents although the current is a setpoint.
+    IW_REFUSE_NOT_HOLDER,    ///< Another client holds the lease.
+    IW_REFUSE_BUSY,          ///< Another client holds the lease, and the request does not ask for a takeover.
     IW_REFUSE_NOT_ARMED,
     IW_REFUSE_LATCHED,
     IW_REFUSE_ESTOP_PRESSED,
@@ -132,30 +132,30 @@ typedef enum {
     IW_REFUSE_NOT_AT_REST,
     IW_REFUSE_SEND_STALLED,
     IW_REFUSE_SECOND_MASTER,
-    IW_REFUSE_CAUSE_PRESENT, ///< `iw_snapshot_t::present` tells which.
-    IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
-    IW_REFUSE_TRACK_NOT_SET, ///< The distance of the wheels not configured: every bound of yaw rests on it.
+    IW_REFUSE_CAUSE_PRESENT, ///< A cause in `iw_snapshot_t::present` is still there.
+    IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role is not configured.
+    IW_REFUSE_TRACK_NOT_SET, ///< The distance between the wheels is not configured. Every yaw limit depends on it.
     IW_REFUSE_STALE_COMMAND, ///< `iw_snapshot_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
-    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_snapshot_t::doubt` tells which.
+    IW_REFUSE_CONTRADICTED, ///< A measurement contradicts `iw_snapshot_t::doubt`, an assumption that motion depends on.
     IW_REFUSALS,
 } iw_refusal_t;
 
 /// The last stop, for `why`.
 typedef struct {
-    iw_time_us_t at_us; ///< When.
-    uint32_t number;    ///< Counts stops; 0: there was none.
+    iw_time_us_t at_us; ///< Time of the stop.
+    uint32_t number;    ///< Number of stops so far; 0 if there was none.
     uint32_t detail;    ///< See iw_cause_t.
-    iw_client_t client; ///< Who held the lease, or asked for the stop.
-    iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
+    iw_client_t client; ///< Client that held the lease, or that requested the stop.
+    iw_pair_t applied;  ///< Last pair before the stop, in the machine's frame.
     iw_cause_t cause;   ///< The first cause.
-    iw_state_t from;    ///< The state that it ended.
-    uint8_t sides;      ///< Which wheel the cause speaks of: IW_SIDES_...
-    bool latched;       ///< It needs a reset.
-    bool at_once;       ///< Zero without a ramp.
+    iw_state_t from;    ///< State before the stop.
+    uint8_t sides;      ///< Wheels that the cause refers to: IW_SIDES_...
+    bool latched;       ///< The stop needs a reset.
+    bool at_once;       ///< The stop was a zero without a ramp.
 } iw_stop_t;
 
-/// What the document leaves open, and is therefore assumed until it is found out.
+/// Facts that the document leaves open. The core assumes each of them until a measurement or the operator decides it.
 typedef enum {
     IW_ASSUMPTION_SETPOINT_TYPE,      ///< Byte 0 of a setpoint.
     IW_ASSUMPTION_CURRENT_ROLE,       ///< Limit or setpoint.
@@ -164,35 +164,35 @@ typedef enum {
     IW_ASSUMPTION_OFFSET_INCLUDED,    ///< The raw force still contains the offset, as documented.
     IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, ///< A positive command is measured as a positive speed.
     IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
-    IW_ASSUMPTION_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
+    IW_ASSUMPTION_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can see it.
     IW_ASSUMPTION_MOUNT_SIGN_RIGHT,
     IW_ASSUMPTION_WHEEL_RADIUS,    ///< "Approximately 192 mm".
-    IW_ASSUMPTION_TRACK,           ///< Distance between the wheels. It turns a twist into wheel speeds, and bounds yaw.
-    IW_ASSUMPTION_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of them the rpm count.
-    IW_ASSUMPTION_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
-    IW_ASSUMPTION_DLC,             ///< Frames are as long as the table: the document does not state it.
+    IW_ASSUMPTION_TRACK,           ///< Distance between the wheels. It relates wheel speeds to yaw.
+    IW_ASSUMPTION_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of the two the rpm in telemetry refer to.
+    IW_ASSUMPTION_POSE_BYTE_ORDER, ///< Most significant byte first. The document does not state it for the pose.
+    IW_ASSUMPTION_DLC,             ///< Frames have the lengths of the table. The document does not state it.
     IW_ASSUMPTION_ITEMS,
 } iw_assumption_item_t;
 
-/// What has become of an assumption.
+/// State of an assumption.
 typedef enum { IW_ASSUMED = 0, IW_CONFIRMED, IW_CONTRADICTED } iw_assumption_state_t;
 
-/// Where it is known from.
+/// Source of an assumption's value.
 typedef enum {
-    IW_SOURCE_NONE = 0,      ///< Nothing: not configured and not documented.
-    IW_SOURCE_DOCUMENT,      ///< The document says so.
-    IW_SOURCE_CONFIGURATION, ///< The operator configured it, nothing confirmed it.
-    IW_SOURCE_BUS,           ///< Measured; `figure` tells what.
-    IW_SOURCE_OPERATOR,      ///< The operator looked at the machine.
+    IW_SOURCE_NONE = 0,      ///< None: neither configured nor documented.
+    IW_SOURCE_DOCUMENT,      ///< The document.
+    IW_SOURCE_CONFIGURATION, ///< The configuration. No measurement has confirmed it.
+    IW_SOURCE_BUS,           ///< A measurement: see `figure`.
+    IW_SOURCE_OPERATOR,      ///< The operator, who has seen the machine.
 } iw_source_t;
 
-/// What is known of an assumption.
+/// One assumption: its state and source.
 typedef struct {
     iw_assumption_state_t state; ///< Assumed, confirmed or contradicted.
-    iw_source_t source;          ///< What that rests on.
-    int32_t figure; ///< Of IW_SOURCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
-        ///< positive command; DLC: the length received; setpoint type: 1000 x measured / applied speed; gear
-        ///< ratio: 1000 x ticks moved / expected; pose: 1000 x way read byte-swapped / way as it is read.
+    iw_source_t source;          ///< Source of that state.
+    int32_t figure; ///< Measured value with IW_SOURCE_BUS. Force unit and offset: 1000 x raw / offset in dN. Sign: mm/s
+        ///< measured at a positive command. DLC: the length received. Setpoint type: 1000 x measured / applied speed.
+        ///< Gear ratio: 1000 x ticks moved / expected. Pose: 1000 x distance read byte-swapped / read in order.
 } iw_assumption_entry_t;
 
 #endif

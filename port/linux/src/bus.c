@@ -7,15 +7,16 @@
 #include <net/if.h>
 #include <string.h>
 
-/// Frames of unknown ids taken at once, after those of known ids, and how often: a full bus brings fewer in that time.
+/// Largest number of frames with unknown ids per interval, and the interval. They come after the known ids. A full bus
+/// carries fewer.
 #define OTHERS_AT_ONCE  256U
 #define OTHERS_EVERY_US 10000U
-/// So soon after a setpoint, and thus not right before the next one, which would come later than the one before.
+/// Time after a setpoint in which they may be received. Closer to the next setpoint they would delay it.
 #define OTHERS_AFTER_SEND_US 3000U
-/// Batches of nothing but error frames taken in one step: a flood of them must not hold up the loop.
+/// Largest number of batches with only error frames in one step: a flood of them must not delay the loop.
 #define ERROR_BATCHES_PER_STEP 8U
 #define US_PER_S               1000000U
-/// The wheels' bit rate, where the kernel reports none.
+/// Bit rate of the wheels, for a kernel that reports none.
 #define BITRATE_ASSUMED_HZ 1000000U
 
 static iwl_bus_t *bus_of(iwl_backend_store_t *store) {
@@ -26,7 +27,8 @@ static const iwl_bus_t *seen(const iwl_backend_store_t *store) {
     return (const iwl_bus_t *)(const void *)store;
 }
 
-/// The name alone decides. A name too long for an interface is refused here: cut off, it could name another one.
+/// Only the name decides. A name that is too long for an interface is refused, because a truncated one could be another
+/// interface.
 static const iwl_bus_kind_t *kind_of(const char *name) {
     if (iwl_unix_link_is_name(name)) {
         return &iwl_local_bus_kind;
@@ -91,7 +93,7 @@ void iwl_bus_lose(iwl_bus_t *bus, int error) {
     bus->kind->lost(bus, error);
 }
 
-/// It is looked at again while bus-off: with a forged or a lost error frame nothing else would end it.
+/// While bus-off the kind checks again, because after a forged or lost error frame nothing else would end it.
 void iwl_bus_note(iwl_bus_t *bus, iw_bus_state_t state) {
     bus->present = state;
     if (state < IW_BUS_PASSIVE) {
@@ -100,8 +102,8 @@ void iwl_bus_note(iwl_bus_t *bus, iw_bus_state_t state) {
     bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + IWL_BUS_RETRY_US : IW_NEVER;
 }
 
-/// `forged`: sent by a process of this machine, which any user may do (fault 19). A bus-off stops the wheels all the
-/// same; an end of bus-off is then not believed, and the carrier shows how long it really lasts.
+/// `forged`: a process of this machine sent it, which any user may do (fault 19). A forged bus-off still stops the
+/// wheels. A forged end of bus-off is ignored, and the carrier shows the end.
 static void hear_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
     if (error == IWL_CAN_ERROR_BUS_OFF) {
         bus->unhandled = IW_BUS_OFF;
@@ -112,7 +114,7 @@ static void hear_error(iwl_bus_t *bus, iwl_can_error_t error, bool forged) {
     } else if (forged) {
         return;
     } else if (error == IWL_CAN_ERROR_RESTARTED) {
-        bus->unhandled = IW_BUS_OFF; // Also if that was not heard: the restart has emptied the queue.
+        bus->unhandled = IW_BUS_OFF; // Also if the bus-off was not received: the restart has emptied the queue.
         bus->present = IW_BUS_ACTIVE;
     } else if (bus->present >= IW_BUS_PASSIVE && (error == IWL_CAN_ERROR_PASSIVE || error == IWL_CAN_ERROR_ACTIVE)) {
         bus->present = (error == IWL_CAN_ERROR_PASSIVE) ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
@@ -142,12 +144,12 @@ void iwl_bus_fill(iwl_bus_t *bus) {
     }
     if (ours->lost != lost) {
         bus->link.lost = ours->lost;
-        bus->look_us = bus->now_us; // An error frame may be among them.
+        bus->look_us = bus->now_us; // The batch may contain an error frame.
     }
 }
 
-/// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h). Between a bus-off and the
-/// call that tells of it nothing is sent: the core takes what was sent before that call for gone.
+/// Success proves nothing, because `send` also succeeds while bus-off. Only the echo is proof (hal.h). Between a
+/// bus-off and the call that reports it nothing is sent, because the core regards everything before that call as gone.
 int iwl_bus_send(iwl_backend_store_t *store, const iw_can_frame_t *frames, uint32_t count) {
     iwl_bus_t *bus = bus_of(store);
     if (bus->up && bus->unhandled < IW_BUS_PASSIVE) {
@@ -163,7 +165,7 @@ int iwl_bus_send(iwl_backend_store_t *store, const iw_can_frame_t *frames, uint3
     return result;
 }
 
-/// The next frame of the batch that is no error frame. False if there is none.
+/// Takes the next frame of the batch that is not an error frame. Returns false if there is none.
 static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
     while (!iwl_socketcan_socket_is_empty(from)) {
         const uint32_t i = from->next++;
@@ -175,7 +177,7 @@ static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
     return false;
 }
 
-/// `drained` ends the step's loop without one more call of the kernel; it counts once, so that the next step looks
+/// `drained` ends the loop of the step without another system call. It counts once, so that the next step receives
 /// again.
 static bool take_ours(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
     while (!take(&bus->ours, out_frame)) {
@@ -194,7 +196,7 @@ static bool take_others(iwl_bus_t *bus, iw_can_frame_t *out_frame) {
         return false;
     }
     if (iwl_socketcan_socket_is_empty(others) && !others->drained) {
-        (void)iwl_socketcan_socket_fill(others); // An error of the interface shows at the other socket too.
+        (void)iwl_socketcan_socket_fill(others); // An error of the interface appears at the other socket too.
     }
     if (!take(others, out_frame)) {
         others->drained = false;

@@ -5,7 +5,7 @@ iwl_timing_t iwl_timing_judge(const iwl_bus_link_t *link, uint32_t bitrate_hz, u
     const uint16_t actual = link->sample_point_permille;
     const uint16_t off =
         (uint16_t)((actual > sample_point_permille) ? actual - sample_point_permille : sample_point_permille - actual);
-    // The order is that of consequence: what is known to be wrong refuses arm even if the rest is not reported.
+    // Ordered by consequence: a value that is known to be wrong refuses arm even if another one is not reported.
     if (link->is_virtual) {
         return IWL_TIMING_VIRTUAL;
     }

@@ -19,7 +19,7 @@ iw_time_us_t iwl_clock_awake_us(iw_time_us_t suspended_us) {
 }
 
 iw_time_us_t iwl_clock_read(iw_time_us_t *out_suspended_us) {
-    // First: an interruption between the two reads makes the suspend seem shorter, never longer.
+    // Read first: an interruption between the two readings makes the suspend appear shorter, never longer.
     const iw_time_us_t total_us = read_us(CLOCK_BOOTTIME);
     const iw_time_us_t running_us = read_us(CLOCK_MONOTONIC);
     *out_suspended_us = (total_us > running_us) ? total_us - running_us : 0U;

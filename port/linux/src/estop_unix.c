@@ -7,16 +7,16 @@
 #include <poll.h>
 #include <sys/socket.h>
 
-/// Longer bursts of presses are read in the next step; the link is level-triggered.
+/// Longer bursts of presses are read in the next step: the link is level-triggered.
 #define BURST_MAX 64
-/// At the start the button is given this long to tell its level; asked sooner it would seem unreadable, and latch.
+/// Time at the start for the button to report its level. Without it the button would be unreadable, which latches.
 #define FIRST_LEVEL_MS 100
 
 typedef struct {
     iwl_unix_link_t link;
-    bool known; ///< The button has told its level on this connection.
-    bool level; ///< Pressed.
-    bool edge;  ///< It changed since the last call of `pressed`.
+    bool known; ///< The button has reported its level on this connection.
+    bool level; ///< The button is pressed.
+    bool edge;  ///< The level changed since the last call of `pressed`.
 } unix_estop_t;
 
 IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iwl_backend_store_t), unix_estop_fits);
@@ -39,14 +39,14 @@ static iw_time_us_t button_next_us(const void *self) {
 
 static void take_levels(unix_estop_t *button, const char *levels, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        const bool level = levels[i] != '0'; // Whatever is not clearly "released" is pressed.
+        const bool level = levels[i] != '0'; // Any value but "released" is pressed.
         button->edge = button->edge || level || (button->known && level != button->level);
         button->level = level;
         button->known = true;
     }
 }
 
-/// A broken connection is noticed here and nowhere else: this look finds it unreadable, however soon it is back.
+/// Detects a broken connection. The button is unreadable in this step, even if the connection returns immediately.
 static void listen_to(unix_estop_t *button) {
     char levels[BURST_MAX];
     if (!iwl_unix_link_is_up(&button->link)) {
@@ -73,10 +73,11 @@ static int button_open(void *self, const iwl_estop_config_t *config) {
     return error;
 }
 
-/// Until the button has told its level, and after a broken connection, it is unreadable, which counts as pressed (R2).
+/// The button is unreadable, which counts as pressed (R2), until it has reported its level and after a broken
+/// connection.
 static int button_pressed(void *self, bool quiet) {
     unix_estop_t *button = (unix_estop_t *)self;
-    (void)quiet; // Level and edges come by the same messages, so they are always read.
+    (void)quiet; // Level and edges arrive in the same messages, so both are always read.
     listen_to(button);
     const bool pressed = button->edge || button->level;
     button->edge = false;

@@ -9,7 +9,7 @@
 
 static const char chip_prefix[] = "gpiochip";
 
-/// Reads digits up to the end or to `end`. NULL if there are none or too many.
+/// Reads digits up to the end of the text or to `end`. Returns NULL if there are none or too many.
 static const char *read_number(const char *text, char end, unsigned *out_number) {
     unsigned number = 0;
     const char *digit = text;
@@ -27,7 +27,7 @@ int iwl_gpio_address_parse(const char *text, iwl_gpio_address_t *out_address) {
     iwl_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
                                                strchr(text, ':') != NULL};
     size_t length = strlen(text);
-    // Lines may be named with a colon too; only a name that also begins like a chip's is an address by offset.
+    // Names of lines may contain a colon. Only a name that also begins like a chip is an address by offset.
     if (address.by_offset) {
         unsigned chip;
         const char *colon = read_number(text + sizeof chip_prefix - 1U, ':', &chip);
@@ -75,7 +75,7 @@ void iwl_gpio_release_init(iwl_gpio_release_t *self, uint32_t debounce_us) {
     *self = (iwl_gpio_release_t){.debounce_us = debounce_us};
 }
 
-/// A change of level without an edge counts as one: the kernel drops edges when its buffer is full.
+/// A change of level without an edge counts as an edge, because the kernel drops edges when its buffer is full.
 void iwl_gpio_release_see(iwl_gpio_release_t *self, iw_time_us_t now_us, bool active, bool edge) {
     const bool disturbed = active || edge || self->active;
     self->edge = self->edge || edge || active != self->active;

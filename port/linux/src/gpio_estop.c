@@ -8,17 +8,17 @@
 #include <sys/epoll.h>
 #include <unistd.h>
 
-/// A line that cannot be had is tried again this often.
+/// Interval of attempts to open a line.
 #define RETRY_US 200000U
 
 typedef struct {
     iwl_gpio_line_t line;
     iwl_gpio_address_t address;
     iwl_gpio_release_t release;
-    iw_time_us_t now_us;   ///< Of the last `poll`.
-    iw_time_us_t retry_us; ///< IW_NEVER while open.
+    iw_time_us_t now_us;   ///< Time of the last `poll`.
+    iw_time_us_t retry_us; ///< Time of the next attempt; IW_NEVER while open.
     uint32_t debounce_us;
-    int trouble; ///< Why it is closed.
+    int trouble; ///< Errno of the reason why it is closed.
     int watch_fd;
     bool active_high;
 } gpio_estop_t;
@@ -51,7 +51,7 @@ static void try_open(gpio_estop_t *estop) {
     iwl_gpio_release_init(&estop->release, estop->debounce_us);
 }
 
-/// An expectation as configured. "any": there is none.
+/// Copies an expected name from the configuration. "any" means none.
 static int expect(char *out_name, const char *name) {
     const size_t length = (name == NULL || strcmp(name, "any") == 0) ? 0U : strlen(name);
     if (length >= IWL_GPIO_NAME_SIZE) {
@@ -61,7 +61,7 @@ static int expect(char *out_name, const char *name) {
     return 0;
 }
 
-/// Only a malformed name is an error. A line that is absent or busy is retried: until then it counts as pressed.
+/// Only a malformed name is an error. An absent or busy line is retried, and counts as pressed until then.
 static int gpio_open(void *self, const iwl_estop_config_t *config) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     *estop = (gpio_estop_t){.line = {.fd = -1},
@@ -108,14 +108,14 @@ static iw_time_us_t gpio_next_us(const void *self) {
     return is_open(estop) ? iwl_gpio_release_next_us(&estop->release, estop->now_us) : estop->retry_us;
 }
 
-/// Edges first, then the level: an edge between the two wakes us again, the other order would lose it.
+/// Reads edges before the level. An edge between the two wakes the loop again; in the other order it would be lost.
 static void look(gpio_estop_t *estop, bool quiet) {
     if (!is_open(estop)) {
         return;
     }
     const int edges = quiet ? 0 : iwl_gpio_line_take_edges(&estop->line);
     const int level = iwl_gpio_line_level(&estop->line);
-    // A chip that was unplugged still has a descriptor; only the reads fail.
+    // After a chip was unplugged its descriptor is still open, and only reads fail.
     if (edges < 0 || level < 0) {
         lose(estop, ENODEV);
         return;
@@ -123,7 +123,7 @@ static void look(gpio_estop_t *estop, bool quiet) {
     iwl_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
 }
 
-/// A line is lost in such a look or before the first: it is told, however soon it is back.
+/// A line that was lost during the reading is reported, even if it returns immediately.
 static int gpio_pressed(void *self, bool quiet) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     look(estop, quiet);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libgpiod 1.5 and later, before 2.
+// Implementation for libgpiod 1.5 and later, before 2.
 #include "gpio.h"
 
 #include <errno.h>
@@ -8,10 +8,11 @@
 #include <stdbool.h>
 #include <string.h>
 
-/// The kernel holds this many edges of a line.
+/// Number of edges of a line that the kernel buffers.
 #define EVENTS 16U
 
-/// Looks for lines of that name on one chip; `*found` is the first of all so far. True: this is a second one.
+/// Searches one chip for lines with the name; `*found` is the first one on all chips. Returns true if there is a second
+/// one.
 static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_line **found) {
     const unsigned lines = gpiod_chip_num_lines(chip);
     bool second = false;
@@ -28,7 +29,7 @@ static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_
     return second;
 }
 
-/// The only line of that name on all chips. Its chip stays open until the line's chip is closed.
+/// Returns the only line with the name on all chips. Its chip stays open until the line's chip is closed.
 static struct gpiod_line *find_by_name(const char *name) {
     struct gpiod_chip_iter *chips = gpiod_chip_iter_new();
     struct gpiod_line *found = NULL;
@@ -65,9 +66,9 @@ static struct gpiod_line *find(const iwl_gpio_address_t *address) {
     return line;
 }
 
-/// The line with what it is called; NULL with an errno.
+/// Returns the line with its identity; NULL and an errno if there is none.
 static struct gpiod_line *find_and_see(const iwl_gpio_address_t *address, iwl_estop_seen_t *out_seen) {
-    errno = ENOENT; // Unless a call below says otherwise.
+    errno = ENOENT; // Valid unless a call below sets another one.
     struct gpiod_line *line = find(address);
     if (line == NULL) {
         return NULL;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libgpiod 2.
+// Implementation for libgpiod 2.
 #include "gpio.h"
 
 #include <dirent.h>
@@ -9,11 +9,11 @@
 #include <stdio.h>
 #include <string.h>
 
-/// The kernel holds this many edges of a line.
+/// Number of edges of a line that the kernel buffers.
 #define EVENTS    16U
 #define PATH_SIZE 320U
 
-/// Number of lines of that name on the chip; `*out_offset` is that of the first.
+/// Returns the number of lines with the name on the chip; `*out_offset` is the offset of the first.
 static unsigned count_named(struct gpiod_chip *chip, const char *name, unsigned *out_offset) {
     struct gpiod_chip_info *chip_info = gpiod_chip_get_info(chip);
     const unsigned lines = (chip_info == NULL) ? 0U : (unsigned)gpiod_chip_info_get_num_lines(chip_info);
@@ -38,8 +38,9 @@ static struct gpiod_chip *open_chip(const char *path) {
     return gpiod_is_gpiochip_device(path) ? gpiod_chip_open(path) : NULL;
 }
 
-/// libgpiod 2 has no search by a line's name over all chips. A chip that we may not open is remembered: the line may be
-/// on it, and "permission denied" leads to the fix where "no such line" would mislead. Two lines of that name: neither.
+/// libgpiod 2 cannot search all chips for a line by name. If a chip must not be opened, the line may be on it: the
+/// result is then "permission denied", which leads to the fix, and not "no such line". If two lines have the name,
+/// neither is used.
 static struct gpiod_chip *search(const char *name, unsigned *out_offset) {
     char path[PATH_SIZE];
     struct gpiod_chip *found = NULL;
@@ -88,7 +89,7 @@ static struct gpiod_chip *find(const iwl_gpio_address_t *address, unsigned *out_
     return open_chip(path);
 }
 
-/// Pull-up: a cut wire of a normally closed contact to ground reads high, like the pressed button.
+/// Pull-up: a cut wire of a normally closed contact to ground reads high, like a pressed button.
 static bool configure(struct gpiod_line_settings *settings, struct gpiod_line_config *lines, unsigned offset) {
     return gpiod_line_settings_set_direction(settings, GPIOD_LINE_DIRECTION_INPUT) == 0 &&
            gpiod_line_settings_set_edge_detection(settings, GPIOD_LINE_EDGE_BOTH) == 0 &&
@@ -124,10 +125,10 @@ static void see(struct gpiod_chip *chip, unsigned offset, iwl_estop_seen_t *out_
     gpiod_chip_info_free(chip_info);
 }
 
-/// The chip with what the line is called; NULL with an errno.
+/// Returns the chip with the identity of the line; NULL and an errno if there is none.
 static struct gpiod_chip *find_and_see(const iwl_gpio_address_t *address, unsigned *out_offset,
                                        iwl_estop_seen_t *out_seen) {
-    errno = ENOENT; // Unless a call below says otherwise.
+    errno = ENOENT; // Valid unless a call below sets another one.
     struct gpiod_chip *chip = find(address, out_offset);
     if (chip == NULL) {
         return NULL;

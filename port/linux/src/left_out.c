@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What this build cannot do, because a library is missing: each is then NULL, and programs say so and tell the cure.
+// Replaces the parts of a build without some libraries: each is NULL, and programs report it with the fix.
 #include "bus.h"
 
 #include <errno.h>
 
-#ifdef IWL_WITHOUT_LIBMNL // Without it the bus timing could not be verified.
+#ifdef IWL_WITHOUT_LIBMNL // Without libmnl the bus timing cannot be verified.
 const iwl_bus_kind_t *const iwl_socketcan_kind = NULL;
 #endif
 #ifdef IWL_WITHOUT_LIBGPIOD

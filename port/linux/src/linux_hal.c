@@ -6,10 +6,10 @@
 #include <errno.h>
 #include <string.h>
 
-/// There is nothing to open or to ask, and no function of it is called.
+/// There is no e-stop, so no function is called.
 static const iwl_estop_ops_t no_estop_ops = {.present = false};
 
-/// The kind for a name as in the configuration, which alone decides; NULL if this build has none for it.
+/// Returns the kind of e-stop for a configured name, which alone decides; NULL if this build has no such kind.
 static const iwl_estop_ops_t *estop_kind(const char *name) {
     if (iwl_unix_link_is_name(name)) {
         return &iwl_unix_estop_ops;
@@ -21,7 +21,7 @@ static bool has_second(const iwl_estop_config_t *config) {
     return config->name2 != NULL && strcmp(config->name2, "none") != 0;
 }
 
-/// A line that is read twice agrees with itself for ever: the second contact would show nothing.
+/// A line that is read as both contacts always agrees with itself, so the second contact would be no check.
 static bool are_one_line(const char *name, const char *other) {
     iwl_estop_seen_t seen[IWL_ESTOP_CONTACTS];
     if (strcmp(name, other) == 0) {
@@ -31,7 +31,7 @@ static bool are_one_line(const char *name, const char *other) {
            strcmp(seen[0].node, seen[1].node) == 0 && seen[0].offset == seen[1].offset;
 }
 
-/// The first contact is open.
+/// Opens the second contact. The first one is open.
 static int open_second(iwl_hal_t *self, const iwl_estop_config_t *config) {
     const iwl_estop_config_t second = {.name = config->name2,
                                        .active_high = config->active_high2,
@@ -66,7 +66,7 @@ static int open_estop(iwl_hal_t *self, const iwl_estop_config_t *config, const c
     return error;
 }
 
-/// Whatever is opened first is closed again if the second fails: nothing stays open on failure.
+/// If the second part fails to open, the first is closed again.
 int iwl_hal_open(iwl_hal_t *self, const char *bus_name, const iwl_estop_config_t *estop, const char **out_cause) {
     *self = (iwl_hal_t){.estop_ops = estop_kind(estop->name), .estop_last = -1, .contact_last = {-1, 0}};
     iw_estop_pair_init(&self->pair, estop->discrepancy_ms * (uint32_t)IW_US_PER_MS);
@@ -92,8 +92,8 @@ void iwl_hal_close(iwl_hal_t *self) {
     }
 }
 
-/// Both are always read: an edge of one must not wait until the other is released. `estop_quiet` holds for one look
-/// only: the next step without a wait in between must read the edges again.
+/// Reads both contacts: an edge of one must not wait until the other is released. `estop_quiet` is valid for one
+/// reading, because the next step without a wait in between must read the edges again.
 int iwl_hal_pressed(iwl_hal_t *self) {
     int *said = self->contact_last;
     said[0] = self->estop_ops->present ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;
@@ -169,7 +169,7 @@ static iw_time_us_t sooner(iw_time_us_t a_us, iw_time_us_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-/// The sooner of all backends' times.
+/// Returns the earliest time of all backends.
 iw_time_us_t iwl_hal_next_us(const iwl_hal_t *self) {
     const iw_time_us_t bus_us = iwl_bus_next_us(&self->bus);
     const iw_time_us_t estop_us = self->estop_ops->present ? self->estop_ops->next_us(&self->estop) : IW_NEVER;
@@ -184,7 +184,7 @@ const iwl_bus_link_t *iwl_hal_link(const iwl_hal_t *self) {
     return iwl_bus_link(&self->bus);
 }
 
-/// NULL: there is no such contact.
+/// Returns NULL if there is no such contact.
 static const iwl_backend_store_t *contact_of(const iwl_hal_t *self, unsigned contact) {
     const iwl_backend_store_t *second = self->two_contacts ? &self->estop2 : NULL;
     const iwl_backend_store_t *first = self->estop_ops->present ? &self->estop : NULL;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// A connection to the simulator's hub as the bus. The echo comes from the hub when the simulated wheels have
-/// acknowledged, so it is a proof.
+/// Bus of the simulator: a connection to its hub. The hub sends the echo when the simulated wheels have acknowledged
+/// the frame, so the echo is a proof.
 #include "bus.h"
 #include "unix_link.h"
 
@@ -13,7 +13,7 @@ typedef struct {
 
 IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iwl_backend_store_t), local_bus_fits);
 
-/// As the connection is now.
+/// Updates the state from the connection.
 static void follow(local_bus_t *local) {
     local->bus.up = iwl_unix_link_is_up(&local->hub);
     local->bus.look_us = local->hub.retry_us;
@@ -44,7 +44,7 @@ static void local_poll(iwl_bus_t *self) {
     follow(local);
 }
 
-/// The hub is gone, and with it every frame of ours that it had not sent.
+/// The hub is gone, with every frame that it had not sent.
 static void local_lost(iwl_bus_t *self, int error) {
     local_bus_t *local = (local_bus_t *)(void *)self;
     (void)error;
@@ -52,7 +52,7 @@ static void local_lost(iwl_bus_t *self, int error) {
     follow(local);
 }
 
-/// Unsent frames are held by the hub, which drops them with the connection. The next `poll` connects anew.
+/// The hub holds frames that are not sent, and drops them with the connection. The next `poll` connects again.
 static int local_purge(iwl_bus_t *self) {
     if (self->up) {
         iwl_bus_lose(self, ENOTCONN);

@@ -12,7 +12,7 @@
 #define ARPHRD_CAN 280
 #endif
 
-/// Three questions by name: in between the interface may vanish, which each of them then reports as absent.
+/// Makes three queries by name. If the interface disappears in between, each of them reports it as absent.
 iwl_link_presence_t iwl_netdev_presence(int fd, const char *name, int *out_index) {
     struct ifreq request = {.ifr_name = ""};
     (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", name);

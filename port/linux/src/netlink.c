@@ -14,13 +14,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/// Replies read for one request at the most: what came before is an answer to an earlier one.
+/// Largest number of replies read per request. Earlier ones answer an earlier request.
 #define REPLIES_MAX 8
-/// News taken in one call at the most; more are taken by the next.
+/// Largest number of events read in one call.
 #define EVENTS_MAX 64
-/// A CAN interface with everything that kernels tell of it takes about 2 KiB.
+/// The description of a CAN interface takes about 2 KiB.
 #define REPLY_SIZE 16384U
-/// How often, and how far apart, an interface is set up again.
+/// Number and interval of attempts to bring an interface up.
 #define TRIES_MAX 60
 #define PAUSE_S   1U
 
@@ -50,7 +50,7 @@ int iwl_netlink_fd(const iwl_netlink_t *self) {
 }
 
 bool iwl_netlink_take_events(iwl_netlink_t *self) {
-    char first[64]; // Only that there is one counts; the rest of the message is dropped.
+    char first[64]; // Only the presence of an event counts; the rest of the message is dropped.
     bool any = false;
     for (int i = 0; i < EVENTS_MAX; i++) {
         if (recv(iwl_netlink_fd(self), first, sizeof first, 0) < 0 && errno != ENOBUFS) {
@@ -76,7 +76,7 @@ static struct nlmsghdr *begin(iwl_netlink_t *self, void *buffer, uint16_t type, 
     return message;
 }
 
-/// What the reply to our request `sequence` is: -1 not an answer to it, 0 taken, else an errno.
+/// Classifies a reply to the request `sequence`: -1 it is not its reply, 0 it was read, otherwise an errno.
 static int take(const iwl_netlink_t *self, const struct nlmsghdr *reply, iwl_netlink_reading_t *out_reading) {
     if (reply->nlmsg_seq != self->sequence) {
         return -1;
@@ -88,7 +88,7 @@ static int take(const iwl_netlink_t *self, const struct nlmsghdr *reply, iwl_net
     return (out_reading != NULL && iwl_netlink_parse(reply, out_reading)) ? 0 : EBADMSG;
 }
 
-/// Sends the request and takes its reply, which is there as soon as the kernel has taken the request.
+/// Sends the request and reads its reply. The reply is there as soon as the kernel has accepted the request.
 static int ask(iwl_netlink_t *self, const struct nlmsghdr *request, iwl_netlink_reading_t *out_reading) {
     static _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE]; // Too large for a stack.
     if (mnl_socket_sendto(self->socket, request, request->nlmsg_len) < 0) {
@@ -132,8 +132,8 @@ int iwl_netlink_set_up(iwl_netlink_t *self, int index, bool up) {
     return ask(self, request, NULL);
 }
 
-/// An interface that we took down must not stay down because its adapter is slow to answer: setting it up is tried
-/// again. ENODEV: it is gone, there is nothing to bring up.
+/// An interface that this process took down must not stay down because its adapter answers slowly, so it tries again.
+/// ENODEV: the interface is gone.
 static int restart(int interface) {
     iwl_netlink_t netlink;
     int error = iwl_netlink_open(&netlink);
@@ -151,15 +151,15 @@ static int restart(int interface) {
     return error;
 }
 
-/// A process and not a thread: the kernel's lock on interface configuration can hold it for seconds, and it must
-/// outlive a gateway that is killed between down and up.
+/// Uses a process and not a thread. The kernel's lock on interface configuration can block it for seconds, and it must
+/// survive a gateway that is killed between down and up.
 int iwl_netlink_restart_start(int interface, pid_t *out_process) {
     const pid_t process = fork();
     if (process < 0) {
         return errno;
     }
     if (process == 0) {
-        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Else clients and the lock file would stay open in it.
+        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Otherwise clients and the lock file would stay open in it.
         const int error = restart(interface);
         _exit((error <= UCHAR_MAX) ? error : EIO);
     }
@@ -174,14 +174,14 @@ int iwl_netlink_restart_poll(pid_t process) {
         return IWL_NETLINK_RESTART_RUNNING;
     }
     if (ended < 0) {
-        return 0; // Somebody else has taken its status; whether the interface is up will be seen.
+        return 0; // Another call has read its status. The state of the interface shows the result.
     }
     return WIFEXITED(status) ? WEXITSTATUS(status) : EIO;
 }
 
 IW_STATIC_ASSERT(sizeof(struct ifinfomsg) % NLMSG_ALIGNTO == 0, netlink_attributes_follow_without_a_gap);
 
-/// Attributes side by side.
+/// List of attributes on one level.
 typedef struct {
     const void *first;
     uint32_t size;
@@ -205,7 +205,7 @@ static const struct nlattr *find(attributes_t among, uint16_t type) {
     return NULL;
 }
 
-/// Copies a payload of exactly this size or larger; newer kernels may append to it. False if there is none.
+/// Copies a payload of at least this size; newer kernels may append to it. Returns false if there is none.
 static bool get(attributes_t among, uint16_t type, void *out, size_t size) {
     const struct nlattr *attribute = find(among, type);
     if (attribute == NULL || mnl_attr_get_payload_len(attribute) < size) {
@@ -229,7 +229,7 @@ static iw_bus_state_t state_of(uint32_t state) {
     }
 }
 
-/// The data of an interface of kind "can": a real controller.
+/// Parses the data of an interface of kind "can": a real controller.
 static void parse_controller(attributes_t data, iwl_netlink_reading_t *reading) {
     struct can_bittiming timing;
     struct can_ctrlmode mode;
@@ -241,7 +241,7 @@ static void parse_controller(attributes_t data, iwl_netlink_reading_t *reading) 
     }
     if (get(data, IFLA_CAN_CTRLMODE, &mode, sizeof mode)) {
         link->is_mute = (mode.flags & CAN_CTRLMODE_LISTENONLY) != 0U;
-        // Loopback echoes without the bus, presume-ack sends without acknowledgement: then an echo proves nothing.
+        // Loopback echoes without the bus, and presume-ack sends without acknowledgement, so an echo proves nothing.
         link->echo_proven =
             link->echo_proven && (mode.flags & (CAN_CTRLMODE_LOOPBACK | CAN_CTRLMODE_PRESUME_ACK)) == 0U;
     }
@@ -251,7 +251,7 @@ static void parse_controller(attributes_t data, iwl_netlink_reading_t *reading) 
     (void)get(data, IFLA_CAN_RESTART_MS, &link->restart_ms, sizeof link->restart_ms);
 }
 
-/// vcan is of another kind: there is no controller, so no bit timing and no error states.
+/// vcan is another kind: without a controller it has no bit timing and no error states.
 static void parse_kind(attributes_t info, iwl_netlink_reading_t *reading) {
     static const char controller[] = "can";
     char kind[sizeof controller] = "";

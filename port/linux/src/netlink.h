@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// The kernel's view of a network interface, through netlink (libmnl).
+/// State of a network interface in the kernel, through netlink (libmnl).
 ///
-/// A request is answered within the call. It may have to wait while a network interface is being configured elsewhere
-/// (see iwl_netdev_presence), so it is made only when an interface has come up.
+/// A request returns with its reply. It may wait while another process configures an interface (see
+/// iwl_netdev_presence), so the port makes it only when an interface has come up.
 #ifndef IWL_NETLINK_H
 #define IWL_NETLINK_H
 
@@ -22,55 +22,58 @@ typedef struct {
 typedef struct {
     iwl_bus_link_t link; ///< Without purge, changes, lost and load.
     int index;
-    iw_bus_state_t state; ///< IW_BUS_ACTIVE too if the interface has no error states.
+    iw_bus_state_t state; ///< IW_BUS_ACTIVE also for an interface without error states.
 } iwl_netlink_reading_t;
 
-/// 0, or an errno. This and `iwl_netlink_open_events` are the only calls that allocate.
+/// Opens the socket. Returns 0 or an errno. Only this function and `iwl_netlink_open_events` allocate memory.
 int iwl_netlink_open(iwl_netlink_t *self);
 void iwl_netlink_close(iwl_netlink_t *self);
 
-/// The same for change events: `self` then becomes readable whenever some interface has changed. Not for requests.
+/// Opens a socket for change events, which becomes readable when an interface has changed. It cannot be used for
+/// requests.
 int iwl_netlink_open_events(iwl_netlink_t *self);
 int iwl_netlink_fd(const iwl_netlink_t *self);
 
-/// Takes all events. True if there were any, of whichever interface.
+/// Reads all events. Returns true if there was one, of any interface.
 bool iwl_netlink_take_events(iwl_netlink_t *self);
 
-/// 0 also for an interface that does not exist (IWL_LINK_ABSENT); else an errno, `*out_reading` then is absent.
+/// Reads the state of an interface. Returns 0, also for an interface that does not exist (IWL_LINK_ABSENT), or an
+/// errno; then `*out_reading` is absent.
 int iwl_netlink_read(iwl_netlink_t *self, const char *name, iwl_netlink_reading_t *out_reading);
 
-/// Takes the interface up or down. 0, or an errno: EPERM without CAP_NET_ADMIN.
+/// Brings the interface up or down. Returns 0 or an errno: EPERM without CAP_NET_ADMIN.
 int iwl_netlink_set_up(iwl_netlink_t *self, int index, bool up);
 
-/// What one message of type RTM_NEWLINK says. Pure function. False if it is malformed.
+/// Parses a message of type RTM_NEWLINK. Pure function. Returns false if it is malformed.
 bool iwl_netlink_parse(const struct nlmsghdr *message, iwl_netlink_reading_t *out_reading);
 
-/// Takes an interface down and up again, in a process of its own: with some adapters that takes seconds, and the loop
-/// must not wait for it.
+/// Takes an interface down and up again in a separate process: with some adapters that takes seconds, and the loop must
+/// not wait for it.
 ///
 ///     start --> RUNNING --poll--> ended: 0 done, or why not
 ///
-/// The process holds nothing of ours, and goes on if we end: an interface that it has taken down it brings up again,
-/// trying once a second for a minute.
+/// The process inherits no descriptors, and continues if the gateway ends: it brings the interface up again, and tries
+/// that once a second for a minute.
 ///
-/// What `poll` answers while the process is at work.
+/// Result of `poll` while the process runs.
 #define IWL_NETLINK_RESTART_RUNNING (-1)
 
-/// 0, or an errno if no process can be made. `*out_process` is for `poll`.
+/// Starts the process. Returns 0, or an errno if it cannot be created. `*out_process` is for `poll`.
 int iwl_netlink_restart_start(int interface, pid_t *out_process);
 
-/// IWL_NETLINK_RESTART_RUNNING; or, once, how it ended: 0 the interface was down and is up again, else an errno: EPERM
-/// without CAP_NET_ADMIN, nothing was done then.
+/// Returns IWL_NETLINK_RESTART_RUNNING, or once the result: 0 if the interface was down and is up again, otherwise an
+/// errno. EPERM: CAP_NET_ADMIN is missing, and nothing was done.
 int iwl_netlink_restart_poll(pid_t process);
 
-/// State of a network interface, read without waiting: none of these takes the kernel's lock on interface configuration
-/// (RTNL), which others may hold for seconds (while an adapter that does not answer is being set up, for example).
+/// Queries about a network interface that do not wait: none of them uses the kernel's lock on interface configuration
+/// (RTNL), which another process may hold for seconds (for example while it sets up an adapter that does not answer).
 ///
-/// Whether the interface is there and up. `fd`: any socket. `*out_index` is written unless it is absent. An interface
-/// is seen as up only after the work of setting it up is done.
+/// Returns whether the interface is present and up. `fd`: any socket. Writes `*out_index` unless it is absent. An
+/// interface counts as up only when its setup is complete.
 iwl_link_presence_t iwl_netdev_presence(int fd, const char *name, int *out_index);
 
-/// 1: its controller takes part in the bus. 0: it does not; for a CAN controller that is up: bus-off. < 0: unknown.
+/// Returns 1 if the controller takes part in the bus, 0 if it does not (for a CAN controller that is up: bus-off), < 0
+/// if unknown.
 int iwl_netdev_carrier(const char *name);
 
 #endif

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: MIT
-/// A SocketCAN interface as the bus: reopened by its name, its losses reported, old frames never sent again.
+/// SocketCAN interface as the bus. It is reopened by its name, its losses are reported, and old frames are never sent.
 ///
 ///     CLOSED --interface up: sockets bound--> UP --ENETDOWN, ENODEV--> DOWN --interface up again--> UP
 ///       ^                                                               |
 ///       +------------- ENODEV, or another index by this name -----------+
 ///
-/// CLOSED: `interface` is 0. The first UP comes from it; an interface that was deleted or unplugged and comes back has
-/// a new index and needs new sockets. DOWN: `up` is false, the sockets are kept, since closing them may wait for
-/// whoever configures interfaces (netlink.h), and what they still hold is dropped. What happens within UP is in bus.h.
+/// CLOSED: `interface` is 0. This is the first state. An interface that was deleted or unplugged and returns has a new
+/// index and needs new sockets. DOWN: `up` is false. The sockets stay open, because closing them may wait for a process
+/// that configures interfaces (netlink.h); their frames are dropped. bus.h describes the states within UP.
 ///
 ///     purge: NONE --asked: child process takes the link down and up--> RESTARTING --> DONE | NOT_ALLOWED | FAILED
 ///
-/// `restarting` is that process. While it works UP goes to DOWN and back as above: that loss is the purge's answer to
-/// the core, `link.purge` only what is shown to people. NOT_ALLOWED stays, DONE and FAILED may be asked again.
+/// `restarting` is that process. While it runs, UP changes to DOWN and back as above: this loss is the result of the
+/// purge for the core, and `link.purge` is only displayed. NOT_ALLOWED is final; after DONE and FAILED a purge may be
+/// repeated.
 #include "bus.h"
 #include "netlink.h"
 
@@ -25,10 +26,10 @@ typedef struct {
     iwl_bus_t bus;
     const char *name;
     iwl_netlink_t netlink;
-    iwl_netlink_t events; ///< Wakes us when an interface comes.
-    pid_t restarting;     ///< The process that purges; 0: none.
-    int probe_fd;         ///< For looking at interfaces.
-    int interface;        ///< That the sockets are bound to; 0: none, they are closed or dead.
+    iwl_netlink_t events; ///< Becomes readable when an interface changes.
+    pid_t restarting;     ///< Process of the purge; 0 if there is none.
+    int probe_fd;         ///< Socket for queries about interfaces.
+    int interface;        ///< Interface of the sockets; 0 if they are closed or dead.
 } socketcan_t;
 
 IW_STATIC_ASSERT(sizeof(socketcan_t) <= sizeof(iwl_backend_store_t), socketcan_fits);
@@ -43,14 +44,14 @@ static void close_sockets(socketcan_t *can) {
     can->interface = 0;
 }
 
-/// The interface is gone or was down. Going down, the kernel emptied its queue; what our sockets still hold is old.
+/// Handles an interface that is gone or was down. The kernel emptied its queue; frames in the sockets are old.
 static void can_lost(iwl_bus_t *bus, int error) {
     if (error == ENODEV) {
         can_of(bus)->interface = 0;
     }
 }
 
-/// Takes over what the kernel reports; what this file counts itself stays.
+/// Copies the kernel's report, but not the fields that this file counts itself.
 static void note_link(iwl_bus_t *bus, const iwl_bus_link_t *reading) {
     const iwl_bus_link_t before = bus->link;
     if (iwl_bus_link_is_same(&before, reading)) {
@@ -64,7 +65,7 @@ static void note_link(iwl_bus_t *bus, const iwl_bus_link_t *reading) {
     bus->link.load_permille = before.load_permille;
 }
 
-/// The kernel's answer to how the interface is set; unanswered, only that it is there is known.
+/// Reads the settings of the interface. If the kernel does not answer, only its presence is known.
 static iw_bus_state_t read_link(socketcan_t *can) {
     iwl_netlink_reading_t reading;
     if (iwl_netlink_read(&can->netlink, can->name, &reading) != 0) {
@@ -88,7 +89,7 @@ static bool open_sockets(socketcan_t *can, int interface) {
     return false;
 }
 
-/// While down: drops what the sockets still hold, frames and errors, and finds out whether they are dead.
+/// While down: drops frames and errors in the sockets, and detects dead sockets.
 static void drop_old(socketcan_t *can) {
     if (can->bus.ours.fd < 0) {
         return;
@@ -100,7 +101,7 @@ static void drop_old(socketcan_t *can) {
     }
 }
 
-/// Looks whether the interface is back, and if so goes on with the sockets there are, or opens new ones.
+/// Checks whether the interface is back, and continues with the sockets or opens new ones.
 static void try_up(socketcan_t *can) {
     int interface = 0;
     iwl_bus_link_t link = can->bus.link;
@@ -120,7 +121,7 @@ static void try_up(socketcan_t *can) {
     iwl_bus_note(&can->bus, read_link(can));
 }
 
-/// While up: is the controller really bus-off, or no longer?
+/// While up: checks by the carrier whether the controller is bus-off.
 static void look_at_carrier(socketcan_t *can) {
     const int carrier = iwl_netdev_carrier(can->name);
     if (carrier == 0) {
@@ -131,7 +132,8 @@ static void look_at_carrier(socketcan_t *can) {
 }
 
 static int open_descriptors(socketcan_t *can) {
-    can->probe_fd = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW); // Never bound. Also: can this kernel do CAN?
+    can->probe_fd =
+        socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW); // Never bound. It also shows whether the kernel supports CAN.
     if (can->probe_fd < 0) {
         return errno;
     }
@@ -174,7 +176,7 @@ static int can_open(iwl_bus_t *bus, const char *name) {
         can_close(bus);
         return error;
     }
-    (void)read_link(can); // Also while it is down: status and doctor then say which settings are wrong.
+    (void)read_link(can); // Also while down: status and doctor then show which settings are wrong.
     try_up(can);
     return 0;
 }
@@ -205,7 +207,8 @@ static void can_poll(iwl_bus_t *bus) {
     if (bus->up && iwl_socketcan_socket_is_empty(&bus->ours)) {
         iwl_bus_fill(bus);
         if (bus->up && bus->ours.count == 0U && !bus->quiet) {
-            (void)iwl_netlink_take_events(&can->events); // Not needed while up, but unread they would wake us for ever.
+            (void)iwl_netlink_take_events(
+                &can->events); // Not needed while up, but unread events would wake the loop again and again.
         }
     }
     if (bus->up && bus->now_us >= bus->look_us) {
@@ -214,9 +217,9 @@ static void can_poll(iwl_bus_t *bus) {
     (void)iwl_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);
 }
 
-/// Has the link taken down and up: that empties the queue and the controller. It may take seconds, so the answer is
-/// "begun"; the loss of the bus tells the core that it is done. Not where the echo is unproven: an slcan adapter keeps
-/// the old frames that it has, and only the zeros in the queue behind them would be lost.
+/// Takes the link down and up, which empties the queue and the controller. It may take seconds, so the result is
+/// "begun", and the loss of the bus reports the end. Not if echoes are unproven: an slcan adapter would retain its old
+/// frames, and only the zeros after them would be lost.
 static int can_purge(iwl_bus_t *bus) {
     socketcan_t *can = can_of(bus);
     if (bus->link.purge == IWL_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {

@@ -9,7 +9,7 @@ IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLA
                  socketcan_flags_are_those_of_the_kernel);
 IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, socketcan_frame_size);
 
-/// CAN_EFF_MASK compares the whole number and no format bit: every format with a known number passes, to be counted.
+/// The filter compares the whole id and no format bit: a known id passes in every format, to be counted.
 void iwl_socketcan_filters(iwl_socketcan_share_t share, struct can_filter *out_filters) {
     const canid_t invert = (share == IWL_SOCKETCAN_OTHERS) ? CAN_INV_FILTER : 0U;
     for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
@@ -30,7 +30,8 @@ iw_can_frame_t iwl_socketcan_translate(const struct can_frame *raw, int flags) {
     return frame;
 }
 
-/// Bus errors (CAN_ERR_BUSERROR) are left out: a disturbed bus brings thousands a second, and the states say enough.
+/// Bus errors (CAN_ERR_BUSERROR) are not requested: a disturbed bus causes thousands per second, and the states
+/// suffice.
 uint32_t iwl_can_error_mask(void) {
     return CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
 }

@@ -7,9 +7,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// More than fits into the room that is asked for, at half a kilobyte for each frame.
+/// More batches than fit the requested receive buffer, at half a kilobyte per frame.
 #define DROP_BATCHES_MAX 512
-/// Marks that the hub sets in a frame's `__res0`: an echo of ours, or an error frame that another client made.
+/// Marks of the hub in `__res0` of a frame: an echo of this client, or an error frame from another client.
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
 
@@ -18,7 +18,7 @@ void iwl_socketcan_socket_init(iwl_socketcan_socket_t *self) {
     self->fd = -1;
 }
 
-/// All frames are told beside into one place: the kernel's count is a running total, so that the last one tells all.
+/// All messages share one control buffer: the kernel's count is a running total, so the last one is enough.
 void iwl_socketcan_socket_use(iwl_socketcan_socket_t *self, int fd, bool is_hub) {
     iwl_socketcan_socket_init(self);
     self->fd = fd;
@@ -36,7 +36,7 @@ static bool set(int fd, int level, int name, int value) {
     return setsockopt(fd, level, name, &value, sizeof value) == 0;
 }
 
-/// Loopback stays on (the default): it is what echoes our frames and what lets other programs see them.
+/// Loopback stays on (the default): it returns the echoes and shows the frames to other programs.
 static bool ask_for(int fd, iwl_socketcan_share_t share) {
     const can_err_mask_t errors = iwl_can_error_mask();
     struct can_filter filters[IWL_SOCKETCAN_IDS];
@@ -61,7 +61,7 @@ int iwl_socketcan_socket_open(iwl_socketcan_socket_t *self, int interface, iwl_s
     if (fd < 0) {
         return errno;
     }
-    (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
+    (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not received, and not counted.
     (void)set(fd, SOL_SOCKET, SO_RCVBUF, (int)IWL_LINK_ROOM_BYTES);
     if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
@@ -85,7 +85,7 @@ void iwl_socketcan_socket_close(iwl_socketcan_socket_t *self) {
     iwl_socketcan_socket_init(self);
 }
 
-/// Of the last message, which has the latest count.
+/// Reads the count from the last message, which has the newest one.
 static void note_drops(iwl_socketcan_socket_t *self, struct msghdr *message) {
     const struct cmsghdr *part = CMSG_FIRSTHDR(message);
     if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
@@ -93,8 +93,8 @@ static void note_drops(iwl_socketcan_socket_t *self, struct msghdr *message) {
     }
 }
 
-/// Keeps what is a frame, and turns the hub's marks into flags. ENOTCONN: it is gone. Frames before the end are still
-/// good; the next call meets the end once more.
+/// Removes entries that are not frames, and converts the hub's marks to flags. ENOTCONN: the hub is gone. Frames before
+/// the end are valid; the next call finds the end again.
 static int sieve(iwl_socketcan_socket_t *self) {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < self->count; i++) {
@@ -125,12 +125,12 @@ int iwl_socketcan_socket_fill(iwl_socketcan_socket_t *self) {
     }
     for (uint32_t i = 0; i < self->count; i++) {
         self->flags[i] = self->message[i].msg_hdr.msg_flags;
-        self->message[i].msg_hdr.msg_controllen = sizeof self->drops; // The kernel has told how much it took of it.
+        self->message[i].msg_hdr.msg_controllen = sizeof self->drops; // The kernel has written how much of it was used.
     }
     if (self->is_hub && count > 0) {
         return sieve(self);
     }
-    return (error == EAGAIN || error == EINTR) ? 0 : error; // ENETDOWN, ENODEV: the interface went down or away.
+    return (error == EAGAIN || error == EINTR) ? 0 : error; // ENETDOWN, ENODEV: the interface is down or gone.
 }
 
 void iwl_socketcan_socket_forget(iwl_socketcan_socket_t *self) {
@@ -154,7 +154,8 @@ int iwl_socketcan_socket_drop(iwl_socketcan_socket_t *self) {
     return last;
 }
 
-/// ENOBUFS: the interface's queue is full. Nothing is retried here: a newer setpoint replaces this one (R6).
+/// ENOBUFS: the queue of the interface is full. The port does not retry, because a newer setpoint replaces this one
+/// (R6).
 int iwl_socketcan_socket_send(const iwl_socketcan_socket_t *self, const iw_can_frame_t *frames, uint32_t count) {
     struct can_frame raw[IW_SIDES];
     struct iovec part[IW_SIDES];
@@ -174,5 +175,5 @@ int iwl_socketcan_socket_send(const iwl_socketcan_socket_t *self, const iw_can_f
     while (whole < sent && message[whole].msg_len == sizeof raw[0]) {
         whole++;
     }
-    return (whole > 0) ? whole : -1; // Less than a frame is no frame.
+    return (whole > 0) ? whole : -1; // A part of a frame is not a frame.
 }

@@ -14,7 +14,7 @@ bool iwl_unix_link_is_name(const char *name) {
     return strncmp(name, prefix, sizeof prefix - 1U) == 0;
 }
 
-/// Non-blocking also while connecting: a hub that does not accept must not hold up the loop.
+/// Non-blocking also while connecting: a hub that does not accept must not delay the loop.
 static bool try_connect(iwl_unix_link_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     memcpy(address.sun_path, self->path, strlen(self->path) + 1U);
@@ -46,7 +46,7 @@ int iwl_unix_link_open(iwl_unix_link_t *self, const char *name, int type) {
     if (watch_fd < 0) {
         return errno;
     }
-    // Nobody listening is no error: the simulator may be started later.
+    // A missing listener is not an error: the simulator may start later.
     *self = (iwl_unix_link_t){.path = path,
                               .retry_us = 0,
                               .backoff_us = IWL_UNIX_LINK_RETRY_MIN_US,
@@ -74,7 +74,7 @@ void iwl_unix_link_lose(iwl_unix_link_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
         self->fd = -1;
-        self->retry_us = 0; // The first attempt is at once; the back-off comes after it has failed.
+        self->retry_us = 0; // The first attempt is immediate; the back-off follows a failure.
     }
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// A connection to a unix socket that comes back by itself: connect, lose, wait, connect again.
+/// A connection to a unix socket that reconnects automatically.
 ///
-///     DOWN --due: connect works--> UP --hang-up or error--> DOWN (attempts: at once, then after each back-off)
+///     DOWN --due: connect works--> UP --hang-up or error--> DOWN (attempts: immediately, then after each back-off)
 ///
-/// The back-off doubles from IWL_UNIX_LINK_RETRY_MIN_US to IWL_UNIX_LINK_RETRY_MAX_US and starts anew with every
-/// success. The epoll set stays the same over all connections: it is what others watch.
+/// The back-off doubles from IWL_UNIX_LINK_RETRY_MIN_US to IWL_UNIX_LINK_RETRY_MAX_US and is reset by every success.
+/// The owner watches the epoll set, which is the same for all connections.
 #ifndef IWL_UNIX_LINK_H
 #define IWL_UNIX_LINK_H
 
@@ -15,27 +15,28 @@
 
 typedef struct {
     const char *path;
-    iw_time_us_t retry_us; ///< When to connect again; IW_NEVER while up.
+    iw_time_us_t retry_us; ///< Time of the next attempt; IW_NEVER while up.
     uint32_t backoff_us;
     int type; ///< SOCK_STREAM or SOCK_SEQPACKET.
     int watch_fd;
-    int fd; ///< -1: down.
+    int fd; ///< Descriptor; -1 if down.
 } iwl_unix_link_t;
 
-/// True for `unix:PATH`.
+/// Returns true for `unix:PATH`.
 bool iwl_unix_link_is_name(const char *name);
 
-/// 0, or an errno (no descriptors left, name too long). Tries to connect at once; failing that is no error.
+/// Opens the link and tries to connect. Returns 0 or an errno (no descriptors left, name too long). A failed connection
+/// is not an error.
 int iwl_unix_link_open(iwl_unix_link_t *self, const char *name, int type);
 void iwl_unix_link_close(iwl_unix_link_t *self);
 
 bool iwl_unix_link_is_up(const iwl_unix_link_t *self);
 
-/// The other side is gone: closes. The next `iwl_unix_link_poll` connects again; if that fails, it waits for the
-/// back-off.
+/// Closes the connection, because the peer is gone. The next `iwl_unix_link_poll` connects again, or after a failure
+/// waits for the back-off.
 void iwl_unix_link_lose(iwl_unix_link_t *self);
 
-/// Connects if it is due. True if the link came up now.
+/// Connects if it is due. Returns true if the link has come up in this call.
 bool iwl_unix_link_poll(iwl_unix_link_t *self, iw_time_us_t now_us);
 
 #endif

@@ -38,7 +38,7 @@ class ConnectionLost(LeaseEnded, GatewayUnavailable):
 class Refused(IWheelError):
     """The gateway said no; nothing was applied.
 
-    `error` is a name of the closed list in docs/northbound.md, `message` tells cause and cure, `cmd` what was asked.
+    `error` is a name of the closed list in docs/user/northbound.md, `message` tells cause and cure, `cmd` what was asked.
     """
 
     def __init__(self, cmd: str, error: str, message: str) -> None:

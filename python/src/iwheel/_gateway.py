@@ -152,7 +152,7 @@ class Gateway:
         return cast(Tared, without_envelope(self._ask("tare", side=side)))
 
     def confirm(self, item: str, value: str | Whole | None = None, how: str | None = None) -> Confirmed:
-        """The operator's word on an item of the assumption ledger (docs/ledger.md). Moves nothing.
+        """The operator's word on an item of the assumption ledger (docs/developer/ledger.md). Moves nothing.
 
         `value` is what was found at the machine; without it what is configured is confirmed. Returns the item's entry: another value
         than the configured one contradicts it, and `disabled` tells what that costs. `how` it was found (up to 127 bytes) is kept as its
@@ -162,7 +162,7 @@ class Gateway:
         return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
 
     def config(self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None) -> Configured:
-        """The configuration of a gateway that keeps it itself (a board, docs/serial.md); a daemon's is its file, and it raises Refused.
+        """The configuration of a gateway that keeps it itself (a board, docs/user/serial.md); a daemon's is its file, and it raises Refused.
 
         Alone it reads; with `key` (`drive.lease_ms`) and `value` it stages that; with `commit` True it writes what is staged, after
         which the board starts anew and this connection ends, with False it forgets it.

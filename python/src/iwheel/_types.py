@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the gateway answers, as this package hands it out. The other types are in _protocol.py; docs/northbound.md tells more."""
+"""What the gateway answers, as this package hands it out. The other types are in _protocol.py; docs/user/northbound.md tells more."""
 
 from __future__ import annotations
 

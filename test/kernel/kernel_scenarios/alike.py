@@ -8,7 +8,7 @@ cut, stalls), and floods that never wait, which would stop virtual time.
 import scenarios  # noqa: F401  (fills REGISTRY)
 from catalogue import add
 from kernel_rig import SlcanRig, VcanRig
-from scenario import REGISTRY
+from scenario import REGISTRY, as_documented
 
 ON_VCAN = (
     "nominal_drive_and_turn",
@@ -32,7 +32,10 @@ ON_VCAN = (
     "row19_second_master_driving",
     "row19_second_master_stopping",
     "row19_second_master_listening",
+    "row19_foreign_zero",
+    "row19_forged_error_frames",
     "row20_odd_frames",
+    "row20_odd_setpoints",
     "row22_left_silent",
     "row22_both_silent",
     "row22_sign_swapped",
@@ -63,13 +66,13 @@ ON_VCAN = (
     "row27_stderr_blocked",
     "row28_socket_path",
     "row29_type_not_set",
+    "row30_two_gateways",
     "no_estop_line",
     "listen_only",
 )
-ON_ADAPTER = ("nominal_drive_and_turn", "row01_client_killed", "row22_left_silent", "row25_killed", "row25_sigterm")
+ON_ADAPTER = ("nominal_drive_and_turn", "row01_client_killed", "row22_left_silent", "row25_killed", "row25_sigterm", "row30_two_gateways")
 REAL_TIME = ("nominal_drive_and_turn", "row01_client_killed", "row25_killed")
-REAL_TIME_FULL = ("row02_client_frozen", "row24_stopped_250_ms", "row24_stopped_700_ms", "row25_sigterm", "row27_stderr_blocked")
-AS_DOCUMENTED = ("nominal_drive_and_turn", "force_offset_and_tare", "row23_", "trap12_")  # telemetry at its full rate
+REAL_TIME_FULL = ("row02_client_frozen", "row19_second_master_driving", "row24_stopped_250_ms", "row24_stopped_700_ms", "row25_sigterm", "row27_stderr_blocked")
 NEVER_WAIT = ("row05_many_observers", "row05_out_of_descriptors")  # in virtual time these would never end
 
 
@@ -79,7 +82,7 @@ def row_of(name):
 
 def register_one(prefix, name, groups, rig, more=""):
     title, _, function = REGISTRY[name]
-    fields = {"pace": 1} if name.startswith(AS_DOCUMENTED) else {}
+    fields = {"pace": 1} if as_documented(name) else {}
     add(prefix + name, title + more, function, groups=groups, row=row_of(name), rig=rig, **fields)
 
 

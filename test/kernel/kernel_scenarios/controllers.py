@@ -19,7 +19,7 @@ AS_DOCUMENTED = {"bitrate": 1_000_000, "sample-point": 0.625}
 
 
 def set_up(name, **timing):
-    """The interface as docs/deploy.md has it, with that timing instead."""
+    """The interface as docs/user/deploy.md has it, with that timing instead."""
     netdev.down(name)
     words = [word for key, value in {**AS_DOCUMENTED, **timing}.items() for word in (key, str(value))]
     netdev.command("ip", "link", "set", name, "type", "can", *words, "restart-ms", "100")

@@ -12,7 +12,6 @@ from catalogue import kernel_test
 from client import Streamer
 from harness import STRANGER, Process, become_stranger, lock_names, now_us, wait_connect
 from judge_log import GAP_US, Event
-from kernel_rig import SlcanRig
 from scenario import REGISTRY
 from scenarios.bus_faults import wait_reset
 from scenarios.process import driving
@@ -112,33 +111,6 @@ def row27_disk_full(t):
     finally:
         rig.gateway.end()
         subprocess.run(["umount", "-l", folder], check=True)
-
-
-def second_gateway(t):
-    """Another gateway on the same interface refuses and sends nothing; the first one drives on."""
-    rig, client, stream = driving(t, speed=250)
-    os.mkdir(rig.path("elsewhere"))
-    for extra in ((), ("--socket", rig.path("other.sock")), ("--socket", rig.path("elsewhere/gateway.sock"))):
-        other = Process(rig.gateway_command(*extra), rig.path("second.out"))
-        rig.processes.append(other)
-        code, text = other.wait(5), other.text()
-        t.check(code == 69, f"exit code {code} with {extra}: {text[-200:]}")
-        t.check("gateway" in text and len(text) > 40, f"it says why: {text[-200:]}")
-        t.check(str(rig.gateway.child.pid) in text, f"it names the process: {text[-200:]}")
-    t.check(stream.stop() is None, f"the first one drives on: {stream.refusal}")
-    client.request("stop")
-    time.sleep(0.5)
-    t.judge(rig)
-
-
-@kernel_test("two gateways on one vcan interface", "host", 30)
-def row30_two_gateways(t):
-    second_gateway(t)
-
-
-@kernel_test("two gateways on one adapter", "adapter", 30, SlcanRig)
-def row30_two_gateways_adapter(t):
-    second_gateway(t)
 
 
 @kernel_test("strangers hold the names of the lock: the gateway starts, also after a kill in motion, and alone", "host", 30)

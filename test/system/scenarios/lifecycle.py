@@ -196,10 +196,12 @@ def row30_two_gateways(t):
     t.arm(client)
     stream = Streamer(client, 250, 250)
     time.sleep(0.4)
-    for extra in ((), ("--socket", rig.path("other.sock"))):
+    os.mkdir(rig.path("elsewhere"))
+    for extra in ((), ("--socket", rig.path("other.sock")), ("--socket", rig.path("elsewhere/gateway.sock"))):
         code, text = second_gateway(t, rig, *extra)
         t.check(code == 69, f"exit code {code} with {extra}: {text[-200:]}")
         t.check("gateway" in text and len(text) > 40, f"it says why: {text[-200:]}")
+        t.check(str(rig.gateway.child.pid) in text, f"it names the process: {text[-200:]}")
     t.check(os.path.exists(rig.path("gateway.sock")), "the first one's socket is still there")
     t.check(stream.stop() is None, f"the first one drives on: {stream.refusal}")
     t.expect(client.request("stop"))

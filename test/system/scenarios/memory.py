@@ -9,6 +9,7 @@ import time
 import zlib
 
 from client import Streamer
+from harness import children
 from scenario import scenario
 
 QUIET_S = 2.6  # A window of forty force frames and some.
@@ -43,13 +44,7 @@ def answered(rig, client):
 
 
 def keeper_of(gateway):
-    with open(f"/proc/{gateway.child.pid}/task/{gateway.child.pid}/children", encoding="ascii") as file:
-        children = file.read().split()
-    for child in children:
-        with open(f"/proc/{child}/comm", encoding="ascii") as file:
-            if file.read().strip() == "iwheel-keeper":
-                return int(child)
-    raise RuntimeError("the gateway has no keeper")
+    return children(gateway.child.pid)["iwheel-keeper"]
 
 
 @scenario("a tare and the operator's word survive kill -9, and nothing moves the zero afterwards", 16)

@@ -91,11 +91,11 @@ def iwheelctl_killed(t):
     interrupted(t, signal.SIGKILL)
 
 
-@scenario("the example client of docs/northbound.md drives the simulator", 6)
+@scenario("the example client of docs/user/northbound.md drives the simulator", 6)
 def documented_client(t):
     rig, _ = t.running()
     script = example_client()
-    if not t.check(script, "docs/northbound.md holds a Python client"):
+    if not t.check(script, "docs/user/northbound.md holds a Python client"):
         return
     with open(rig.path("example.py"), "w", encoding="utf-8") as file:
         file.write(script)
@@ -110,7 +110,7 @@ def documented_client(t):
 
 def example_client():
     """The code block of the documentation, as it is."""
-    path = os.path.join(os.path.dirname(__file__), "..", "..", "..", "docs", "northbound.md")
+    path = os.path.join(os.path.dirname(__file__), "..", "..", "..", "docs", "user", "northbound.md")
     if not os.path.exists(path):
         return None
     with open(path, encoding="utf-8") as file:

@@ -3,8 +3,6 @@
 
 from .chip import MS
 
-SLOT_NS = 62_500_000
-
 
 class Lamp:
     def __init__(self, port, pin, lit):

@@ -19,13 +19,15 @@ function pair(left, right, digits) {
   return left === null && right === null ? null : words.join(" / ");
 }
 
-// A machine without a clock tells none.
-const when = (wall_us) => (wall_us === null ? STRINGS.unknown : new Date(wall_us / 1000).toLocaleString());
-
 function row(machine) {
   const made = document.createElement("tr"), name = document.createElement("th"), online = machine.online;
   name.scope = "row";
-  name.textContent = machine.machine;
+  if (pages.address) {
+    const link = document.createElement("a");
+    link.href = pages.address.replaceAll("{machine}", encodeURIComponent(machine.machine));
+    link.textContent = machine.machine;
+    name.append(link);
+  } else name.textContent = machine.machine;
   const stop = machine.cause === null ? STRINGS.fleet_never : `${when(machine.stop_wall_us)}: ${machine.cause}${machine.sentence ? `. ${machine.sentence}` : ""}`;
   made.append(name, cell("fleet_state", online ? machine.state : STRINGS.fleet_offline, online ? { latched: "bad", stopping: "care" }[machine.state] ?? "" : "care"),
     cell("fleet_last", stop, machine.cause === null ? "quiet" : ""),
@@ -58,8 +60,17 @@ function show(fleet, now_ms) {
   tell(say(old ? "fleet_stale" : "fleet_fresh", { time: when(fleet.wall_us) }), old ? "bad" : "good");
 }
 
+// Where each machine has its own page, if that is configured.
+const pages = { address: null };
+
+async function findPages() {
+  const answer = await askProved("GET", "/health");
+  if (answer.status !== 401) pages.address = (await answer.json()).machine_page;
+}
+
 async function look() {
   try {
+    if (pages.address === null) await findPages();
     const answer = await askProved("GET", "/api/fleet");
     $("login").hidden = answer.status !== 401;
     $("main").hidden = answer.status === 401;

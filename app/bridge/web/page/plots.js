@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Series over time by uPlot: they follow the newest 60 s, can be moved, zoomed and frozen, and saved as PNG and CSV.
+// Series over time by uPlot: they follow the newest seconds, can be moved, zoomed and frozen together, and saved as PNG and CSV.
 
-const WINDOW_S = 60;
 const KEPT_S = 600; // What can still be looked at by moving back; memory stays the same for hours.
 
 function colour(name) {
@@ -57,27 +56,59 @@ class Series {
   }
 }
 
+// What all plots have in common: the part of time that they show, and what happened in it. `range` is set once somebody has moved or zoomed.
+const view = { range: null, span_s: 60, frozen: false, at: null, live_marks: [], marks: null, plots: [], newest_s: 0 };
+
+function redrawAll() {
+  for (const plot of view.plots) plot.dirty = plot.forced = true;
+}
+
+// Moves by a part of what is shown, and zooms around a place in it (0 left, 1 right).
+function moveView(by, zoom, around = 0.5) {
+  const [first, last] = view.plots[0].window(), span = last - first;
+  const middle = first + span * around, wide = Math.min(Math.max(span * zoom, 0.05), KEPT_S);
+  view.range = [middle - wide * around + span * by, middle + wide * (1 - around) + span * by];
+  redrawAll();
+}
+
+function resetView() {
+  view.range = null;
+  redrawAll();
+}
+
+function freezeView(frozen) {
+  view.range = frozen ? view.plots[0].window() : null;
+  view.frozen = frozen;
+  redrawAll();
+}
+
+// One of the same kind and source within a short time is one event.
+function markLive(t, words, tone) {
+  if (view.live_marks.some((one) => one.words === words && Math.abs(one.t - t) < 0.5)) return;
+  view.live_marks.push({ t, words, tone });
+  if (view.live_marks.length > 200) view.live_marks.shift();
+  redrawAll();
+}
+
 class Plot {
-  // lines: [{ name, label, dash }]; their colours are the page's of that name.
+  // lines: [{ name, label, column, dash, more }]; their colours are the page's of that name; `more`: shown on request only. Plots of one `kind` have
+  // one axis.
   constructor(place, title, label, lines, file) {
-    this.lines = lines;
-    this.file = file;
+    Object.assign(this, { lines, file, kind: title, all: false, dirty: true, forced: true, visible: true, low: null, high: null });
     this.live = new Series(lines.length + 1);
     this.series = this.live;
-    this.range = null; // [first, last] if somebody has moved or zoomed.
-    this.frozen = false;
-    this.dirty = true;
-    this.host = element("div", { tabindex: "0", role: "img", "aria-label": `${label} ${STRINGS.plot_keys}` });
+    this.host = element("div", { tabindex: "0", role: "img", class: "canvas", "aria-label": `${label} ${STRINGS.plot_keys}` });
     const saves = element("div", { class: "row" },
       this.button("save_png", title, () => this.savePng()), this.button("save_csv", title, () => this.saveCsv()));
-    const legend = element("ul", { class: "legend" }, ...lines.map((line) =>
-      element("li", { class: line.name }, element("i"), line.label)));
-    place.append(element("div", { class: "plot" }, element("h3", { text: title }), this.host, legend, saves));
+    this.values = lines.map(() => element("b"));
+    this.legend = lines.map((line, n) => element("li", { class: line.name }, element("i"), line.label, this.values[n]));
+    place.append(element("div", { class: "plot" }, element("h3", { text: title }), element("ul", { class: "legend" }, ...this.legend), this.host, saves));
     this.host.addEventListener("keydown", (event) => this.key(event));
     this.host.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    this.visible = true;
+    this.followFingers();
     new IntersectionObserver((entries) => { this.visible = entries.at(-1).isIntersecting; this.dirty = true; }).observe(this.host);
     new ResizeObserver(() => this.size()).observe(this.host);
+    view.plots.push(this);
     this.build();
   }
   button(name, title, action) {
@@ -85,23 +116,29 @@ class Plot {
     made.addEventListener("click", action);
     return made;
   }
+  shows(line) {
+    return this.all || !line.more;
+  }
   build() {
     this.uplot?.destroy();
     const axis = { stroke: colour("quiet"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 }, font: "12px system-ui" };
     const seconds = (u, ticks) => ticks.map((tick) => `${Math.round((tick - this.zero()) * 1000) / 1000} s`);
     this.uplot = new uPlot({
       width: Math.max(this.host.clientWidth, 200), height: 180, legend: { show: false }, padding: [8, 12, 0, 0],
-      cursor: { drag: { x: true, y: false, setScale: false }, y: false },
-      scales: { x: { time: false, range: () => this.window() }, y: { range: (u, low, high) => spread(low, high) } },
+      cursor: { drag: { x: true, y: false, setScale: false }, y: false, sync: { key: "time" } },
+      scales: { x: { time: false, range: () => this.window() }, y: { range: () => this.span() } },
       axes: [{ ...axis, splits: (u, i, low, high) => this.ticks(u.width, low, high), values: seconds, size: 30 }, { ...axis, size: 56 }],
-      series: [{}, ...this.lines.map((line) => ({ stroke: colour(line.name), width: 2, dash: line.dash, points: { show: false }, spanGaps: false }))],
-      hooks: { setSelect: [(u) => this.select(u)] },
+      series: [{}, ...this.lines.map((line) => ({ show: this.shows(line), stroke: colour(line.name), width: 2, dash: line.dash, points: { show: false }, spanGaps: false }))],
+      hooks: { setSelect: [(u) => this.select(u)], draw: [(u) => this.drawMarks(u)], setCursor: [() => this.showValues()] },
     }, this.series.data.map(() => []), this.host);
-    this.dirty = true;
+    this.cursor = element("i", { class: "at" });
+    this.uplot.over.append(this.cursor);
+    this.legend.forEach((item, n) => { item.hidden = !this.shows(this.lines[n]); });
+    this.dirty = this.forced = true;
   }
   // Time 0 of the axis: now, or the stop of a recording.
   zero() {
-    return this.series === this.live ? this.live.last ?? 0 : 0;
+    return this.series === this.live ? view.newest_s : 0;
   }
   // Round seconds from time 0, no closer than they can be read.
   ticks(width, low, high) {
@@ -111,67 +148,136 @@ class Plot {
     return found;
   }
   window() {
-    if (this.range) return this.range;
+    if (view.range) return view.range;
     if (this.series !== this.live) return [this.series.data[0][0] ?? -1, this.series.last ?? 1];
-    const last = this.live.last ?? 0;
-    return [last - WINDOW_S, last];
+    return [view.newest_s - view.span_s, view.newest_s];
   }
   add(row) {
     this.live.add(row);
+    view.newest_s = row[0];
     this.dirty ||= this.series === this.live;
   }
   show(series) {
     this.series = series ?? this.live;
-    this.range = null;
-    this.dirty = true;
+    resetView();
+  }
+  showAll(all) {
+    this.all = all;
+    this.build();
   }
   size() {
     const width = Math.max(this.host.clientWidth, 200);
     if (width !== this.uplot.width) this.uplot.setSize({ width, height: 180 });
   }
+  // The vertical axis is that of all plots of this kind: left and right can be compared.
+  span() {
+    const alike = view.plots.filter((plot) => plot.kind === this.kind && plot.low !== null);
+    return spread(Math.min(...alike.map((plot) => plot.low)), Math.max(...alike.map((plot) => plot.high)));
+  }
+  measure(columns) {
+    const before = [this.low, this.high];
+    [this.low, this.high] = [null, null];
+    this.lines.forEach((line, n) => {
+      if (!this.shows(line)) return;
+      for (const value of columns[n + 1]) {
+        if (value === null) continue;
+        if (this.low === null || value < this.low) this.low = value;
+        if (this.high === null || value > this.high) this.high = value;
+      }
+    });
+    if (before[0] === this.low && before[1] === this.high) return;
+    for (const plot of view.plots) if (plot !== this && plot.kind === this.kind) plot.dirty = true;
+  }
   draw() {
-    if (!this.dirty || !this.visible || (this.frozen && this.series === this.live && this.drawn)) return;
-    this.dirty = false;
-    this.drawn = true;
+    if (!this.dirty || (!this.visible && !this.forced) || (view.frozen && this.series === this.live && !this.forced)) return;
+    this.dirty = this.forced = false;
     const [first, last] = this.window();
-    this.uplot.setData(this.series.between(first, last), false);
+    const columns = this.series.between(first, last);
+    this.measure(columns);
+    this.uplot.setData(columns, false);
     this.uplot.setScale("x", { min: first, max: last });
+    this.showAt();
   }
-  freeze(frozen) {
-    this.frozen = frozen;
-    this.range = frozen ? this.window() : null;
-    this.dirty = true;
-    this.drawn = false;
+  // Where a recording is being played, and the values there.
+  showAt() {
+    const { min, max } = this.uplot.scales.x, shown = view.at !== null && view.at >= min && view.at <= max;
+    this.cursor.hidden = !shown;
+    if (shown) this.cursor.style.left = `${this.uplot.valToPos(view.at, "x")}px`;
+    this.showValues();
   }
-  move(by, zoom, around = 0.5) {
-    const [first, last] = this.window(), span = last - first;
-    const middle = first + span * around, wide = Math.min(Math.max(span * zoom, 0.05), KEPT_S);
-    this.range = [middle - wide * around + span * by, middle + wide * (1 - around) + span * by];
-    this.dirty = true;
-    this.drawn = false;
+  // Under the mouse; else where a recording is; else the newest.
+  showValues() {
+    const index = view.at === null ? this.uplot.cursor.idx ?? this.uplot.data[0].length - 1 : Math.max(0, this.indexAt(view.at));
+    this.values.forEach((place, n) => {
+      const value = this.uplot.data[n + 1]?.[index] ?? null, words = value === null ? "–" : plain(value.toFixed(this.lines[n].digits ?? 0));
+      if (place.textContent !== words) place.textContent = words;
+    });
+  }
+  indexAt(t) {
+    return this.uplot.data[0].findLastIndex((time) => time <= t);
+  }
+  // What happened, as upright lines; of those that are close together the first has its words.
+  drawMarks(u) {
+    const { ctx } = u, { left, top, width, height } = u.bbox, ratio = devicePixelRatio;
+    const marks = this.series === this.live ? view.live_marks : view.marks ?? [];
+    let free = left;
+    ctx.save();
+    ctx.font = `${11 * ratio}px system-ui`;
+    ctx.lineWidth = ratio;
+    for (const { t, words, tone } of marks.filter((one) => one.t >= u.scales.x.min && one.t <= u.scales.x.max)) {
+      const x = u.valToPos(t, "x", true), wide = ctx.measureText(words).width;
+      ctx.strokeStyle = colour(tone);
+      ctx.beginPath();
+      ctx.moveTo(x, top);
+      ctx.lineTo(x, top + height);
+      ctx.stroke();
+      if (x < free || x + wide > left + width) continue;
+      ctx.fillStyle = colour("ink");
+      ctx.fillText(words, x + 3 * ratio, top + 10 * ratio);
+      free = x + wide + 12 * ratio;
+    }
+    ctx.restore();
   }
   key(event) {
     const moves = { ArrowLeft: [-0.2, 1], ArrowRight: [0.2, 1], "+": [0, 0.5], "-": [0, 2] };
-    if (event.key === "0") this.show(this.series === this.live ? null : this.series);
-    else if (moves[event.key]) this.move(...moves[event.key]);
+    if (event.key === "0") resetView();
+    else if (moves[event.key]) moveView(...moves[event.key]);
     else return;
     event.preventDefault();
     event.stopPropagation();
-    this.drawn = false;
   }
   // With Ctrl or a pinch it zooms, sideways it moves; else the page scrolls.
   wheel(event) {
-    if (event.ctrlKey) this.move(0, event.deltaY > 0 ? 1.25 : 0.8, event.offsetX / Math.max(this.host.clientWidth, 1));
-    else if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) this.move(event.deltaX / Math.max(this.host.clientWidth, 1), 1);
+    if (event.ctrlKey) moveView(0, event.deltaY > 0 ? 1.25 : 0.8, this.partOf(event.clientX));
+    else if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) moveView(event.deltaX / this.uplot.over.clientWidth, 1);
     else return;
     event.preventDefault();
   }
+  partOf(x) {
+    const box = this.uplot.over.getBoundingClientRect();
+    return Math.min(1, Math.max(0, (x - box.left) / Math.max(box.width, 1)));
+  }
+  // One finger drags, two zoom around their middle; up and down the page scrolls.
+  followFingers() {
+    const fingers = new Map(), places = () => [...fingers.values()];
+    const gap = () => Math.max(20, Math.abs(places()[0] - places()[1]));
+    this.host.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch") fingers.set(event.pointerId, event.clientX);
+    });
+    this.host.addEventListener("pointermove", (event) => {
+      if (!fingers.has(event.pointerId)) return;
+      const before = event.clientX - fingers.get(event.pointerId), wide = fingers.size === 2 ? gap() : 0;
+      fingers.set(event.pointerId, event.clientX);
+      if (fingers.size === 1) moveView(-before / this.uplot.over.clientWidth, 1);
+      if (fingers.size === 2) moveView(-before / 2 / this.uplot.over.clientWidth, wide / gap(), this.partOf((places()[0] + places()[1]) / 2));
+    });
+    for (const name of ["pointerup", "pointercancel"]) addEventListener(name, (event) => fingers.delete(event.pointerId));
+  }
   select(u) {
     if (u.select.width < 8) return;
-    this.range = [u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")];
+    view.range = [u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")];
     u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-    this.dirty = true;
-    this.drawn = false;
+    redrawAll();
   }
   savePng() {
     const from = this.uplot.ctx.canvas, to = element("canvas");
@@ -197,7 +303,7 @@ class Plot {
 
 // Room above and below, and never a line of noise over the whole height.
 function spread(low, high) {
-  if (low === null || high === null || !Number.isFinite(low)) return [-1, 1];
+  if (!Number.isFinite(low) || !Number.isFinite(high)) return [-1, 1];
   const room = Math.max((high - low) * 0.1, 1);
   return [low - room, high + room];
 }

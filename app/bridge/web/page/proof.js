@@ -4,18 +4,18 @@
 
 const proof = { token: "", key: null, session: null };
 
-// Behind the # of the address, which no browser sends; kept for this tab.
+// Behind the # of the address, which no browser sends; kept in this browser until somebody forgets it here, or another one is made on the machine.
 function takeToken() {
   const found = /[#&]token=([0-9a-f]{32})\b/.exec(location.hash);
   if (found) {
-    sessionStorage.setItem("token", found[1]);
+    localStorage.setItem("token", found[1]);
     history.replaceState(null, "", location.pathname); // No history and no screen shows it.
   }
-  setToken(sessionStorage.getItem("token") ?? "");
+  setToken(localStorage.getItem("token") ?? "");
 }
 
 function setToken(token) {
-  sessionStorage.setItem("token", token);
+  localStorage.setItem("token", token);
   Object.assign(proof, { token, key: null, session: null });
 }
 

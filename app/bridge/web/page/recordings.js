@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 "use strict";
-// Recordings: read by pieces with their checksums, decoded (docs/protocol.md), and the frames around a stop on a time axis.
+// Recordings: read by pieces with their checksums, decoded (docs/developer/protocol.md), and the frames around a stop on a time axis.
 
 const SETPOINTS = { 266: 0, 298: 1 }, SPEEDS = { 256: 0, 288: 1 }, FORCES = { 512: 0, 544: 1 };
 
@@ -96,8 +96,20 @@ function decodeRecording(files) {
     wheel.speed.add([t, wheel.wanted, wheel.told, wheel.measured]);
   }
   const happened = told.filter((one) => one.t_us !== undefined && ((one.type === "state" && one.state !== one.before) || ["arm", "stopped", "died"].includes(one.type)))
-    .map((one) => ({ t: seconds(one.t_us + wall), text: [one.type, one.state, one.cause].filter(Boolean).join(" ") }));
+    .map((one) => ({ t: seconds(one.t_us + wall), text: [one.type, one.state, one.cause].filter(Boolean).join(" "), state: one.state ?? one.type, cause: one.cause }));
   return { wheels, happened, why, states: asked.filter((one) => one.type === "state"), first: seconds(frames[0].t_us), last: seconds(frames.at(-1).t_us) };
+}
+
+// One line for each value that changed, in the order of time.
+function recordingCsv({ wheels }) {
+  const lines = [];
+  ["left", "right"].forEach((side, i) => {
+    const { speed, force } = wheels[i], cell = (value) => (value === null ? "" : Number(value.toFixed(3)));
+    speed.data[0].forEach((t, n) => lines.push([t, side, ...speed.data.slice(1).map((column) => cell(column[n])), ""]));
+    force.data[0].forEach((t, n) => lines.push([t, side, "", "", "", cell(force.data[1][n])]));
+  });
+  lines.sort((a, b) => a[0] - b[0]);
+  return ["t_s,wheel,requested_mm_s,commanded_mm_s,measured_mm_s,force_raw_N", ...lines.map(([t, ...rest]) => [t.toFixed(6), ...rest].join(","))].join("\n") + "\n";
 }
 
 // What the client wants from here on: its last command, while it may.

@@ -17,17 +17,17 @@
 /// A limit falls by 1 mA in this time: 4000 mA/s.
 #define IW_CURRENT_FALL_US 250U
 
-/// The lowest limit that is sent: `min_current_mA`, or `max_current_mA` where that is lower.
+/// Returns the lowest limit that is sent: `min_current_mA`, or `max_current_mA` if that is lower.
 static inline int32_t iw_current_floor(const iw_config_t *config) {
     return (config->min_current_mA < config->max_current_mA) ? config->min_current_mA : config->max_current_mA;
 }
 
-/// Makes limits that may be sent of the requested ones, which lie within 0..max_current_mA. `zero`: both speeds are 0.
-/// True if a limit differs from the request.
+/// Replaces the requested limits, within 0..max_current_mA, by the limits to send. `zero`: both speeds are 0. Returns
+/// true if a limit differs from the request.
 bool iw_current_limit(const iw_config_t *config, int32_t limit_mA[IW_SIDES], bool zero);
 
-/// Moves the applied limits to the target ones: a higher limit holds immediately, a lower one is approached by at most
-/// 1 mA in IW_CURRENT_FALL_US.
+/// Moves the applied limits to the target limits: a higher limit applies immediately, a lower one is reached at 1 mA in
+/// IW_CURRENT_FALL_US.
 void iw_current_follow(int16_t limit_mA[IW_SIDES], const iw_pair_t *target, uint32_t elapsed_us);
 
 #endif

@@ -1,81 +1,81 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Which setpoint pair is due now, and when is the next one?
+/// Setpoint scheduler: selects the setpoint pair that is due, and the time of the next one.
 ///
-/// Pure state machine: no I/O and no clock. What to aim at is told by the motion permission as a demand; what the
-/// client wants by `iw_setpoint_command`.
+/// Pure state machine: no I/O and no clock. The motion permission sets the demand, and `iw_setpoint_command` sets the
+/// command of the client.
 ///
 ///     SILENCE --any other demand--> (first pair: zero) --FOLLOW--> ramps to the command
 ///                                                      --BRAKE --> ramps to zero
-///                                                      --ZERO  --> zero at once
+///                                                      --ZERO  --> zero immediately
 ///
-/// Ramps follow elapsed time, not calls. Both wheels ramp together: the one with the longest way sets the pace, so a
-/// machine in a curve stays in it while it stops. But an accelerating wheel never holds up one that brakes. A sign
-/// change passes through zero. Away from zero a late call is granted two periods at the most (no burst); towards zero
-/// the whole time.
+/// Ramps follow elapsed time, not the number of calls. Both wheels ramp together: the wheel with the largest change
+/// sets the pace, so that a machine in a curve stays on the curve while it stops. An accelerating wheel never delays a
+/// braking one. A change of sign passes through zero. After a late call the ramp away from zero advances by two periods
+/// at most, so that there is no burst; the ramp towards zero advances by the whole time.
 ///
-/// Under a command other than 0/0 the difference of both wheels grows no faster, and no further, than yaw.h allows.
+/// With a command other than 0/0, yaw.h limits the difference of both wheels and its growth.
 ///
-/// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least
-/// IW_SETPOINT_SPACING_US after the last one; ZERO is due at once.
+/// Pairs have a grid of `period_ms`. A new command or demand moves the next pair forward, to IW_SETPOINT_SPACING_US
+/// after the last one or later. ZERO is due immediately.
 #ifndef IW_SETPOINT_H
 #define IW_SETPOINT_H
 
 #include "iwheel/config.h"
 #include "iwheel/private/yaw.h"
 
-/// A changed command leaves at once, but not sooner than this after the last pair.
+/// Shortest interval between the last pair and the pair of a new command.
 #define IW_SETPOINT_SPACING_US 5000U
 
-/// Ramp and grid of both wheels.
+/// State of the scheduler.
 typedef struct {
-    const iw_config_t *config; ///< The owner's.
-    iw_demand_t demand;        ///< As told last.
-    bool from_zero;       ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
-    iw_time_us_t last_us; ///< When the last pair was taken.
-    iw_time_us_t due_us;  ///< When the next one is due; IW_NEVER in silence.
-    iw_pair_t target;     ///< The client's command, cleared whenever the demand is not FOLLOW.
-    int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
-    int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
-    int16_t limit_mA[IW_SIDES];   ///< IW_ROLE_LIMIT: as last taken. See current.h.
-    iw_yaw_t yaw;                 ///< How fast the pair may turn the machine.
+    const iw_config_t *config;    ///< Configuration of the owner.
+    iw_demand_t demand;           ///< Last demand.
+    bool from_zero;               ///< The next pair is zero, whatever the command: after a pause, ZERO or a collapse.
+    iw_time_us_t last_us;         ///< Time of the last pair.
+    iw_time_us_t due_us;          ///< Time of the next pair; IW_NEVER if none is due.
+    iw_pair_t target;             ///< Command of the client. Cleared when the demand is not FOLLOW.
+    int32_t speed_um_s[IW_SIDES]; ///< Present speeds of the ramp.
+    int32_t current_uA[IW_SIDES]; ///< Present currents of the ramp, with IW_ROLE_SETPOINT only.
+    int16_t limit_mA[IW_SIDES];   ///< Last current limits, with IW_ROLE_LIMIT. See current.h.
+    iw_yaw_t yaw;                 ///< Yaw limits of the pair.
 } iw_setpoint_t;
 
-/// `config` must be checked and outlive it. Begins in silence.
+/// Initializes `self` with the demand SILENCE. `config` must be checked, and must exist as long as `self`.
 void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config);
 
-/// Tells what to aim at. The same demand again changes nothing.
+/// Sets the demand. The same demand again has no effect.
 void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t demand);
 
-/// The client's new command, already within the limits. Ignored unless the demand is FOLLOW.
+/// Sets the command of the client, which must be within the limits. Ignored unless the demand is FOLLOW.
 void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target);
 
-/// Moves the next pair forward, but not closer than IW_SETPOINT_SPACING_US to the last one. Nothing in silence.
+/// Moves the next pair forward, to IW_SETPOINT_SPACING_US after the last one or later. No effect if none is due.
 void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole, or somebody
-/// else commands from now on. The zero is hastened; under FOLLOW the ramp to the next command starts from it, also if
-/// the command comes before it.
+/// Sets the ramp to zero immediately, whatever the demand, and clears the command: the port has not accepted the last
+/// pair as a whole, or the lease has moved to another client. The zero pair is hastened. With FOLLOW the ramp to the
+/// next command starts at this zero, even if the command arrives before the pair.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// True if a pair must leave now.
+/// Returns true if a pair must be sent now.
 static inline bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us) {
     return now_us >= self->due_us;
 }
 
-/// Advances the ramp to now, hands out the pair that must leave now and sets the time of the next.
+/// Advances the ramp to now, returns the pair that must be sent now, and sets the time of the next one.
 iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// The pair as last taken, in the machine's frame (not inverted).
+/// Returns the last pair of `iw_setpoint_take`, in the machine's frame (not inverted).
 iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self);
 
-/// True if the output is zero: the pair last taken was, or a collapse or a new demand has made it so.
+/// Returns true if the output is zero: the last pair was zero, or a collapse or a new demand has set it to zero.
 bool iw_setpoint_is_zero(const iw_setpoint_t *self);
 
-/// True if the next pair will be zero, whenever it is taken.
+/// Returns true if the next pair will be zero at any time.
 bool iw_setpoint_next_is_zero(const iw_setpoint_t *self);
 
-/// When a pair is due; IW_NEVER in silence.
+/// Returns the time of the next pair, or IW_NEVER.
 static inline iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {
     return self->due_us;
 }

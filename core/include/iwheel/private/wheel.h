@@ -1,40 +1,41 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// What is known of one wheel: its last values, how old they are, whether it is there, at rest, or has rebooted.
+/// State of one wheel: its last values, their age, and whether it is online, at rest, or has rebooted.
 ///
-/// "Heard" means its speed frame (4 ms): that is the one the safety rules judge; other frames do not keep a wheel
-/// alive.
+/// A wheel is online if its speed message (4 ms) arrives, because the safety rules judge that message. Other messages
+/// do not count.
 ///
-/// Two frames of reference: `speed_rpm` and `ticks` are the wheel's own, as on the bus; mm/s and distance are the
-/// machine's, with `invert` applied, so that they can be compared with commands.
+/// There are two frames of reference. `speed_rpm` and `ticks` are those of the wheel, as on the bus. Speeds in mm/s and
+/// distances are those of the machine, with `invert` applied, so that they can be compared with commands.
 ///
-/// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can
-/// turn; offset frames that come back. A wheel sends those in its first 60 s (document), so after a pause they mean
-/// another start. For how long they come is no evidence: a wheel may send them for longer, or for ever. Nor are offset
-/// frames in our own first minute: a gateway that starts late hears the rest of the wheel's.
+/// The core recognises a reboot by no frame for IW_WHEEL_REBOOT_SILENCE_US, by odometry that jumps further than a wheel
+/// can turn, or by offset messages after a pause. A wheel sends offset messages in the first 60 s after its start
+/// (document), so after a pause they show another start. Their duration shows nothing, because a wheel may send them
+/// for longer. Offset messages in the first minute of the gateway show nothing either: the wheel may have started
+/// shortly before.
 #ifndef IW_WHEEL_H
 #define IW_WHEEL_H
 
 #include "iwheel/codec.h"
 #include "iwheel/config.h"
 
-/// Silent for this long, a wheel must be assumed to have been without power.
+/// After this time without a frame the core assumes that the wheel had no power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
-/// Of the offset frames (document).
+/// Period of offset messages (document).
 #define IW_WHEEL_OFFSET_PERIOD_US 1000000U
-#define IW_WHEEL_OFFSET_LEARN_US  2000000U ///< How long a wheel listens to its sensor before the first one.
-/// Offset frames that come after this much of a run without any are back. Four may get lost in a row; and it is longer
-/// than a wheel needs for its first one, so that an ordinary start is none that begins twice. Ours.
+#define IW_WHEEL_OFFSET_LEARN_US  2000000U ///< Time in which a wheel measures its offset before the first message.
+/// An offset message after this time without one shows a reboot. Four in a row may be lost. The time is longer than a
+/// wheel needs for its first message, so that a normal start does not count twice. Chosen by us.
 #define IW_WHEEL_OFFSET_BACK_US 5000000U
-/// No odometry step is faster than this: twice the highest configurable speed. Ours, not the document's.
+/// No odometry step is faster than this: twice the highest configurable speed. Chosen by us.
 #define IW_WHEEL_FASTEST_MM_S 10000U
-/// Odometry steps up to this many ticks are believed whatever the time between them. Ours.
+/// The core accepts odometry steps of up to this many ticks at any interval. Chosen by us.
 #define IW_WHEEL_TICK_SLACK 30U
-/// Beyond this, either way, ticks are counted no more: so a distance in nanometres fits 64 bits whatever a wheel says.
-/// At the 20 mm of a tick without gear that is two million kilometres. Ours.
+/// Limit of the tick counter in both directions, so that a distance in nanometres always fits 64 bits. With 20 mm per
+/// tick (no gear) it is two million kilometres. Chosen by us.
 #define IW_WHEEL_TICKS_MAX 100000000000
 
-/// By what a reboot was recognised.
+/// Observation that showed a reboot.
 typedef enum {
     IW_REBOOT_NONE = 0,
     IW_REBOOT_SILENCE,
@@ -42,56 +43,58 @@ typedef enum {
     IW_REBOOT_OFFSET_FRAMES,
 } iw_reboot_t;
 
-/// What is known of a wheel. What is short stands first: a Cortex-M reaches it by shorter instructions.
+/// State of a wheel. Short members come first, because a Cortex-M reaches them by shorter instructions.
 typedef struct {
-    const iw_config_t *config;      ///< The owner's.
-    iw_side_t side;                 ///< Which wheel this is.
-    iw_reboot_t pending_reboot;     ///< Not yet taken.
-    bool boot_seen;                 ///< This run of the wheel began while we were listening, not before.
-    iw_time_us_t first_us;          ///< First heard; IW_NEVER: not yet.
-    iw_time_us_t offset_us;         ///< Last offset frame of this run, or its start.
-    iw_time_us_t any_us;            ///< Last frame of any kind, or the end of our own stall, or the start.
-    iw_time_us_t received_us;       ///< Last speed frame that counted for liveness; IW_NEVER: none yet.
-    iw_time_us_t received_until_us; ///< Without another one it is heard until here; 0: none yet.
-    iw_time_us_t speed_us;          ///< Last speed frame.
-    iw_time_us_t status_us;         ///< Last status frame.
-    iw_time_us_t rest_since_us;     ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
-    iw_time_us_t excused_us;        ///< Our own stall ended here: silence before it is not the wheel's.
-    int64_t ticks;                  ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
-    /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
+    const iw_config_t *config;      ///< Configuration of the owner.
+    iw_side_t side;                 ///< Side of this wheel.
+    iw_reboot_t pending_reboot;     ///< Reboot that `iw_wheel_take_reboot` has not returned yet.
+    bool boot_seen;                 ///< The start of this run of the wheel was observed.
+    iw_time_us_t first_us;          ///< Time of the first frame; IW_NEVER if there is none.
+    iw_time_us_t offset_us;         ///< Time of the last offset message of this run, or of its start.
+    iw_time_us_t any_us;            ///< Time of the last frame, or of the end of a stall, or of the start.
+    iw_time_us_t received_us;       ///< Last speed message with a known reception time; IW_NEVER if there is none.
+    iw_time_us_t received_until_us; ///< Without another speed message the wheel is online until this time; 0 if none.
+    iw_time_us_t speed_us;          ///< Time of the last speed message.
+    iw_time_us_t status_us;         ///< Time of the last status message.
+    iw_time_us_t rest_since_us;     ///< Start of the speed messages at rest without a gap; IW_NEVER if it moves.
+    iw_time_us_t excused_us;        ///< End of the last stall of the gateway: missing frames before it do not count.
+    int64_t ticks; ///< Odometry without wraps since the first status message, in the wheel's direction.
+    /// Distance of one tick in the machine's frame: negative if `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64
+    /// bits.
     int32_t nm_per_tick;
-    uint32_t um_s_per_rpm;    ///< Speed in um/s at 1 rpm of its telemetry.
-    uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
-    uint32_t reboots;         ///< Recognised so far.
-    int32_t speed_mm_s;       ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
-    int32_t odometry_ticks;   ///< Of the last status frame.
+    uint32_t um_s_per_rpm;    ///< Speed in um/s at 1 rpm of telemetry.
+    uint32_t us_per_tick_min; ///< Shortest time of a tick, at IW_WHEEL_FASTEST_MM_S.
+    uint32_t reboots;         ///< Number of reboots that were recognised.
+    int32_t speed_mm_s;       ///< Last speed in the machine's frame, rounded towards zero. Valid only while online.
+    int32_t odometry_ticks;   ///< Odometry of the last status message.
 } iw_wheel_t;
 
-/// `config` must be checked and outlive the wheel.
+/// Initializes `self`. `config` must be checked, and must exist as long as `self`.
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
-/// Takes a message from this wheel: `told` has its values. `fresh` is false in a late step, when the time of reception
-/// is unknown: values are then taken, but the wheel's silence does not end and no run of rest begins.
+/// Receives a message of this wheel; `told` has its values. `fresh` is false in a late step, in which reception times
+/// are unknown. The values are then stored, but the wheel does not become online and no run of rest begins.
 void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
                       bool fresh);
 
-/// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
-/// a fresh speed frame in between it extends nothing.
+/// Reports that a step was late: until `wheel_silent_ms` from now missing frames do not count. Another call without a
+/// fresh speed message in between does not extend that time.
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us);
 
-/// True if its speed was heard less than `wheel_silent_ms` ago.
+/// Returns true if the last speed message is less than `wheel_silent_ms` old.
 static inline bool iw_wheel_online(const iw_wheel_t *self, iw_time_us_t now_us) {
     return now_us < self->received_until_us;
 }
 
-/// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.
+/// Returns true if no speed message has ever arrived, or none for `wheel_silent_ms` without an excuse
+/// (iw_wheel_excuse).
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 
-/// How long it has been heard with |rpm| <= rest_rpm, without a gap, UINT32_MAX at the most; 0: it turns, or is not
-/// heard.
+/// Returns the time for which the wheel has been online with |rpm| <= rest_rpm without a gap, at most UINT32_MAX.
+/// Returns 0 if the wheel turns or is offline.
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
 
-/// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
+/// Returns the observation that showed a reboot since the last call, or IW_REBOOT_NONE.
 static inline iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {
     const iw_reboot_t reboot = self->pending_reboot;
     self->pending_reboot = IW_REBOOT_NONE;

@@ -40,7 +40,7 @@ extern "C" {
 #define IWC_API
 #endif
 
-/// The northbound protocol that this library knows (`api` in docs/northbound.md).
+/// The northbound protocol that this library knows (`api` in docs/user/northbound.md).
 #define IWC_PROTOCOL 1
 /// Longest request, without its newline.
 #define IWC_REQUEST_MAX 4096U

@@ -7,8 +7,7 @@
 
 typedef struct {
     iwn_scan_t scan;
-    uint16_t *name_at;
-    unsigned names;                ///< Of all objects that are open.
+    iwn_work_t *work;
     uint16_t first[IWN_DEPTH_MAX]; ///< The first of them, per object.
     bool is_list[IWN_DEPTH_MAX];
     unsigned depth;
@@ -34,10 +33,11 @@ static int compare_names(const char *one, const char *other) {
 /// Puts the token among the names of its object. False, and that is told, if it is there already.
 static bool add_name(check_t *self) {
     unsigned low = self->first[self->depth - 1U];
-    unsigned high = self->names;
+    iwn_work_t *const work = self->work;
+    unsigned high = work->names;
     while (low < high) {
         const unsigned middle = (low + high) / 2U;
-        const int order = compare_names(self->scan.token + 1, &self->scan.text[self->name_at[middle]]);
+        const int order = compare_names(self->scan.token + 1, &self->scan.text[work->name_at[middle]]);
         if (order == 0) {
             return fail(self, "duplicate object key");
         }
@@ -47,12 +47,12 @@ static bool add_name(check_t *self) {
             high = middle;
         }
     }
-    if (self->names == IWN_NAMES_MAX) {
+    if (work->names == IWN_NAMES_MAX) {
         return fail(self, "too many names");
     }
-    memmove(&self->name_at[low + 1U], &self->name_at[low], (self->names - low) * sizeof self->name_at[0]);
-    self->name_at[low] = (uint16_t)(self->scan.token + 1 - self->scan.text);
-    self->names++;
+    memmove(&work->name_at[low + 1U], &work->name_at[low], (work->names - low) * sizeof work->name_at[0]);
+    work->name_at[low] = (uint16_t)(self->scan.token + 1 - self->scan.text);
+    work->names++;
     return true;
 }
 
@@ -82,9 +82,12 @@ static int closing(const check_t *self) {
     return in_list(self) ? ']' : '}';
 }
 
+/// The names of the root stay, for iwn_json_name.
 static void close_container(check_t *self) {
     self->depth--;
-    self->names = self->first[self->depth];
+    if (self->depth > 0U) {
+        self->work->names = self->first[self->depth];
+    }
 }
 
 /// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which closes it.
@@ -93,7 +96,7 @@ static bool open_container(check_t *self, int *token) {
         return fail(self, "nested too deeply");
     }
     self->is_list[self->depth] = *token == '[';
-    self->first[self->depth] = (uint16_t)self->names;
+    self->first[self->depth] = self->work->names;
     self->depth++;
     *token = iwn_scan(&self->scan);
     if (*token == closing(self)) {
@@ -142,7 +145,8 @@ static bool check_next(check_t *self) {
 
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
     check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault},
-                    .name_at = work->name_at};
+                    .work = work};
+    work->names = 0;
     const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
     if (token != '{' && token != '[') {
         return fail(&self, "'[' or '{' expected");
@@ -215,6 +219,18 @@ iwn_json_t iwn_json_inside(iwn_json_t container) {
     return (iwn_json_t){container.at + 1};
 }
 
+iwn_json_t iwn_json_root(const char *text) {
+    return (iwn_json_t){skip_blanks(text)};
+}
+
+iwn_json_t iwn_json_name(const char *text, const iwn_work_t *work, unsigned index) {
+    return (iwn_json_t){&text[work->name_at[index]] - 1};
+}
+
+iwn_json_t iwn_json_value(iwn_json_t name) {
+    return (iwn_json_t){skip_blanks(skip_blanks(skip_text(name.at)) + 1)};
+}
+
 bool iwn_json_next(iwn_json_t *rest, iwn_json_t *out_name, iwn_json_t *out_value) {
     const char *at = skip_blanks(rest->at);
     if (*at == ',') {
@@ -225,7 +241,7 @@ bool iwn_json_next(iwn_json_t *rest, iwn_json_t *out_name, iwn_json_t *out_value
     }
     if (out_name != NULL) {
         out_name->at = at;
-        at = skip_blanks(skip_blanks(skip_text(at)) + 1);
+        at = iwn_json_value(*out_name).at;
     }
     out_value->at = at;
     rest->at = skip_value(at);
@@ -269,21 +285,29 @@ bool iwn_json_is(iwn_json_t value, const char *text) {
 }
 
 bool iwn_json_text(iwn_json_t value, char *out_text, size_t size) {
-    if (*value.at != '"') {
+    const char *at = value.at;
+    if (*at != '"') {
         return false;
     }
-    const char *at = value.at + 1;
-    size_t used = 0;
-    for (uint32_t code_point = iwn_scan_character(&at); code_point != 0U; code_point = iwn_scan_character(&at)) {
+    at++;
+    while (*at != '"') {
         char bytes[4];
-        const size_t length = iwn_utf8(code_point, bytes);
-        if (used + length >= size) {
+        const char *from = at;
+        size_t length = 1; // What is not escaped is copied byte by byte.
+        if (*at == '\\') {
+            length = iwn_utf8(iwn_scan_character(&at), bytes);
+            from = bytes;
+        } else {
+            at++;
+        }
+        if (length >= size) {
             return false;
         }
-        memcpy(&out_text[used], bytes, length);
-        used += length;
+        memcpy(out_text, from, length);
+        out_text += length;
+        size -= length;
     }
-    out_text[used] = '\0';
+    *out_text = '\0';
     return true;
 }
 

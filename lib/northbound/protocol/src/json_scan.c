@@ -362,8 +362,12 @@ int iwn_scan(iwn_scan_t *self) {
     if (iwn_scan_is_letter(c)) {
         return scan_word(self);
     }
+    if (is_mark(c)) {
+        self->at++;
+        return c;
+    }
     self->at += character_length(self);
-    return is_mark(c) ? c : IWN_TOKEN_INVALID;
+    return IWN_TOKEN_INVALID;
 }
 
 /// What the escape means that begins at the backslash there.

@@ -17,6 +17,14 @@ typedef struct {
     uint16_t max;    ///< Of a text, in bytes.
 } field_t;
 
+/// A line that has been checked, and the names in it that all requests have in common.
+typedef struct {
+    const char *line;
+    const iwn_work_t *work;
+    iwn_json_t id;  ///< NULL: there is none.
+    iwn_json_t cmd; ///< The same.
+} members_t;
+
 #define BIT(cmd) (1U << IWN_CMD_##cmd)
 #define ROW(name, member, kind, bytes, required, allowed)                                                              \
     {#name, allowed, kind, required, offsetof(iwn_request_t, member), bytes},
@@ -227,27 +235,28 @@ static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_re
     return true;
 }
 
-/// What all requests have in common, wherever in the object it stands.
-static bool read_common(iwn_json_t root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    iwn_json_t rest = iwn_json_inside(root);
-    iwn_json_t name;
-    iwn_json_t value;
-    iwn_json_t id = {NULL};
-    iwn_json_t cmd = {NULL};
-    while (iwn_json_next(&rest, &name, &value)) {
-        if (iwn_json_is(name, "id")) {
-            id = value;
-        } else if (iwn_json_is(name, "cmd")) {
-            cmd = value;
+/// The name of a member; `at` is NULL if there is none.
+static iwn_json_t find_name(const members_t *members, const char *text) {
+    for (unsigned i = 0; i < members->work->names; i++) {
+        const iwn_json_t name = iwn_json_name(members->line, members->work, i);
+        if (iwn_json_is(name, text)) {
+            return name;
         }
     }
-    if (id.at != NULL && !read_id(id, &request->id, out_refusal)) {
+    return (iwn_json_t){NULL};
+}
+
+/// What all requests have in common, wherever in the object it stands.
+static bool read_common(members_t *members, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    members->id = find_name(members, "id");
+    members->cmd = find_name(members, "cmd");
+    if (members->id.at != NULL && !read_id(iwn_json_value(members->id), &request->id, out_refusal)) {
         return false;
     }
-    if (cmd.at == NULL) {
+    if (members->cmd.at == NULL) {
         return IWN_REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
     }
-    return read_cmd(cmd, &request->cmd, out_refusal);
+    return read_cmd(iwn_json_value(members->cmd), &request->cmd, out_refusal);
 }
 
 static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
@@ -279,25 +288,29 @@ static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_re
     return false;
 }
 
-/// Every field that is there is known and right. `*out_seen` has a bit for each of them.
-static bool read_fields(iwn_json_t root, iwn_request_t *request, uint32_t *out_seen, iwn_refusal_t *out_refusal) {
-    iwn_json_t rest = iwn_json_inside(root);
-    iwn_json_t name;
-    iwn_json_t value;
-    while (iwn_json_next(&rest, &name, &value)) {
-        if (iwn_json_is(name, "id") || iwn_json_is(name, "cmd")) {
+/// Every field that is there is known and right; otherwise the refusal names the first in the line that is not. `*out_seen` has a bit
+/// for each of them.
+static bool read_fields(const members_t *members, iwn_request_t *request, uint32_t *out_seen,
+                        iwn_refusal_t *out_refusal) {
+    iwn_json_t wrong = {NULL};
+    bool unknown = false;
+    for (unsigned i = 0; i < members->work->names; i++) {
+        const iwn_json_t name = iwn_json_name(members->line, members->work, i);
+        if (name.at == members->id.at || name.at == members->cmd.at || (wrong.at != NULL && name.at > wrong.at)) {
             continue;
         }
         const field_t *const field = find_field(name, request->cmd);
-        if (field == NULL) {
-            return refuse_unknown(request->cmd, name, out_refusal);
+        if (field != NULL && read_field(field, iwn_json_value(name), request, out_refusal)) {
+            *out_seen |= 1U << (field - fields);
+        } else {
+            wrong = name;
+            unknown = field == NULL;
         }
-        if (!read_field(field, value, request, out_refusal)) {
-            return false;
-        }
-        *out_seen |= 1U << (field - fields);
     }
-    return true;
+    if (unknown) {
+        return refuse_unknown(request->cmd, wrong, out_refusal);
+    }
+    return wrong.at == NULL;
 }
 
 /// Every field that must be there is.
@@ -319,15 +332,15 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
 }
 
 /// One object, right in form.
-static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_json_t *out_root,
-                      iwn_refusal_t *out_refusal) {
+static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_refusal_t *out_refusal) {
+    iwn_json_t root;
     char digits[NUMBER_SIZE];
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = IWN_BAD_JSON;
     iwn_text_add(&message, "not one JSON object on one line: ");
-    if (iwn_json_check(line, length, work, out_root, &message)) {
+    if (iwn_json_check(line, length, work, &root, &message)) {
         iwn_text_add(&message, "it is not an object");
-        return iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
+        return iwn_json_kind(root) == IWN_JSON_OBJECT;
     }
     return is_too_deep(line, length)
                ? IWN_REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
@@ -338,13 +351,13 @@ bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_req
                       iwn_refusal_t *out_refusal) {
     const iwn_request_t request = {.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
     char digits[NUMBER_SIZE];
-    iwn_json_t root;
+    members_t members = {.line = line, .work = work};
     uint32_t seen = 0;
     *out_request = request;
     if (length > IWN_LINE_MAX) {
         return IWN_REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
                           " bytes; end each with a newline");
     }
-    return read_line(line, length, work, &root, out_refusal) && read_common(root, out_request, out_refusal) &&
-           read_fields(root, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);
+    return read_line(line, length, work, out_refusal) && read_common(&members, out_request, out_refusal) &&
+           read_fields(&members, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);
 }

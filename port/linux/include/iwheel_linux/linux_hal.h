@@ -1,70 +1,70 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// A bus and an e-stop input, opened and tended together, as one HAL for the core.
+/// HAL of the core on Linux: a bus and an e-stop input, opened and polled together.
 ///
-/// A loss or an edge is reported once: asking a second time would take it from the core.
+/// The HAL reports a loss or an edge once, to the first caller. Only the core may call these functions of the HAL.
 #ifndef IWHEEL_LINUX_HAL_H
 #define IWHEEL_LINUX_HAL_H
 
 #include "iwheel_linux/backend.h"
 
-/// A bus and an e-stop, opened. Its members are the port's own.
+/// An open bus and an open e-stop. Only the port may use the members.
 typedef struct {
-    const iwl_estop_ops_t *estop_ops;     ///< The kind of the e-stop, of both its contacts.
-    bool two_contacts;                    ///< It has a second one.
-    int estop_last;                       ///< The last answer given to the core; -1 before the first.
-    int contact_last[IWL_ESTOP_CONTACTS]; ///< What each contact said then; the second says 0 if there is none.
-    iw_time_us_t now_us;                  ///< Of the last `poll`.
-    iw_estop_pair_t pair;                 ///< What both say together.
-    bool estop_quiet; ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
+    const iwl_estop_ops_t *estop_ops;     ///< Kind of the e-stop, the same for both contacts.
+    bool two_contacts;                    ///< The e-stop has a second contact.
+    int estop_last;                       ///< Last result for the core; -1 before the first.
+    int contact_last[IWL_ESTOP_CONTACTS]; ///< Last reading of each contact; 0 for a second contact that does not exist.
+    iw_time_us_t now_us;                  ///< Time of the last `poll`.
+    iw_estop_pair_t pair;                 ///< Combination of both contacts.
+    bool estop_quiet; ///< The last wait found no edge at the descriptor of the e-stop, and it has not been read since.
     iwl_backend_store_t bus;    ///< State of the bus.
     iwl_backend_store_t estop;  ///< State of the e-stop.
-    iwl_backend_store_t estop2; ///< Of its second contact.
+    iwl_backend_store_t estop2; ///< State of its second contact.
 } iwl_hal_t;
 
-/// Opens both, by their names in the configuration. 0 or an errno; `*out_cause` is then the name at fault. ENOTSUP:
-/// this build has no backend for it; EXDEV: one contact of the e-stop is simulated and the other is not; ENOTUNIQ: both
-/// are the same line, under whatever names. Nothing stays open on failure. The names must outlive the HAL.
+/// Opens the bus and the e-stop by their configured names, which must exist as long as the HAL. Returns 0 or an errno;
+/// then nothing is open and `*out_cause` is the name at fault. ENOTSUP: this build has no backend for it. EXDEV: one
+/// contact of the e-stop is simulated and the other is not. ENOTUNIQ: both contacts are the same line.
 int iwl_hal_open(iwl_hal_t *self, const char *bus_name, const iwl_estop_config_t *estop, const char **out_cause);
-/// Closes both.
+/// Closes the bus and the e-stop.
 void iwl_hal_close(iwl_hal_t *self);
 
-/// The table of functions for the core. It is valid, as `self` is, until the HAL is closed; `self` must not move.
+/// Returns the functions for the core. They are valid until the HAL is closed. `self` must not move.
 iw_hal_t iwl_hal(iwl_hal_t *self);
 
-/// As `estop_pressed` of iw_hal_t.
+/// Implements `estop_pressed` of iw_hal_t.
 int iwl_hal_pressed(iwl_hal_t *self);
 
-/// Descriptor of the bus to watch for reading.
+/// Returns the descriptor of the bus to watch for reading.
 int iwl_hal_bus_fd(const iwl_hal_t *self);
-/// The same of the e-stop; -1: there is nothing to watch.
+/// Returns the descriptor of the e-stop to watch for reading; -1 if there is none.
 int iwl_hal_estop_fd(const iwl_hal_t *self);
-/// The same of its second contact.
+/// Returns the descriptor of the second contact; -1 if there is none.
 int iwl_hal_estop2_fd(const iwl_hal_t *self);
 
-/// What a wait for both descriptors has found readable.
+/// Descriptors that a wait found readable.
 typedef struct {
-    bool bus;   ///< That of the bus.
-    bool estop; ///< That of the e-stop.
+    bool bus;   ///< The descriptor of the bus.
+    bool estop; ///< The descriptor of the e-stop.
 } iwl_reported_t;
 
-/// May be called right after such a wait, which saves reading of what has nothing to tell: edges of the e-stop in the
-/// next look, news of other interfaces until the next wait.
+/// Reports the result of a wait for both descriptors. Calling it directly after the wait saves system calls: the next
+/// reading of the e-stop reads no edges, and the bus reads no interface events until the next wait.
 void iwl_hal_waited(iwl_hal_t *self, iwl_reported_t told);
 
-/// Call before every step.
+/// Polls bus and e-stop. Call it before every step.
 void iwl_hal_poll(iwl_hal_t *self, iw_time_us_t now_us);
 
-/// When `poll` has something to do; IW_NEVER if it has not.
+/// Returns the time at which `poll` must be called; IW_NEVER if it need not.
 iw_time_us_t iwl_hal_next_us(const iwl_hal_t *self);
 
-/// What is known of the link to the bus; valid until the HAL is closed.
+/// Returns the state of the link. It is valid until the HAL is closed.
 const iwl_bus_link_t *iwl_hal_link(const iwl_hal_t *self);
 
-/// What the kernel calls the line of a contact, 0 or 1. False if it cannot be read now, or has no such name.
+/// Reads the identity of the line of a contact (0 or 1). Returns false if it cannot be read now, or has none.
 bool iwl_hal_estop_seen(const iwl_hal_t *self, unsigned contact, iwl_estop_seen_t *out_seen);
 
-/// Why a contact of the e-stop cannot be read, as an errno; 0 while it can.
+/// Returns the errno of the reason why a contact cannot be read; 0 while it can.
 int iwl_hal_estop_trouble(const iwl_hal_t *self, unsigned contact);
 
 #endif

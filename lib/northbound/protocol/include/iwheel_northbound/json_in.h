@@ -2,8 +2,9 @@
 /// @file
 /// Reads JSON where it lies: nothing is copied, nothing is allocated, and what is not JSON to the letter (RFC 8259) is refused.
 ///
-///     iwn_json_check     once, judges every byte of the text
-///     iwn_json_...       then walk what has been checked, and only that
+///     iwn_json_check     once, judges every byte of the text and finds the members of the root
+///     iwn_json_name      then reads the members of the root where the check found them
+///     iwn_json_...       or walks what has been checked, and only that
 ///
 /// Refused are, beside wrong syntax: bytes that are no UTF-8, NUL in any spelling, single surrogates, control characters in
 /// texts, a name twice in one object however it is spelt, integers beyond 64 bits, other numbers beyond what a double holds,
@@ -25,10 +26,11 @@
 /// line of 4096 bytes holds more.
 #define IWN_NAMES_MAX 832U
 
-/// Where the names of the open objects begin, sorted within each object. Its owner need not set anything; it is used within one
-/// call only, so that one for all of a program will do.
+/// The names of the open objects, sorted within each object; after a check that returned true, those of the root. Its owner need not
+/// set anything. The next check overwrites it, so one for all of a program will do.
 typedef struct {
-    uint16_t name_at[IWN_NAMES_MAX]; ///< Offsets in the text.
+    uint16_t name_at[IWN_NAMES_MAX]; ///< Offsets in the text, behind the first quote.
+    uint16_t names;                  ///< How many of these are in use.
 } iwn_work_t;
 
 /// What a value is.
@@ -51,6 +53,16 @@ typedef struct {
 /// True: the text, of at most IWN_JSON_MAX bytes, is one object or list, and `*out_root` is that. False: the reason is added to
 /// `fault`, in printable ASCII.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
+
+/// The object or list of a text that has been checked.
+iwn_json_t iwn_json_root(const char *text);
+
+/// The name of a member of the root, in the order of the names. `text` and `work` are those of the check; `index` is below
+/// `work->names`.
+iwn_json_t iwn_json_name(const char *text, const iwn_work_t *work, unsigned index);
+
+/// The value that belongs to a name.
+iwn_json_t iwn_json_value(iwn_json_t name);
 
 /// What it is, by its first bytes.
 iwn_json_kind_t iwn_json_kind(iwn_json_t value);

@@ -4,6 +4,9 @@
 ///
 /// A pure function of the bytes, so that it can be tested and fuzzed alone: no heap, no stdio. What depends on the state of the
 /// wheels is judged later, by the core. Which fields a request has is told by share/northbound.json.
+///
+/// The line is read once: one pass checks every byte and stores where each name begins; then each value is read where it is. The pass
+/// cannot read the values itself, because `cmd`, which decides what they mean, may come last, and a fault of the whole line comes first.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_H
 #define IWHEEL_NORTHBOUND_REQUEST_H
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /// @file
 /// The words of the northbound protocol for errors, causes, states and the rest. Each list is closed and documented in
-/// docs/northbound.md; a value outside its list is "unknown".
+/// docs/user/northbound.md; a value outside its list is "unknown".
 #ifndef IWHEEL_NORTHBOUND_WORDS_H
 #define IWHEEL_NORTHBOUND_WORDS_H
 
 #include "iwheel/gateway.h"
 
-/// Errors of the protocol, in the words of docs/northbound.md.
+/// Errors of the protocol, in the words of docs/user/northbound.md.
 typedef enum {
     IWN_OK = 0,
     IWN_BAD_JSON,

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#include "lan.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <gnutls/crypto.h>
+#include <gnutls/x509.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sysexits.h>
+#include <time.h>
+#include <unistd.h>
+
+/// Phones refuse a server's certificate that is valid for more than 825 days.
+#define DAYS_VALID 820
+#define DAY_S      86400
+#define NAME_SIZE  65U
+
+static int complain(const char *what, const char *why) {
+    (void)fprintf(stderr, "iwheel-web: %s: %s; let token_file name a folder in which the bridge may write\n", what,
+                  why);
+    return EX_CANTCREAT;
+}
+
+bool web_lan_address(char out[INET_ADDRSTRLEN]) {
+    // An address for documentation: nothing is sent to it, the kernel only selects the interface.
+    struct sockaddr_in there = {.sin_family = AF_INET, .sin_port = htons(9)};
+    struct sockaddr_in here = {.sin_family = AF_INET};
+    socklen_t size = sizeof here;
+    (void)inet_pton(AF_INET, "192.0.2.1", &there.sin_addr);
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const bool good = fd >= 0 && connect(fd, (const struct sockaddr *)&there, sizeof there) == 0 &&
+                      getsockname(fd, (struct sockaddr *)&here, &size) == 0 &&
+                      inet_ntop(AF_INET, &here.sin_addr, out, INET_ADDRSTRLEN) != NULL;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return good;
+}
+
+static void host_name(char out[NAME_SIZE]) {
+    if (gethostname(out, NAME_SIZE - 1U) != 0 || out[0] == '\0') {
+        (void)snprintf(out, NAME_SIZE, "iwheel");
+    }
+    out[NAME_SIZE - 1U] = '\0';
+}
+
+/// Next to its place first, then moved: no program reads half of it. Only its owner may read it.
+static bool write_file(const char *path, const gnutls_datum_t *data) {
+    char beside[128];
+    (void)snprintf(beside, sizeof beside, "%s.new", path);
+    (void)unlink(beside);
+    const int file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+    const bool written = file >= 0 && write(file, data->data, data->size) == (ssize_t)data->size;
+    if (file >= 0) {
+        (void)close(file);
+    }
+    return written && rename(beside, path) == 0;
+}
+
+/// Names and addresses by which a browser may call this machine.
+static int name_subject(gnutls_x509_crt_t certificate) {
+    char name[NAME_SIZE];
+    char local[NAME_SIZE + 6U];
+    char text[INET_ADDRSTRLEN];
+    struct in_addr address;
+    const unsigned flags = GNUTLS_FSAN_APPEND;
+    host_name(name);
+    (void)snprintf(local, sizeof local, "%s.local", name);
+    int error =
+        gnutls_x509_crt_set_dn_by_oid(certificate, GNUTLS_OID_X520_COMMON_NAME, 0, name, (unsigned)strlen(name));
+    const char *const names[] = {name, local, "localhost"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0] && error == 0; i++) {
+        error = gnutls_x509_crt_set_subject_alt_name(certificate, GNUTLS_SAN_DNSNAME, names[i],
+                                                     (unsigned)strlen(names[i]), flags);
+    }
+    if (error == 0 && web_lan_address(text) && inet_pton(AF_INET, text, &address) == 1) {
+        error =
+            gnutls_x509_crt_set_subject_alt_name(certificate, GNUTLS_SAN_IPADDRESS, &address, sizeof address, flags);
+    }
+    return error;
+}
+
+static int fill(gnutls_x509_crt_t certificate, gnutls_x509_privkey_t key) {
+    unsigned char serial[16];
+    const time_t now = time(NULL);
+    int error = gnutls_rnd(GNUTLS_RND_NONCE, serial, sizeof serial);
+    serial[0] = (unsigned char)((serial[0] & 0x7FU) | 0x40U); // Positive, and no leading zero.
+    error = (error == 0) ? gnutls_x509_crt_set_version(certificate, 3) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_serial(certificate, serial, sizeof serial) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_activation_time(certificate, now - DAY_S) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_expiration_time(certificate, now + (time_t)DAYS_VALID * DAY_S) : error;
+    error = (error == 0) ? name_subject(certificate) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_basic_constraints(certificate, 0, -1) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_key_usage(certificate, GNUTLS_KEY_DIGITAL_SIGNATURE) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_key_purpose_oid(certificate, GNUTLS_KP_TLS_WWW_SERVER, 0) : error;
+    error = (error == 0) ? gnutls_x509_crt_set_key(certificate, key) : error;
+    return (error == 0) ? gnutls_x509_crt_sign2(certificate, certificate, key, GNUTLS_DIG_SHA256, 0) : error;
+}
+
+static int write_pair(const web_settings_t *settings, gnutls_x509_crt_t certificate, gnutls_x509_privkey_t key) {
+    gnutls_datum_t key_text = {NULL, 0};
+    gnutls_datum_t text = {NULL, 0};
+    int error = gnutls_x509_privkey_generate2(key, GNUTLS_PK_ECDSA,
+                                              (unsigned)GNUTLS_CURVE_TO_BITS(GNUTLS_ECC_CURVE_SECP256R1), 0, NULL, 0);
+    error = (error == 0) ? fill(certificate, key) : error;
+    error = (error == 0) ? gnutls_x509_privkey_export2(key, GNUTLS_X509_FMT_PEM, &key_text) : error;
+    error = (error == 0) ? gnutls_x509_crt_export2(certificate, GNUTLS_X509_FMT_PEM, &text) : error;
+    int code = (error == 0) ? 0 : complain("the certificate cannot be made", gnutls_strerror(error));
+    if (code == 0 && (!write_file(settings->web.key, &key_text) || !write_file(settings->web.certificate, &text))) {
+        code = complain(settings->web.certificate, strerror(errno));
+    }
+    gnutls_memset(key_text.data, 0, key_text.size);
+    gnutls_free(key_text.data);
+    gnutls_free(text.data);
+    return code;
+}
+
+static int make_pair(const web_settings_t *settings) {
+    gnutls_x509_crt_t certificate = NULL;
+    gnutls_x509_privkey_t key = NULL;
+    int code = EX_OSERR;
+    if (gnutls_x509_crt_init(&certificate) == 0 && gnutls_x509_privkey_init(&key) == 0) {
+        code = write_pair(settings, certificate, key);
+    }
+    gnutls_x509_privkey_deinit(key);
+    gnutls_x509_crt_deinit(certificate);
+    return code;
+}
+
+/// True if there is a certificate that is not over yet. The bridge judges itself whether the key fits.
+static bool is_good(const web_settings_t *settings) {
+    gnutls_datum_t text = {NULL, 0};
+    gnutls_x509_crt_t certificate = NULL;
+    bool good = access(settings->web.key, R_OK) == 0 && gnutls_load_file(settings->web.certificate, &text) == 0 &&
+                gnutls_x509_crt_init(&certificate) == 0 &&
+                gnutls_x509_crt_import(certificate, &text, GNUTLS_X509_FMT_PEM) == 0 &&
+                gnutls_x509_crt_get_expiration_time(certificate) > time(NULL) + DAY_S;
+    if (certificate != NULL) {
+        gnutls_x509_crt_deinit(certificate);
+    }
+    gnutls_free(text.data);
+    return good;
+}
+
+/// `names` of the configuration stay; the machine's own is one more.
+static void add_host(web_settings_t *settings) {
+    char name[NAME_SIZE];
+    char all[sizeof settings->web.hosts + 2U * NAME_SIZE + 16U];
+    host_name(name);
+    (void)snprintf(all, sizeof all, "%s %s %s.local", web_settings_hosts(settings), name, name);
+    if (strlen(all) < sizeof settings->web.hosts) {
+        memcpy(settings->web.hosts, all, strlen(all) + 1U);
+    }
+}
+
+int web_lan_prepare(web_settings_t *settings) {
+    (void)snprintf(settings->web.listen, sizeof settings->web.listen, "0.0.0.0");
+    add_host(settings);
+    if (web_settings_has_tls(settings)) {
+        return 0;
+    }
+    const char *end = strrchr(settings->web.token_file, '/');
+    const int length = (end != NULL) ? (int)(end - settings->web.token_file) + 1 : 0;
+    const int one = snprintf(settings->web.certificate, sizeof settings->web.certificate, "%.*slan-certificate.pem",
+                             length, settings->web.token_file);
+    const int other =
+        snprintf(settings->web.key, sizeof settings->web.key, "%.*slan-key.pem", length, settings->web.token_file);
+    if (one >= (int)sizeof settings->web.certificate || other >= (int)sizeof settings->web.key) {
+        return complain(settings->web.token_file, "its folder's name is too long");
+    }
+    return is_good(settings) ? 0 : make_pair(settings);
+}

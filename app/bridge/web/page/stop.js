@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+"use strict";
+// STOP, the control that latches, reset, and the question before what cannot be taken back.
+
+const STOP_TRY_MS = 400;
+
+// Asks once, in words, before something that cannot be taken back.
+// Not modal: a modal dialog would make STOP inert. STOP answers it with no.
+function confirmed(text, yes) {
+  const dialog = $("ask"), before = document.activeElement;
+  dialog.onclose?.(); // Another question takes its place.
+  $("ask-says").textContent = text;
+  $("ask-yes").textContent = yes;
+  if (!dialog.open) dialog.show();
+  $("ask-no").focus();
+  return new Promise((done) => {
+    $("ask-yes").onclick = () => { done(true); dialog.close(); };
+    $("ask-no").onclick = () => dialog.close();
+    dialog.onclose = () => { done(false); dialog.onclose = null; before?.focus(); };
+  });
+}
+
+// Repeated until the gateway answers. Says loudly, and goes on saying, that it did not. The second control takes the place of a stop that is
+// not delivered yet, never the other way round.
+async function deliver(name) {
+  deliver.verb = deliver.busy && deliver.verb === "estop" ? "estop" : name;
+  if (deliver.busy) return;
+  deliver.busy = true;
+  let times = 0, why = "";
+  tell(STRINGS.stopping_now);
+  for (;;) {
+    times++;
+    const asked = deliver.verb;
+    try {
+      const options = { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true };
+      const answer = await (asked === "stop" ? askStop(options) : ask("POST", "/api/estop", options));
+      const body = await answer.json();
+      if (answer.ok) {
+        tell(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
+        page.delivered = { state: body.state, seen: false, ms: performance.now() };
+        if (asked === deliver.verb) break;
+        continue;
+      }
+      why = body.message;
+      if (answer.status === 401) { notDelivered(why, times); break; }
+    } catch {
+      why = STRINGS.no_answer;
+    }
+    notDelivered(why.replace(`${STRINGS.not_delivered}: `, ""), times);
+    page.stream?.abort(); // It may hold the last connection that the browser allows.
+    await new Promise((done) => setTimeout(done, STOP_TRY_MS / 2));
+  }
+  deliver.busy = false;
+}
+
+// What was said of a stop goes with the next state.
+function forgetDelivered(state) {
+  const said = page.delivered;
+  if (!said) return;
+  if (state.state === said.state) said.seen = true;
+  else if (said.seen || performance.now() - said.ms > 1000) tell("");
+}
+
+function tell(words, tone = "") {
+  page.delivered = null;
+  $("delivered").className = tone;
+  $("delivered").textContent = words;
+}
+
+// The page is not zoomed by touch (page.css), but some browsers zoom every page: the bar then goes along, at its size, measured from its lower edge.
+function keepStopInSight() {
+  const seen = visualViewport, bar = $("bar"), factor = 1 / seen.scale;
+  bar.style.transform = "";
+  if (factor > 0.99) return;
+  const place = bar.getBoundingClientRect();
+  const x = seen.offsetLeft + place.left * factor, y = seen.offsetTop + seen.height - (innerHeight - place.top) * factor;
+  bar.style.transform = `translate(${x - place.left}px, ${y - place.top}px) scale(${factor})`;
+}
+
+// What is below or beside the bar can be scrolled out of it.
+function makeRoomForStop() {
+  const bar = $("bar"), column = bar.offsetWidth < innerWidth;
+  document.documentElement.style.setProperty("--bar-b", column ? "0px" : `${bar.offsetHeight}px`);
+  document.documentElement.style.setProperty("--bar-r", column ? `${bar.offsetWidth}px` : "0px");
+  keepStopInSight();
+}
+
+function setUpStop() {
+  const press = () => { letGo("why_let_go"); deliver("stop"); $("ask").close(); };
+  $("stop").addEventListener("pointerdown", press); // When it is touched, not when the finger leaves it.
+  $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // By Enter, or by a screen reader.
+  $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
+  $("reset").addEventListener("click", async () => {
+    const stop = page.stop; // The one that the person sees: a later one is not cleared.
+    if (await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes)) reset(stop);
+  });
+  document.addEventListener("keydown", (event) => {
+    const typing = event.target.matches("input, select") && event.target.type !== "range";
+    if (event.key.toLowerCase() === "s" && !typing && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) press();
+    if (event.key === "Escape") $("ask").close();
+  });
+  visualViewport.addEventListener("resize", keepStopInSight);
+  visualViewport.addEventListener("scroll", keepStopInSight);
+  new ResizeObserver(makeRoomForStop).observe($("bar"));
+  addEventListener("resize", makeRoomForStop);
+}
+
+async function reset(stop) {
+  try {
+    const query = new URLSearchParams({ boot: await bootOf(), t_us: page.t_us, stop });
+    const body = await (await ask("POST", `/api/reset?${query}`, { signal: AbortSignal.timeout(ASK_MS) })).json();
+    tell(body.ok ? "" : fill(STRINGS.refused, { why: body.message }));
+  } catch {
+    tell(fill(STRINGS.refused, { why: STRINGS.no_answer }));
+  }
+}
+
+function notDelivered(why, times) {
+  tell(STRINGS.not_delivered, "bad");
+  $("delivered").append(element("small", { text: fill(STRINGS.not_delivered_why, { why, times }) }));
+}

@@ -1,0 +1,795 @@
+# SPDX-License-Identifier: MIT
+"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass. -k GATE: one gate's cases."""
+
+import argparse
+import collections
+import contextlib
+import hashlib
+import importlib.machinery
+import importlib.util
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
+ROOT = Path(__file__).resolve().parent.parent.parent
+SCRIPTS = ROOT / "scripts"
+os.environ["PATH"] = f"{ROOT}/.venv/bin:{os.environ['PATH']}"
+ARM = [
+    "arm-none-eabi-gcc",
+    "-mcpu=cortex-m4",
+    "-mthumb",
+    "-mfloat-abi=soft",
+    "-Os",
+    "-std=c99",
+    "-ffreestanding",
+    "-ffunction-sections",
+    "-fstack-usage",
+    "-fcallgraph-info=su",
+]
+CLEAN = "// SPDX-License-Identifier: MIT\nint iw_f(int a);\nint iw_f(int a)\n{\n    return a + 1;\n}\n"
+
+
+def run(*command, cwd=None):
+    """(status, everything it said)"""
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def arm_library(folder, code):
+    """Compiles code as the core would be, into the folder's own little build tree; returns the library."""
+    objects = folder / "iwheel_core.dir"
+    objects.mkdir()
+    (folder / "core").mkdir()
+    source = folder / "core" / "planted.c"
+    source.write_text(code)
+    status, said = run(*ARM, "-c", source, "-o", objects / "planted.c.o")
+    if status != 0:
+        raise RuntimeError(said)
+    run("arm-none-eabi-ar", "rcs", folder / "libiwheel_core.a", objects / "planted.c.o")
+    return folder / "libiwheel_core.a"
+
+
+def purity(folder, code):
+    return run(SCRIPTS / "purity.py", arm_library(folder, code), folder / "core")
+
+
+def stack(folder, code):
+    arm_library(folder, code)
+    return run(SCRIPTS / "stack_usage.py", folder, 256)
+
+
+def frames(folder, code):
+    (folder / "planted.c").write_text(code)
+    entry = {"directory": str(folder), "file": str(folder / "planted.c"), "command": "gcc -O2 -c planted.c -o planted.o"}
+    (folder / "compile_commands.json").write_text(json.dumps([entry]))
+    return run(SCRIPTS / "stack_usage.py", "--frames", folder, 4096, folder)
+
+
+def coverage(folder, calls):
+    """A function with two branches and a main that makes the calls given."""
+    sources, objects = folder / "core" / "src", folder / "iwheel_core.dir"
+    sources.mkdir(parents=True)
+    objects.mkdir()
+    (sources / "planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
+    (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
+    if calls is not None:
+        run("gcc", "-O0", "--coverage", "-c", sources / "planted.c", "-o", objects / "planted.o")
+        run("gcc", folder / "main.c", objects / "planted.o", "--coverage", "-o", folder / "main", cwd=folder)
+        run(folder / "main")
+    shutil.copy(ROOT / "gcovr.cfg", folder)
+    return run("gcovr", objects, cwd=folder)
+
+
+def warnings(folder, code, compiler="gcc"):
+    text = (ROOT / "cmake/iwheel_warnings.cmake").read_text()
+    flags = " ".join(re.findall(r"target_compile_options\(iwheel_warnings INTERFACE\s+([^)]*)\)", text)).split()
+    (folder / "planted.c").write_text(code)
+    return run(compiler, "-std=c99", *flags, "-c", folder / "planted.c", "-o", folder / "planted.o")
+
+
+def analyzer(folder, code):
+    """With what the preset adds."""
+    presets = json.loads((ROOT / "CMakePresets.json").read_text())["configurePresets"]
+    flags = next(preset["environment"]["CFLAGS"] for preset in presets if preset["name"] == "analyzer")
+    (folder / "planted.c").write_text(code)
+    return run("gcc", "-std=c99", "-O2", *flags.split(), "-Werror", "-c", folder / "planted.c", "-o", folder / "planted.o")
+
+
+def tidy(folder, code, part="app"):
+    """A file of a program, by all that .clang-tidy says there."""
+    for name in (".clang-tidy", "core/.clang-tidy", "lib/northbound/.clang-tidy"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    source = folder / part / "planted.c"
+    source.parent.mkdir(exist_ok=True)
+    source.write_text(code)
+    (folder / "compile_commands.json").write_text(json.dumps([{"directory": str(folder), "file": str(source), "command": f"clang -std=c99 -c {source}"}]))
+    return run("run-clang-tidy", "-quiet", "-p", folder, cwd=folder)
+
+
+def tidy_core(folder, code):
+    return tidy(folder, code, "core/src")
+
+
+def tidy_northbound(folder, code):
+    return tidy(folder, code, "lib/northbound")
+
+
+def cppcheck(folder, code, suppressions=""):
+    """As the core."""
+    if "2.10" not in run("cppcheck", "--version")[1]:
+        return 77, "skip: the suppressions are written for cppcheck 2.10"
+    for part in ("core/src", "core/include"):
+        (folder / part).mkdir(parents=True)
+    (folder / "core/src/planted.c").write_text(code)
+    (folder / ".cppcheck-suppressions").write_text(suppressions)
+    return run("xargs", "-a", ROOT / ".cppcheck", "cppcheck", "core/src/planted.c", cwd=folder)
+
+
+def cppcheck_accepts(folder, what, begin="&a"):
+    """Memory is copied, whose value the addon takes as discarded (17.7)."""
+    text = CLEAN.replace("    return", f"    int b;\n    memcpy(&b, {begin}, sizeof b);\n    return")
+    return cppcheck(folder, "#include <string.h>\n" + text, f"misra-c2012-17.7:core/*\nmissingIncludeSystem\n{what}")
+
+
+def cppcheck_behind(folder, begin):
+    """Of a line the addon tells one finding: accepted, it must not hide the next."""
+    return cppcheck_accepts(folder, "", begin)
+
+
+def deviations(folder, fault):
+    """A tree whose page is true, and one change of it: file, what stands there, what stands there then."""
+    for name, text in DEVIATING.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text.replace(*fault[1:]) if name == fault[0] else text)
+    return run(SCRIPTS / "deviations.py", folder)
+
+
+def northbound(folder, fault):
+    """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
+    library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
+    sources = [
+        *(f"lib/northbound/protocol/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)),
+        "lib/northbound/server/src/observe.c",
+        *(f"app/gateway/{name}.c" for name in ("answers/answers_events", "bus/bus_facts", "assumptions/assumptions_json")),
+    ]
+    for name in (
+        "scripts/northbound.py",
+        "test/northbound/described.py",
+        "test/northbound/test_description.py",
+        "share/northbound.json",
+        "docs/user/northbound.md",
+        "python/src/iwheel/_protocol.py",
+        *sources,
+    ):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        text = (ROOT / name).read_text()
+        if name == fault[0]:
+            assert fault[1] in text, f"{name} no longer has {fault[1]}"
+            text = text.replace(fault[1], fault[2], 1)
+        (folder / name).write_text(text)
+    written, said = run(sys.executable, folder / "scripts/northbound.py", "--check")
+    told, more = run(sys.executable, folder / "test/northbound/test_description.py")
+    # A failure comes with a traceback as well; only an error is a broken gate.
+    return written + told, said + (more if "errors=" in more else more.replace("Traceback", "at"))
+
+
+def eva(folder, code):
+    (folder / "planted.c").write_text("#include <__fc_builtin.h>\n" + code)
+    return run(ROOT / "test/eva/run", "--work", folder / "work", "--program", folder / "planted.c")
+
+
+def eva_core(folder, fault):
+    """A fault in the core itself: that the events of test/eva/main.c reach it, and that it is an alarm."""
+    status, said = run(ROOT / "test/eva/run", "--work", folder / "work", "--fault", fault)
+    return (status if status == 77 else int("failed: no alarm" in said)), said
+
+
+def mcdc(folder, calls):
+    """A function with a decision of two conditions and a main that makes the calls given."""
+    (folder / "core").mkdir()
+    (folder / "build/mcdc/profiles").mkdir(parents=True)
+    (folder / "core/planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
+    (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
+    run(
+        "clang-19",
+        "-fprofile-instr-generate",
+        "-fcoverage-mapping",
+        "-fcoverage-mcdc",
+        folder / "main.c",
+        folder / "core/planted.c",
+        "-o",
+        folder / "build/mcdc/unit_planted",
+    )
+    run("env", f"LLVM_PROFILE_FILE={folder}/build/mcdc/profiles/a.profraw", folder / "build/mcdc/unit_planted")
+    inner, outer = re.findall(r'^set\(conditions "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)
+    command = outer.replace("${conditions}", inner).replace("\\$", "$").replace('\\"', '"')
+    return run("sh", "-c", command, cwd=folder)
+
+
+def ruff(folder, code):
+    """A script with that body."""
+    (folder / "planted").write_text(f'#!/usr/bin/env python3\n"""Planted."""\n{code}')
+    return run("ruff", "check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
+
+
+def ruff_format(folder, code):
+    """A script with that body."""
+    (folder / "planted").write_text(f'#!/usr/bin/env python3\n"""Planted."""\n{code}')
+    return run("ruff", "format", "--check", "--no-cache", "--config", ROOT / "ruff.toml", folder / "planted")
+
+
+def shellcheck(folder, code):
+    (folder / "planted").write_text(f"#!/usr/bin/env bash\n{code}")
+    return run("shellcheck", "-x", folder / "planted")
+
+
+def codespell(folder, text):
+    shutil.copy(ROOT / ".codespellrc", folder)
+    (folder / "page.md").write_text(text)
+    return run("codespell", cwd=folder)
+
+
+def style(folder, code):
+    for part in ("core/src", "core/include", "lib/northbound/protocol/src", "lib/northbound/protocol/include", "port", "app", "test"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    (folder / "core/src/planted.c").write_text(code)
+    for part in ("core/src", "port"):
+        (folder / part / "commented.c").write_text(CLEAN + ("// A reason.\n" + "int iw_x;\n" * 7) * 12)
+    for part in ("lib/northbound/protocol/src", "app"):
+        (folder / part / "clean.c").write_text(CLEAN)
+    return run(sys.executable, SCRIPTS / "style.py", folder)
+
+
+def style_header(folder, guard):
+    (folder / "app").mkdir()
+    (folder / "app/planted.h").write_text(f"// SPDX-License-Identifier: MIT\n#ifndef IW_{guard}\n#define IW_{guard}\n#endif\n")
+    return style(folder, CLEAN)
+
+
+def put(folder, fault):
+    """One change in that copy of the tree: file, what stands there, what stands there then."""
+    file, old, new = fault
+    text = (folder / file).read_text()
+    assert old in text, f"{file} no longer has {old}"
+    (folder / file).write_text(text.replace(old, new, 1))
+
+
+def house(folder, fault):
+    """The tree with one change. Of the programs only the one changed is compiled anew."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    put(folder, fault)
+    flags = [f"-I{folder / part}" for part in ("core/include", "port/stm32_stub", "port/stm32_stub/access", "port/stm32_stub/boards/stm32f103")]
+    lamp = str(folder / "port/stm32_stub/lamp.c")
+    (folder / "build/default").mkdir(parents=True)
+    (folder / "build/default/compile_commands.json").write_text(
+        json.dumps([{"file": lamp, "directory": str(folder), "command": f"gcc -std=c99 {' '.join(flags)} -o a.o -c {lamp}"}])
+    )
+    return run(SCRIPTS / "house.py", "facts", folder)
+
+
+def arch(folder, fault):
+    """The tree with one change, which is compared with the table of who may include whom."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    put(folder, fault)
+    return run(SCRIPTS / "house.py", "layers", folder)
+
+
+def arch_of_names(folder, more):
+    """The same with one file more."""
+    for part in ("core", "port", "lib", "app", "docs"):
+        shutil.copytree(ROOT / part, folder / part)
+    (folder / more).write_text("// SPDX-License-Identifier: MIT\n")
+    return run(SCRIPTS / "house.py", "layers", folder)
+
+
+def faults(folder, fault):
+    """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
+    for part in ("core", "port", "lib", "app", "python", "test/faults"):
+        shutil.copytree(ROOT / part, folder / part)
+    for part in ("target", "fuzz", "support"):
+        (folder / "test" / part).symlink_to(ROOT / "test" / part)
+    put(folder, fault[:3])
+    if len(fault) > 3:
+        (folder / fault[0]).rename(folder / fault[3])
+    return run(sys.executable, folder / "test/faults/run", "--check", "--build", ROOT / "build/default")
+
+
+def api(folder, fault):
+    """The reference of small copies of the headers' folders, of which one is `fault`."""
+    for name in ("core", "lib/northbound/protocol", "lib/client", "port/linux"):
+        (folder / name / "include").mkdir(parents=True)
+    (folder / "docs/developer").mkdir(parents=True)
+    shutil.copy(ROOT / "docs/developer/Doxyfile", folder / "docs/developer")
+    (folder / "core/include/planted.h").write_text(fault)
+    command = re.search(r'^test\(idle api .* sh -c "(.*)"\)$', (ROOT / "test/all/steps.cmake").read_text(), re.M)[1]
+    return run("sh", "-c", command.replace("\\$", "$"), cwd=folder)
+
+
+def pages(folder, fault):
+    """A page with one list, and indexes, about a small tree; the fault is (file, old, new), or a file more."""
+    tree = {
+        "app/a.c": "int follow_ms;\n",
+        "app/b.c": "int other;\n",
+        "test/README.md": "| `run` | x |\n",
+        "test/run": "x\n",
+        "scripts/README.md": "| `one.py` | x |\n",
+        "scripts/one.py": "x\n",
+        "docs/README.md": "| `developer/how-to-add.md` | x |\n",
+        "docs/developer/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n",
+    }
+    name, old, new = fault
+    tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
+    for name, text in tree.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return run(SCRIPTS / "house.py", "pages", folder)
+
+
+def man(folder, fault):
+    """The manual pages of the build, one of them with one change: (page, old, new)."""
+    build = ROOT / "build/default"
+    if not (build / "man/iwheelctl.1.scd").exists():
+        return 77, "build/default has no manual pages"
+    shutil.copytree(build / "man", folder / "man")
+    (folder / "app").symlink_to(build / "app")
+    page, old, new = fault
+    text = (folder / "man" / page).read_text()
+    if old not in text:
+        return 0, f"{old} is not in {page}"
+    (folder / "man" / page).write_text(text.replace(old, new))
+    status, said = run(sys.executable, ROOT / "test/man/test_pages.py", folder, "-k", "has_its_help", "-k", "has_the_help", "-k", "running_one")
+    # A failure comes with a traceback as well; only an error is a broken gate.
+    return status, said if "errors=" in said else said.replace("Traceback", "at")
+
+
+def python_pins(folder, fault):
+    """The pinned PyPI packages with one change: file, what stands there, what stands there then; and a program beside them."""
+    shutil.copytree(ROOT / "requirements", folder / "requirements")
+    (folder / "tool").write_text('#!/bin/sh\n"$venv/bin/pip" install --require-hashes -r x\n')
+    (folder / "tool").chmod(0o755)
+    name, old, new = fault
+    text = (folder / name).read_text()
+    assert re.search(old, text, re.M), f"{name} no longer has {old}"
+    (folder / name).write_text(re.sub(old, new, text, count=1, flags=re.M))
+    return run(ROOT / ".venv/bin/python", SCRIPTS / "house.py", "pins", folder)
+
+
+def python_wheels(folder, lines):
+    """Two wheels, pinned; what is brought into an environment is what has its checksum, and nothing else."""
+    sums = {}
+    for name in ("one", "two"):
+        with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as wheel:
+            wheel.writestr(f"{name}.py", "")
+            wheel.writestr(f"{name}-1.dist-info/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n")
+            wheel.writestr(f"{name}-1.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            wheel.writestr(f"{name}-1.dist-info/RECORD", "")
+        sums[name] = hashlib.sha256((folder / f"{name}-1-py3-none-any.whl").read_bytes()).hexdigest()
+    (folder / "list.txt").write_text(lines.format(**sums, other="0" * 64))
+    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", SCRIPTS / "python_packages", folder / "venv", folder / "list.txt")
+    there = sorted(path.stem for path in folder.glob("venv/lib/python*/site-packages/*.py") if path.stem in sums)
+    if there != ([] if status else ["one", "two"]):
+        raise RuntimeError(f"installed: {there}\n{said}")
+    return status, said
+
+
+def of_sizes():
+    sys.path.insert(0, str(SCRIPTS))
+    return importlib.import_module("sizes")
+
+
+def sizes(_, new):
+    found = [*of_sizes().differences({"permit": [2000], "core": [9000]}, new)]
+    return len(found), "\n".join(found)
+
+
+def sizes_of_use(_, more):
+    """What is linked on a Cortex-M4 for the use of the codec, and of something more."""
+    module, build = of_sizes(), ROOT / "build/arm"
+    if not [*build.rglob("libiwheel_core.a")]:
+        return 77, "build/arm has no library"
+    module.CPUS = {"Cortex-M4": "cortex-m4"}
+    module.USES = {"codec": ("codec.h observation.h", f"{module.CODEC} {more}", 10_000)}
+    found = module.uses([build])[1]
+    return len(found), "\n".join(found)
+
+
+def counting(folder, case):
+    (folder / "junit.xml").write_text(f"<testsuite>{case}</testsuite>")
+    status, said = run(ROOT / "test/all/count_tests.py", "--run", folder / "read.xml", "cp", folder / "junit.xml", folder / "read.xml")
+    return status or int(said.split()[-4]), said
+
+
+def of_mutation(name):
+    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/faults")]
+    loader = importlib.machinery.SourceFileLoader(f"mutation_{name}", str(ROOT / "test/mutation" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+def around(_, found):
+    """The gate's word on bugs by meaning: (the word for one of them, those that are known, whether it is still there)"""
+    word, known, there = found
+    record = argparse.Namespace(files=["a.c"], mutants={"a.c | f | x; | y;": None} if there else {})
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        return of_mutation("around").verdict(record, known, {"a.c | f | x; | y;": word} if there else {}, True), said.getvalue()
+
+
+def mutation(_, kind):
+    """The gate's word on a mutant of the core that is judged like that."""
+    module, key = of_mutation("run"), "a.c | f | x; | y;"
+    judge = argparse.Namespace(kills=collections.defaultdict(collections.Counter))
+    campaign = module.Campaign(judge, {key: argparse.Namespace(file="a.c", function="f")}, {}, 1)
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        campaign.enter(key, module.Verdict(kind))
+        return campaign.failures(["a.c"]), said.getvalue()
+
+
+def proofs(folder, change):
+    (folder / "proofs.csv").write_text(change((ROOT / "docs/developer/proofs.csv").read_text()))
+    return run(SCRIPTS / "proofs.py", folder / "proofs.csv")
+
+
+def function(body, parameters="int a"):
+    return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
+
+
+def nested(depth):
+    """As many conditions inside each other: cognitive complexity 1 + 2 + ... + depth."""
+    return "".join(f"    if (a > {n}) {{\n" for n in range(depth)) + "    a++;\n" + "    }\n" * depth + "    return a;\n"
+
+
+def null(folder, device):
+    """A test of ./check in a copy of the mounts where that is /dev/null."""
+    (folder / "file").touch()
+    mounts = ["unshare", "--map-root-user", "--mount", "sh", "-c", 'mount --bind "$0" /dev/null && exec "$@"', folder / device]
+    if run(*mounts, "true")[0] != 0:
+        return 77, "nothing can be mounted here"
+    return run(*mounts, ROOT / "test/all/start", "idle", "lint", "planted", "", "true", cwd=folder)
+
+
+def junit(status, output):
+    return f'<testcase name="t" status="{status}"><system-out>{output}</system-out></testcase>'
+
+
+BIG = "void take(char *);\nvoid iw_g(void);\nvoid iw_g(void) { char buffer[300]; take(buffer); }\n"
+VARIABLE = "void take(char *);\nvoid iw_g(int n);\nvoid iw_g(int n) { char buffer[n]; take(buffer); }\n"
+RECURSION = "int take(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? take(n) + iw_g(n - 1) * iw_g(n - 2) : 1; }\n"
+SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0, {})]; }}\n"
+SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
+
+DEVIATING = {
+    "docs/developer/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
+    ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
+    "core/a.c": CLEAN,
+    ".cppcheck-suppressions": "# Words.\nzero:core/*\n",
+    "ruff.toml": "[lint]\nignore = [\n]\n",
+}
+
+# gate, its tool, what is planted, argument, must it be caught
+CASES = [
+    (purity, "arm-none-eabi-gcc", "clean", CLEAN, False),
+    (purity, "arm-none-eabi-gcc", "counter at file scope", "int iw_count(void);\nstatic int n;\nint iw_count(void) { return ++n; }\n", True),
+    (purity, "arm-none-eabi-gcc", "initialised variable", "int iw_n = 7;\n", True),
+    (purity, "arm-none-eabi-gcc", "call of puts", 'int puts(const char *);\nint iw_g(void) { return puts(""); }\n', True),
+    (purity, "arm-none-eabi-gcc", "floating point", "float iw_g(float a) { return a * 2; }\n", True),
+    (purity, "arm-none-eabi-gcc", "constant folded floating point", "int iw_g(void) { return (int)(double)2; }\n", True),
+    (purity, "arm-none-eabi-gcc", "header of libc", "#include <stdlib.h>\n" + CLEAN, True),
+    (stack, "arm-none-eabi-gcc", "clean", CLEAN, False),
+    (stack, "arm-none-eabi-gcc", "300 bytes", BIG, True),
+    (stack, "arm-none-eabi-gcc", "variable length", VARIABLE, True),
+    (stack, "arm-none-eabi-gcc", "recursion", RECURSION, True),
+    (frames, "gcc", "4000 bytes", BIG.replace("300", "4000"), False),
+    (frames, "gcc", "4200 bytes", BIG.replace("300", "4200"), True),
+    (frames, "gcc", "variable length", VARIABLE, True),
+    (coverage, "gcovr", "clean", SOME_FOUR, False),
+    (coverage, "gcovr", "a branch never taken", "f(0, 0); f(1, 1);", True),
+    (coverage, "gcovr", "a function never called", "", True),
+    (coverage, "gcovr", "nothing is measured", None, True),
+    (warnings, "gcc", "clean", CLEAN, False),
+    (warnings, "gcc", "lost bits", "short f(long a);\nshort f(long a) { return a; }\n", True),
+    (warnings, "gcc", "sign", "unsigned f(int a);\nunsigned f(int a) { return a; }\n", True),
+    (analyzer, "gcc", "clean", CLEAN, False),
+    (analyzer, "gcc", "second free", "#include <stdlib.h>\nvoid f(void *p);\nvoid f(void *p)\n{\n    free(p);\n    free(p);\n}\n", True),
+    (mcdc, "llvm-cov-19", "clean", SOME_FOUR, False),
+    (mcdc, "llvm-cov-19", "a decision that nothing runs", "", True),
+    (mcdc, "llvm-cov-19", "a condition that never decides alone", "f(0, 0); f(1, 1);", True),
+    (eva, "frama-c", "clean", SOME_INDEX.format(1), False),
+    (eva, "frama-c", "index off by one", SOME_INDEX.format(2), True),
+    (eva, "frama-c", "signed overflow", "int main(void) { int a = Frama_C_interval(0, 2147483647); return a + 1; }\n", True),
+    (eva, "frama-c", "an assertion that does not hold", "int main(void) { int a = Frama_C_interval(0, 1);\n//@ assert a == 0;\nreturn a; }\n", True),
+    (eva_core, "frama-c", "the core: ring index off by one", "eva-ring-index-off-by-one", True),
+    (eva_core, "frama-c", "the core: a queue of three in room for two", "eva-queue-of-three-in-room-for-two", True),
+    (eva_core, "frama-c", "the core: negation of any number", "eva-negation-of-any-number", True),
+    (tidy, "clang-tidy", "clean", CLEAN, False),
+    (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
+    (tidy, "clang-tidy", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), False),
+    (tidy, "clang-tidy", "81 lines", function("    a++;\n" * 78 + "    return a;\n"), True),
+    (tidy, "clang-tidy", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
+    (tidy, "clang-tidy", "cognitive complexity 28", function(nested(7)), True),
+    (tidy_core, "clang-tidy", "60 lines", function("    a++;\n" * 57 + "    return a;\n"), False),
+    (tidy_core, "clang-tidy", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
+    (tidy_core, "clang-tidy", "cognitive complexity 15", function(nested(5)), False),
+    (tidy_core, "clang-tidy", "cognitive complexity 21", function(nested(6)), True),
+    (tidy_northbound, "clang-tidy", "cognitive complexity 21", function(nested(6)), True),
+    (cppcheck, "cppcheck", "clean", CLEAN, False),
+    (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
+    (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
+    (cppcheck_accepts, "cppcheck", "clean", "", False),
+    (cppcheck_behind, "cppcheck", "MISRA 18.4 in a line with what is accepted", "&a + 0", True),
+    (cppcheck_accepts, "cppcheck", "a suppression that nothing needs", "misra-c2012-8.4:core/*\n", True),
+    (deviations, "python3", "clean", ("", "", ""), False),
+    (deviations, "python3", "a switch-off without a number", (".clang-tidy", "-cert-x,", "-cert-x,\n  -cert-y,"), True),
+    (deviations, "python3", "a number without use", (".clang-tidy", "  -cert-x,\n", ""), True),
+    (deviations, "python3", "a suppression without a number", (".cppcheck-suppressions", "zero:core/*\n", "zero:core/*\none:core/*\n"), True),
+    (deviations, "python3", "a number that cppcheck does not need", (".cppcheck-suppressions", "zero:core/*\n", ""), True),
+    (deviations, "python3", "a rule of ruff without a number", ("ruff.toml", "[\n]", '[\n    "E402",\n]'), True),
+    (deviations, "python3", "a comment that silences ruff", ("core/a.c", "a + 1;", "a + 1; # noqa"), True),
+    (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
+    (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
+    (deviations, "python3", "a number given twice", ("docs/developer/static.md", "D2", "D1"), True),
+    (deviations, "python3", "no reason", ("docs/developer/static.md", "a reason", ""), True),
+    (northbound, "python3", "clean", ("", "", ""), False),
+    (northbound, "python3", "a word that only the gateway has", ("lib/northbound/protocol/src/states.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a fault that is no cause", ("lib/northbound/server/src/observe.c", '"still_moving", true', '"still_rolling", true'), True),
+    (northbound, "python3", "a state of the memory", ("app/gateway/assumptions/assumptions_json.c", '"ignored"', '"distrusted"'), True),
+    (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
+    (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
+    (
+        northbound,
+        "python3",
+        "a field that the reader does not know",
+        ("lib/northbound/protocol/src/request_fields.h", "    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))", "    "),
+        True,
+    ),
+    (
+        northbound,
+        "python3",
+        "a request in another place",
+        ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_CMD_TARE,\n    IWN_CMD_WHY,", "IWN_CMD_WHY,\n    IWN_CMD_TARE,"),
+        True,
+    ),
+    (
+        northbound,
+        "python3",
+        "a limit of the reader's own",
+        ("lib/northbound/protocol/include/iwheel_northbound/request.h", "IWN_LINE_MAX        4096U", "IWN_LINE_MAX        8192U"),
+        True,
+    ),
+    (northbound, "python3", "a field that is not documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
+    (northbound, "python3", "a field that is only documented", ("docs/user/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
+    (northbound, "python3", "an example of another type", ("docs/user/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
+    (northbound, "python3", "an error that means something else", ("docs/user/northbound.md", "a wheel turns |", "a wheel stands |"), True),
+    (
+        northbound,
+        "python3",
+        "an integer without a unit",
+        ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'),
+        True,
+    ),
+    (ruff, "ruff", "clean", "import sys\n\nprint(sys.argv)\n", False),
+    (ruff, "ruff", "an import that nobody needs", "import sys\n", True),
+    (ruff, "ruff", "a name that is nowhere", "print(gone)\n", True),
+    (ruff, "ruff", "a default that all calls share", "def f(a=[]):\n    a.append(1)\n    return a\n", True),
+    (ruff, "ruff", "whatever goes wrong is passed over", "try:\n    print(1)\nexcept:\n    print(2)\n", True),
+    (ruff, "ruff", "a run whose failure nobody sees", "import subprocess\n\nsubprocess.run(['false'])\n", True),
+    (ruff, "ruff", "a comparison of what may be shorter", "print([a for a, b in zip('ab', 'a') if a == b])\n", True),
+    (ruff, "ruff", "complexity 17", "def f(a):\n" + "".join(f"    if a == {n}:\n        print({n})\n" for n in range(16)), True),
+    (ruff_format, "ruff", "formatted", "\nprint(1, [2, 3])\n", False),
+    (ruff_format, "ruff", "not formatted", "\nprint( 1,[2,3] )\n", True),
+    (shellcheck, "shellcheck", "clean", 'echo "$1"\n', False),
+    (shellcheck, "shellcheck", "words that are split", "rm -r $1\n", True),
+    (shellcheck, "shellcheck", "a folder that is not there", "cd build\nrm -r x\n", True),
+    (shellcheck, "shellcheck", "a name that is nowhere", 'echo "$gone"\n', True),
+    (shellcheck, "shellcheck", "a status that is lost", 'f() { local a=$(false); echo "$a"; }\nf\n', True),
+    (codespell, "codespell", "clean", "The wheels obey its behaviour.\n", False),
+    (codespell, "codespell", "two letters in each other's place", "The wheels obey te" + "h gateway.\n", True),
+    (style, "lizard", "clean", CLEAN, False),
+    (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
+    (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
+    (style, "lizard", "a comment that names a macro of the board that is gone", CLEAN + "// As BRD_GONE.\n", True),
+    (style, "lizard", "a comment that names a file that is gone", CLEAN + "// See gone.h.\n", True),
+    (style, "lizard", "a comment that names a rule that is gone", CLEAN + "// By R99.\n", True),
+    (style, "lizard", "121 characters", CLEAN + "// " + "a" * 118 + "\n", True),
+    (style, "lizard", "no comment that says why", CLEAN + "int iw_h;\n" * 300, True),
+    (style, "lizard", "nothing but comments", CLEAN + "// A reason.\n" * 60, True),
+    (style, "lizard", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
+    (style, "lizard", "complexity 12", function("    if (a == 1) {\n        a++;\n    }\n" * 11 + "    return a;\n"), True),
+    (style, "lizard", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
+    (style, "lizard", "401 lines that are no comments", CLEAN + "\n" * 396, True),
+    (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
+    (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
+    (style, "lizard", "the form of the tree", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),
+    (style, "lizard", "++ before a name", function("    ++a;\n    return a;\n"), True),
+    (style, "lizard", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
+    (style, "lizard", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
+    (style_header, "lizard", "clean", "PLANTED_H", False),
+    (style_header, "lizard", "an include guard of another name", "PLANTS_H", True),
+    (faults, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
+    (faults, "python3", "a function is renamed that no fault is in", ("lib/northbound/server/src/requests.c", "void carry_out(", "void carry_it_out("), False),
+    (
+        faults,
+        "python3",
+        "a function is renamed that faults are in",
+        ("lib/northbound/server/src/drive.c", "void iwn_server_twist(", "void iwn_server_turn("),
+        False,
+    ),
+    (faults, "python3", "a file has another name and place", ("app/gateway/loop.c", "#include", "#include", "app/cycle.c"), False),
+    (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
+    (
+        faults,
+        "python3",
+        "the code of a fault occurs twice",
+        (
+            "core/src/sender.c",
+            "const bool invert = config->invert[side];",
+            "const bool invert = config->invert[side]; const bool invert = config->invert[side];",
+        ),
+        True,
+    ),
+    (
+        faults,
+        "python3",
+        "the code of a fault of the daemon is gone",
+        ("app/gateway/loop.c", "events[i].data.u64 == SOCK_TAG_ESTOP", "events[i].data.u32 == SOCK_TAG_ESTOP"),
+        True,
+    ),
+    (faults, "python3", "the code of a fault of the board is gone", ("app/board/configure.c", "!brd_host_is_silent(self)", "!is_silent(self)"), True),
+    (faults, "python3", "a test that should notice is no test", ("test/faults/gateway.faults", "unit.daemon_watchers", "unit.daemon_watching"), True),
+    (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
+    (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
+    (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
+    (
+        house,
+        "gcc",
+        "a program reads a part of the core",
+        (
+            "port/stm32_stub/lamp.c",
+            '#include "lamp.h"',
+            '#include "lamp.h"\n#include "iwheel/gateway.h"\n'
+            "int iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}",
+        ),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "a program includes what is private",
+        ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'),
+        True,
+    ),
+    (house, "gcc", "a header includes one level more", ("core/src/arithmetic.h", '#include "iwheel/types.h"', '#include "iwheel/gateway.h"'), True),
+    (
+        house,
+        "gcc",
+        "two folders need each other",
+        ("app/gateway/process/child.c", '#include "child.h"', '#include "child.h"\n#include "disk/file_store.h"'),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "another folder's header by its bare name",
+        ("app/gateway/answers/answers_refuse.c", '#include "wheels/wheels.h"', '#include "wheels.h"'),
+        True,
+    ),
+    (
+        house,
+        "gcc",
+        "two arrows more",
+        ("app/gateway/lock/bus_names.c", '#include "bus_names.h"', '#include "bus_names.h"\n#include "disk/file_store.h"\n#include "box/box.h"'),
+        True,
+    ),
+    (arch, "python3", "clean", ("app/ctl/main.c", "#include", "#include"), False),
+    (
+        arch,
+        "python3",
+        "a tool includes a file of the daemon",
+        ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#include "assumptions/assumptions_file.h"'),
+        True,
+    ),
+    (
+        arch,
+        "python3",
+        "the same by its way",
+        ("app/ctl/main.c", '#include "begin/begin.h"', '#include "begin/begin.h"\n#  include "../gateway/daemon.h"'),
+        True,
+    ),
+    (arch, "python3", "a library looks up to a program", ("lib/config/value.c", "#include", '#include "talk/ctl.h"\n#include'), True),
+    (
+        arch,
+        "python3",
+        "a port looks up to the board's application",
+        ("port/stm32_stub/report.c", '#include "report.h"', '#include "report.h"\n#include "host.h"'),
+        True,
+    ),
+    (
+        arch,
+        "python3",
+        "the board includes a file of the daemon",
+        ("app/board/host.c", '#include "host.h"', '#include "host.h"\n#include "answers/answers.h"'),
+        True,
+    ),
+    (arch, "python3", "a permission that nobody needs", ("docs/developer/architecture.md", "| `lib/client` | ", "| `lib/client` | `core`, "), True),
+    (arch, "python3", "a library that is not in the table", ("docs/developer/architecture.md", "| `lib/begin` | nobody |\n", ""), True),
+    (arch_of_names, "python3", "clean", "app/ctl/text/a_name_of_its_own.c", False),
+    (arch_of_names, "python3", "a source of a program with the name of another's", "app/ctl/text/host.c", True),
+    (arch_of_names, "python3", "a header of a library with the name of the port's", "lib/config/frame_ring.h", True),
+    (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
+    (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
+    (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
+    (api, "doxygen", "a member without a word", "/// @file\n/// A header.\n\n/// A struct.\ntypedef struct {\n    int a;\n} iw_a_t;\n", True),
+    (api, "doxygen", "a header that Doxygen would pass over", "/// A header.\nvoid iw_f(void);\n", True),
+    (pages, "python3", "clean", ("app/b.c", "other", "another"), False),
+    (pages, "python3", "a file more has the example", ("app/b.c", "other", "follow_ms"), True),
+    (pages, "python3", "a listed file has it no more", ("app/a.c", "follow_ms", "other"), True),
+    (pages, "python3", "a listed file is not there", ("docs/developer/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
+    (pages, "python3", "a list without its pattern", ("docs/developer/how-to-add.md", "pattern", "patern"), True),
+    (pages, "python3", "an entry that the index lacks", ("test/more", "", "x\n"), True),
+    (pages, "python3", "a page for users that the index lacks", ("docs/user/more.md", "", "x\n"), True),
+    (pages, "python3", "a source that names a page that is not there", ("app/b.c", "int other;", "int other; // docs/user/gone.md"), True),
+    (pages, "python3", "a link that leads nowhere", ("docs/developer/how-to-add.md", "there.", "[there](../gone.md)."), True),
+    (pages, "python3", "a link and a name that lead somewhere", ("docs/developer/how-to-add.md", "there.", "[docs/README.md](../README.md)."), False),
+    (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
+    (python_pins, "python3", "clean", ("tool", "sh", "sh"), False),
+    (python_pins, "python3", "a pin without a checksum", ("requirements/check.txt", r"^(pyte==[^\\\n]+) \\\n(?:    --hash.*\n)+", r"\1\n"), True),
+    (python_pins, "python3", "a pin for one Python only", ("requirements/demo.txt", r"^(cyclonedds==\S+ ; )", r'\1python_version == "3.13" and '), True),
+    (python_pins, "python3", "a wish that is not pinned", ("requirements/pyproject.toml", r'^    "lizard==.*$', '    "lizard==9.9",'), True),
+    (python_pins, "python3", "a pin that nobody needs", ("requirements/pyproject.toml", r'^    "lizard==.*$', ""), True),
+    (python_pins, "python3", "a program that calls pip without checksums", ("tool", "--require-hashes ", ""), True),
+    (python_wheels, "python3", "clean", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{two}\n", False),
+    (python_wheels, "python3", "a wheel with another checksum", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{other}\n", True),
+    (python_wheels, "python3", "a wheel without checksum", "one==1 --hash=sha256:{one}\ntwo==1\n", True),
+    (python_wheels, "python3", "a wheel that does not fit this Python", "one==1 --hash=sha256:{one}\ntwo==2 --hash=sha256:{two}\n", True),
+    (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
+    (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
+    (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
+    (sizes_of_use, "arm-none-eabi-gcc", "clean", "", False),
+    (sizes_of_use, "arm-none-eabi-gcc", "a module that nothing calls", "iw_observation_init", True),
+    (mutation, "clang", "seen", "killed", False),
+    (mutation, "clang", "lives", "lives", True),
+    (around, "clang", "seen", ("daemon_motion", {}, True), False),
+    (around, "clang", "lives, and its reason is known", ("!", {"a.c | f | x; | y;": "a reason"}, True), False),
+    (around, "clang", "lives", ("!", {}, True), True),
+    (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
+    (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
+    (proofs, "python3", "clean", str, False),
+    (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
+    (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),
+    (man, "python3", "clean", ("iwheelctl.1.scd", "", ""), False),
+    (man, "python3", "a verb whose page is not what it prints", ("iwheelctl.1.scd", "REASON appears", "REASON is shown"), True),
+    (man, "python3", "an option that a program has no more", ("iwheel-gateway.1.scd", "--listen-only ", "--listen "), True),
+    (man, "python3", "a verb without a summary", ("iwheelctl.1.scd", "  disarm   the same as stop\n", ""), True),
+    (man, "python3", "a command that the simulator has not", ("iwheel-sim.1.scd", "unmute left", "unmuted left"), True),
+    (proofs, "python3", "a step without a row", lambda table: re.sub(r"^demo,.*\n", "", table, flags=re.M), True),
+    (proofs, "python3", "a proof that changes its list", lambda table: re.sub(r"^(kernel.check,.*),check$", r"\1,full", table, flags=re.M), True),
+    (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
+    (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
+    (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
+    (counting, "python3", "a crash before the sum", junit("fail", "test.c:1:test_a:PASS"), True),
+    (null, "unshare", "clean", "/dev/null", False),
+    (null, "unshare", "a file in the place of /dev/null", "file", True),
+    (counting, "python3", "a crash after the sum", junit("fail", "3 Tests 0 Failures 0 Ignored"), True),
+]
+
+
+@pytest.mark.parametrize(("gate", "tool", "name", "argument", "must_catch"), CASES, ids=[f"{case[0].__name__}: {case[2]}" for case in CASES])
+def test_gate(tmp_path, gate, tool, name, argument, must_catch):
+    if not (importlib.util.find_spec(tool) if tool == "lizard" else shutil.which(tool)):
+        pytest.skip(f"{tool} is missing")
+    status, said = gate(tmp_path, argument)
+    if status == 77:
+        pytest.skip(said.strip().removeprefix("skip: "))
+    assert "Traceback" not in said and (status != 0) == must_catch, f"{'not caught' if must_catch else 'caught although clean'}\n{said}"

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+"""The images of the three boards on an emulated Cortex-M: scenarios.py, gateway_scenarios.py. What is long and the same on both families runs on the first
+board only, unless IWHEEL_FULL is 1. And the files beside each image, which flashing tools are given.
+"""
+
+import functools
+import gc
+import re
+
+import pytest
+import verdict
+from images import CPUS, WORK, must
+
+pytest.importorskip("unicorn", reason="the Python package unicorn is missing in .venv (scripts/python_packages .venv requirements/check.txt)")
+import beginnings
+import emulate
+import scenarios
+
+pytestmark = [pytest.mark.exact, pytest.mark.limit(3000)]
+
+
+def cases():
+    """Those that begin alike are together, the largest group is first."""
+    groups = {}
+    for board, images in scenarios.BY_BOARD.items():
+        for image, several in images.items():
+            for scenario in several:
+                groups.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
+    for (board, image, *begins), several in sorted(groups.items(), key=lambda group: -len(group[1])):
+        for scenario in several:
+            long = [pytest.mark.full] if board == "stm32f407" and scenario in scenarios.LONG else []
+            marks = [pytest.mark.together(f"{board}-{image}.{several[0].__name__}"), *long]
+            yield pytest.param(board, image, *begins, scenario, id=f"{board}-{image}.{scenario.__name__}", marks=marks)
+
+
+@functools.cache
+def begun(board, image, oscillator, beginning):
+    """The rig after what several scenarios begin with."""
+    emulate.load(WORK / "libmodel.so")
+    gc.disable()  # It takes a twentieth of the time, and has little to find before the end.
+    rig = emulate.Rig(WORK / f"images/{board}-{image}.elf", oscillator)
+    beginnings.run(rig, beginning)
+    return rig
+
+
+@pytest.fixture
+def evidence():
+    return verdict.Evidence()
+
+
+@pytest.mark.parametrize(("board", "image", "oscillator", "beginning", "scenario"), [*cases()])
+def test_scenario(board, image, oscillator, beginning, scenario, evidence):
+    error, notes = beginnings.apart(emulate.judge, begun(board, image, oscillator, beginning), scenario) or ("it ended without a verdict", [])
+    evidence.figures += notes
+    assert not error, error
+
+
+@pytest.mark.parametrize("board", [*CPUS])
+def test_elf_bin_and_hex_hold_the_same(board, tmp_path):
+    elf = WORK / f"{board}/port/stm32_stub/iwheel_{board}.elf"
+    binary, text = (elf.with_suffix(ending) for ending in (".bin", ".hex"))
+    assert all(path.stat().st_mtime >= elf.stat().st_mtime for path in (binary, text))
+    must(["arm-none-eabi-objcopy", "-I", "ihex", "-O", "binary", text, tmp_path / "back"])
+    assert (tmp_path / "back").read_bytes() == binary.read_bytes()
+    assert re.search(r"^:02000004(\w{4})", text.read_text(), re.MULTILINE)[1] == "0800", "the flash's first address"
+    assert int.from_bytes(binary.read_bytes()[:4], "little") == 0x20000700, "the top of the stack"

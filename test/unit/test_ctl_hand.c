@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// The sum of what wheels count under hands: a stall of ours is no gap of theirs.
+#include "bringup/bringup.h"
+
+#include "unit.h"
+
+#include <math.h>
+
+#define RPM     100 // 100 ticks each second: a tick is a sixtieth of a turn.
+#define LOOK_MS 20
+
+static hand_t hand;
+static hand_look_t look;
+static int64_t now_us;
+
+void setUp(void) {
+    look = (hand_look_t){.heard = true};
+    now_us = 5000000;
+    hand_begin(&hand, &look, now_us);
+}
+
+/// The wheels turn for that time, the left one backwards; then an answer comes.
+static void turn_until_an_answer(int ms) {
+    now_us += ms * INT64_C(1000);
+    look.rpm[IW_LEFT] = -RPM;
+    look.rpm[IW_RIGHT] = RPM;
+    look.ticks[IW_LEFT] -= RPM * ms / 1000;
+    look.ticks[IW_RIGHT] += RPM * ms / 1000;
+    hand_add(&hand, &look, now_us);
+}
+
+static void turn(int ms) {
+    for (int i = 0; i < ms; i += LOOK_MS) {
+        turn_until_an_answer(LOOK_MS);
+    }
+}
+
+TEST(test_hand_adds_what_both_wheels_count) {
+    turn(3000);
+    TEST_ASSERT_EQUAL_INT64(-300, hand.ticks[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT64(300, hand.ticks[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT64(300, hand.way[IW_LEFT]);
+    TEST_ASSERT_TRUE(hand_is_complete(&hand));
+    TEST_ASSERT_INT_WITHIN(1, 100, lround(100.0 * hand_rpm_share(&hand, IW_LEFT)));
+    TEST_ASSERT_INT_WITHIN(1, 100, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
+}
+
+/// What the machine under test did when it failed: it did not run for longer than the wheels may be offline.
+TEST(test_hand_stall_of_ours_loses_nothing) {
+    turn(1000);
+    turn_until_an_answer(HAND_OFFLINE_US / 1000 + 100);
+    look.heard = false; // What waited meanwhile has not been read yet.
+    turn_until_an_answer(LOOK_MS);
+    look.heard = true;
+    turn(1000);
+    turn_until_an_answer(HAND_UNSEEN_US / 1000);
+    TEST_ASSERT_TRUE(hand_is_complete(&hand));
+    TEST_ASSERT_EQUAL_INT64(-100 - 60 - 2 - 100 - 200, hand.ticks[IW_LEFT]);
+}
+
+TEST(test_hand_stall_of_ours_does_not_change_the_rpm) {
+    turn(2000);
+    now_us += 1000000; // It turned, and stands when the next answer comes.
+    look.ticks[IW_RIGHT] += RPM;
+    look.rpm[IW_RIGHT] = 0;
+    hand_add(&hand, &look, now_us);
+    TEST_ASSERT_INT_WITHIN(1, 100, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
+    look.ticks[IW_RIGHT] += 2 * RPM;
+    now_us += HAND_STALL_US + 1;
+    hand_add(&hand, &look, now_us);
+    TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT))); // 200 of 500 ticks are too few.
+}
+
+TEST(test_hand_without_ticks_shows_no_rpm) {
+    TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
+}
+
+TEST(test_hand_wheel_that_is_offline_is_a_gap) {
+    turn(100);
+    look.heard = false;
+    turn(HAND_OFFLINE_US / 1000);
+    TEST_ASSERT_TRUE(hand_is_complete(&hand));
+    look.heard = true;
+    turn(100); // Moments do not add up.
+    look.heard = false;
+    turn(HAND_OFFLINE_US / 1000);
+    TEST_ASSERT_TRUE(hand_is_complete(&hand));
+    turn(LOOK_MS);
+    TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
+    look.heard = true;
+    turn(1000);
+    TEST_ASSERT_FALSE(hand_is_complete(&hand));
+}
+
+TEST(test_hand_stall_while_a_wheel_is_offline_counts_little) {
+    look.heard = false;
+    turn_until_an_answer(1000);
+    turn_until_an_answer(1000);
+    TEST_ASSERT_EQUAL_INT(HAND_COMPLETE, hand.gap);
+    turn_until_an_answer(1000);
+    TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
+}
+
+TEST(test_hand_wheel_that_restarts_is_a_gap) {
+    turn(100);
+    look.reboots = 1;
+    turn(LOOK_MS);
+    turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1); // The first reason stays.
+    TEST_ASSERT_EQUAL_INT(HAND_RESTARTED, hand.gap);
+    TEST_ASSERT_FALSE(hand_is_complete(&hand));
+}
+
+TEST(test_hand_that_nobody_watched_is_a_gap) {
+    turn(100);
+    turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1);
+    TEST_ASSERT_EQUAL_INT(HAND_UNSEEN, hand.gap);
+    TEST_ASSERT_FALSE(hand_is_complete(&hand));
+}
+
+TEST(test_hand_that_begins_offline_is_a_gap) {
+    look.heard = false;
+    hand_begin(&hand, &look, now_us);
+    TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
+}
