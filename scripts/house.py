@@ -8,9 +8,9 @@ facts    the table of facts in docs/developer/architecture.md, each with its lim
          with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
 layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md. And the name
          of a source or header file belongs to one file of core, lib, port and app.
-pages    the lists of docs/developer/how-to-add.md, the indexes of test/, scripts/ and docs/, links of Markdown and names of pages in every file. A list stands below a comment
-         `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have the pattern are those whose names stand in the list, each
-         after its number. A file of test/ may be named too, and must have it then.
+pages    the indexes of test/, scripts/ and docs/; links of Markdown, and names of pages in every file: each must exist; and the lists of
+         docs/developer/how-to-add.md. A list stands below a comment `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have
+         the pattern are those whose names stand in the list, each after its number. A file of test/ may be named too, and must have it then.
 pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
          of the tree calls pip without checksums.
 
@@ -292,14 +292,13 @@ def judge_index(folder, deep=()):
 
 PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
 LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
-PLANTS = "test/gates/test_planted_faults.py"  # Names pages that must not exist.
 
 
 def judge_names():
     """Pages that a file names from the root, and links of Markdown relative to their page, that do not exist."""
     wrong, count = [], 0
     for file in files("."):
-        text = (ROOT / file).read_text(errors="replace") if file != PLANTS else ""
+        text = (ROOT / file).read_text(errors="replace")
         named = [(found, ROOT / found[0]) for found in PAGE_NAMED.finditer(text)]
         if file.endswith(".md"):
             named += [(found, (ROOT / file).parent / found[1]) for found in LINK.finditer(text)]

@@ -90,7 +90,7 @@ class Types:
         if name in self.description.words:
             words = ", ".join(json.dumps(word) for word in self.description.words[name])
             line = f"{camel(name)} = Literal[{words}]"
-            self.blocks.append(line if len(line) <= 120 else wrapped(name, self.description.words[name]))
+            self.blocks.append(line if len(line) <= 160 else wrapped(name, self.description.words[name]))
         else:
             self.define_object(name)
 

@@ -27,11 +27,11 @@ OTHER_TESTS = {
     26: ("hang",),
     34: (
         "test_one_person_arm_too_old_changes_nothing",
-        "test_one_person_reset_too_old_leaves_the_latch",
+        "test_one_person_reset_too_old_does_not_clear_the_latch",
         "test_one_person_confirm_too_old_is_refused",
         "test_one_person_burst_of_old_requests_changes_nothing",
-        "test_one_person_reset_of_another_stop_leaves_the_latch",
-        "test_one_person_board_refuses_what_is_too_old",
+        "test_one_person_reset_of_another_stop_does_not_clear_latch",
+        "test_one_person_board_refuses_late_requests",
     ),
 }
 # Tests of a row by the first part of their names, beside those that begin with rowNN_.

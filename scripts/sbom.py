@@ -96,8 +96,9 @@ def foreign_files(root):
     """{file of the page: checksum} of those that are not this project's."""
     own = {checksum(path) for path in (ROOT / "app/bridge/web/page").iterdir()}
     # Its texts are one file when it is installed, and each file has a compressed form of the same bytes, which the bridge compares.
-    made = {"strings.js", *(f"{path.name}.gz" for path in Path(root, PAGE).iterdir())}
-    return {path.name: checksum(path) for path in Path(root, PAGE).glob("*") if path.name not in made and checksum(path) not in own}
+    page = list(Path(root, PAGE).glob("*"))
+    made = {"strings.js", *(f"{path.name}.gz" for path in page)}
+    return {path.name: checksum(path) for path in page if path.name not in made and checksum(path) not in own}
 
 
 def facts(folder):

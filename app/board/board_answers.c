@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the board adds to the server: quotes of the serial line, names, and the requests of a microcontroller.
+// The board's part of the server: quotes of the serial line, names, and the requests of a microcontroller.
 #include "host.h"
 
 #include "iwheel_server/target.h"
@@ -15,7 +15,7 @@ iwn_client_t *iwn_target_next(iwn_server_t *server, const iwn_client_t *after) {
     return (next < IWN_LINE_CHANNELS) ? &self->client[next].served : NULL;
 }
 
-/// Told when the long line is free.
+/// Stores the request. The snapshot is sent when the long line is free.
 void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
     brd_host_client_t *const whose = (brd_host_client_t *)client;
     if (whose->owed_status) {
@@ -24,11 +24,11 @@ void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
         iwn_server_refuse(server, client, &server->request.id);
         return;
     }
-    whose->owed_status = true; // A status of every client has a place.
+    whose->owed_status = true; // Every client has a place for a status.
     brd_pending_put(&brd_host_of(server)->pending, client->id, IWN_CMD_STATUS, &server->request.id);
 }
 
-/// The snapshot itself goes out when the long line is free.
+/// Marks the snapshot as due for each subscriber. It is sent when the long line is free.
 void iwn_target_state(iwn_server_t *server, const iw_snapshot_t *seen, bool due_only) {
     (void)seen;
     for (iwn_client_t *client = iwn_target_next(server, NULL); client != NULL;
@@ -66,7 +66,8 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
                       "this gateway is a microcontroller, which gives no key; leave key out");
 }
 
-/// What is wrong with a quote; NULL: nothing. A stamp from before the channel was opened is another client's.
+/// Returns the defect of a quote, or NULL if there is none. A stamp from before the channel was opened belongs to
+/// another client.
 static const char *stale(const brd_host_t *self, const brd_host_client_t *client, const iwn_quote_t *quote) {
     uint64_t boot = 0;
     if (quote == NULL) {
@@ -91,8 +92,8 @@ static const char *stale(const brd_host_t *self, const brd_host_client_t *client
     return NULL;
 }
 
-/// The lease runs from the stamp: whoever held the line up, the wheels stop lease_ms after a time at which the command
-/// did not exist yet. Unless they are armed the core refuses the command, whatever it quotes.
+/// The lease runs from the stamp. If the line is delayed, the wheels still stop lease_ms after a time at which the
+/// command did not exist yet. If the gateway is not armed the core refuses the command with any quote.
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
     const brd_host_t *const self = brd_host_of(server);
     brd_host_client_t *const whose = (brd_host_client_t *)client;
@@ -172,7 +173,7 @@ int64_t iwn_target_wall_us(void) {
     return IWN_WALL_UNKNOWN;
 }
 
-/// Into one of `self->scratch.texts`, so that several names fit into a sentence.
+/// Writes the name into `self->scratch.texts[text]`, so that several names fit into a sentence.
 static const char *name(brd_host_t *self, iw_client_t id, unsigned text) {
     const iwn_client_t *const client = iwn_server_find(&self->server, id);
     iwn_text_t out = iwn_text_begin(self->scratch.texts[text], sizeof self->scratch.texts[text]);
@@ -193,7 +194,7 @@ iwn_surroundings_t iwn_target_around(iwn_server_t *server, const iw_snapshot_t *
         .wall_us = IWN_WALL_UNKNOWN,
         .version = server->version,
         .bus = {.name = server->bus,
-                .timing = "confirmed", // Asserted when it was compiled.
+                .timing = "confirmed", // Asserted at compile time.
                 .bitrate_hz = self->bitrate_hz,
                 .sample_point_permille = self->sample_point_permille},
         .estop = server->estop,
@@ -230,7 +231,7 @@ void iwn_target_describe(iwn_server_t *server, iw_refusal_t refusal, iwn_refuse_
     context->listen_only = "the image never sends; build it without listen only";
 }
 
-/// Of the track: nothing else is asked for.
+/// Only the track can be contradicted here: the server asks for no other item.
 void iwn_target_contradiction(iwn_server_t *server, iw_assumption_item_t item, char *out_text, size_t size) {
     iwn_text_t text = iwn_text_begin(out_text, size);
     (void)server;
@@ -245,7 +246,7 @@ void iwn_target_write_terms(iwn_server_t *server, const iwn_client_t *client, iw
     (void)json;
 }
 
-/// There is no disk for recordings, and no room for frames.
+/// The board has no disk for recordings and no memory for frames.
 void iwn_target_write_why(iwn_server_t *server, iwn_out_t *json) {
     (void)server;
     iwn_out_null(json, "directory");

@@ -3,9 +3,9 @@
 
 #include <string.h>
 
-#define STATE(item)    ((iw_assumption_state_t)((item)&15U))
-#define EVIDENCE(item) ((iw_source_t)((item) >> 4))
-/// The furthest raw force in cN that is not saturated: no wheel's zero lies beyond.
+#define STATE(item)  ((iw_assumption_state_t)((item)&15U))
+#define SOURCE(item) ((iw_source_t)((item) >> 4))
+/// Largest raw force that is not saturated (32766 cN), in mN: no zero of a wheel exceeds it.
 #define ZERO_MAX_mN 327660
 
 const char *brd_assumptions_key(iw_assumption_item_t item) {
@@ -25,7 +25,7 @@ static bool has_value(const char *key, const brd_settings_t *one, const brd_sett
     return brd_settings_value(one, key, value) && brd_settings_value(other, key, wanted) && strcmp(value, wanted) == 0;
 }
 
-/// Evidence for another value than the one in force is worth nothing.
+/// Returns true if both settings have the same value of the item. Facts that were found for another value do not apply.
 static bool is_for(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *now) {
     const char *const key = brd_assumptions_key(item);
     return (key == NULL || has_value(key, found, now)) &&
@@ -38,7 +38,7 @@ static iw_assumption_item_t unit_of(unsigned side) {
 
 brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window) {
     return (brd_assumptions_zero_t){.offset_mN = force->offset_mN,
-                                    .drift_mN = (int16_t)window->drift_mN, // A window that gives a zero is a quiet one.
+                                    .drift_mN = (int16_t)window->drift_mN, // It fits: a zero's window has little drift.
                                     .deviation_mN = (uint16_t)window->deviation_mN,
                                     .from = (uint8_t)force->provenance};
 }
@@ -63,7 +63,7 @@ void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t
                              brd_assumptions_zero_t out_zero[IW_SIDES]) {
     for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {
         const iw_assumption_item_t item = (iw_assumption_item_t)i;
-        const iw_assumption_entry_t entry = {STATE(self->item[i]), EVIDENCE(self->item[i]), self->figure[i]};
+        const iw_assumption_entry_t entry = {STATE(self->item[i]), SOURCE(self->item[i]), self->figure[i]};
         if (is_for(item, &self->settings, settings)) {
             iw_gateway_set_assumption(gateway, item, &entry);
         }
@@ -82,22 +82,22 @@ void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t
     }
 }
 
-static bool is_another_zero(const brd_assumptions_zero_t *now, const brd_assumptions_zero_t *kept) {
-    const int32_t moved = now->offset_mN - kept->offset_mN;
-    const bool tared = now->from == IW_OFFSET_OPERATOR || kept->from == IW_OFFSET_OPERATOR;
-    return (now->from == IW_OFFSET_NONE) != (kept->from == IW_OFFSET_NONE) || moved > BRD_ASSUMPTIONS_MOVED_mN ||
-           moved < -BRD_ASSUMPTIONS_MOVED_mN || (tared && (now->from != kept->from || moved != 0));
+static bool is_another_zero(const brd_assumptions_zero_t *now, const brd_assumptions_zero_t *stored) {
+    const int32_t moved = now->offset_mN - stored->offset_mN;
+    const bool tared = now->from == IW_OFFSET_OPERATOR || stored->from == IW_OFFSET_OPERATOR;
+    return (now->from == IW_OFFSET_NONE) != (stored->from == IW_OFFSET_NONE) || moved > BRD_ASSUMPTIONS_MOVED_mN ||
+           moved < -BRD_ASSUMPTIONS_MOVED_mN || (tared && (now->from != stored->from || moved != 0));
 }
 
-bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *kept) {
-    bool differs = memcmp(now->item, kept->item, sizeof now->item) != 0;
+bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *stored) {
+    bool differs = memcmp(now->item, stored->item, sizeof now->item) != 0;
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
-        differs =
-            differs || (now->item[item] != 0U && !is_for((iw_assumption_item_t)item, &now->settings, &kept->settings));
+        differs = differs ||
+                  (now->item[item] != 0U && !is_for((iw_assumption_item_t)item, &now->settings, &stored->settings));
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        differs = differs || is_another_zero(&now->zero[side], &kept->zero[side]) ||
-                  (now->zero[side].from != IW_OFFSET_NONE && !is_for(unit_of(side), &now->settings, &kept->settings));
+        differs = differs || is_another_zero(&now->zero[side], &stored->zero[side]) ||
+                  (now->zero[side].from != IW_OFFSET_NONE && !is_for(unit_of(side), &now->settings, &stored->settings));
     }
     return differs;
 }

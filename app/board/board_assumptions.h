@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-/// What was learnt of the wheels, from one run of the board to the next: evidence of the ledger, and the zeros of the
-/// force. The rules are the daemon's (docs/developer/ledger.md): what was found for other settings is forgotten, a zero of before
-/// gives way to whatever this run measures, a tare only to a tare.
+/// Learned facts about the wheels, from one run of the board to the next: entries of the assumption store, and the
+/// zeros of the forces. The rules are those of the daemon (docs/developer/ledger.md): facts that were found for other
+/// settings are dropped, a stored zero gives way to any zero that this run measures, and a tare only to a tare.
 ///
 ///     start: record --> the core
-///     run:   something of it has changed --> silence for BRD_ASSUMPTIONS_PERIOD_US --> a record
+///     run:   a fact changes --> nothing is sent for BRD_ASSUMPTIONS_PERIOD_US --> a record
 ///
-/// A figure that was measured once more, or a zero that has moved by less than BRD_ASSUMPTIONS_MOVED_mN, is not worth a
-/// record: the flash wears.
+/// A repeated measurement of a figure, or a zero that moved by no more than BRD_ASSUMPTIONS_MOVED_mN, does not cause a
+/// record, because each record wears the flash.
 #ifndef BOARD_ASSUMPTIONS_H
 #define BOARD_ASSUMPTIONS_H
 
@@ -15,41 +15,41 @@
 
 #include "iwheel/gateway.h"
 
-/// Nothing has been sent for so long, without a pause, before a record is written; and between two looks.
+/// Time without any setpoint before a record is written, and period of the checks.
 #define BRD_ASSUMPTIONS_PERIOD_US 2000000U
 #define BRD_ASSUMPTIONS_MOVED_mN  500
 
 /// The zero of one wheel's force.
 typedef struct {
     int32_t offset_mN;
-    int16_t drift_mN;      ///< Of the window that it is the mean of, with ESTIMATED and OPERATOR.
-    uint16_t deviation_mN; ///< The same.
-    uint8_t from;          ///< iw_offset_provenance_t: where it came from first; IW_OFFSET_NONE: there is none.
+    int16_t drift_mN;      ///< Drift in the window of which it is the mean, with ESTIMATED and OPERATOR.
+    uint16_t deviation_mN; ///< Deviation in that window.
+    uint8_t from;          ///< First source of the zero (iw_offset_provenance_t); IW_OFFSET_NONE: there is none.
 } brd_assumptions_zero_t;
 
-/// As flash holds it: what grows is put to the end. All zero: nothing is known.
+/// Layout in flash: new members go to the end. All zero: nothing was learned.
 typedef struct {
-    brd_settings_t settings; ///< For which it was found.
+    brd_settings_t settings; ///< Settings for which the facts were found.
     brd_assumptions_zero_t zero[IW_SIDES];
     int32_t figure[IW_ASSUMPTION_ITEMS];
-    uint8_t item[IW_ASSUMPTION_ITEMS]; ///< State, and in the upper half the evidence; 0: none.
+    uint8_t item[IW_ASSUMPTION_ITEMS]; ///< State, with the source in the upper half; 0: none.
 } brd_assumptions_t;
 
-/// What this window gave.
+/// Returns the zero that this window gave.
 brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window);
 
-/// What is known of a gateway with these settings and zeros.
+/// Writes to `*self` all facts about a gateway with these settings and zeros.
 void brd_assumptions_note(brd_assumptions_t *self, const iw_snapshot_t *seen, const brd_settings_t *settings,
                           const brd_assumptions_zero_t zero[IW_SIDES]);
 
-/// Puts it in force, right after the gateway's init; `out_zero`: those of its zeros that were.
+/// Restores the facts directly after the init of the gateway. `out_zero` receives the zeros that were restored.
 void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t *settings, iw_gateway_t *gateway,
                              brd_assumptions_zero_t out_zero[IW_SIDES]);
 
-/// Whether there is more in `now` than in `kept`, or something else.
-bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *kept);
+/// Returns true if `now` contains more facts than `stored`, or other ones.
+bool brd_assumptions_differs(const brd_assumptions_t *now, const brd_assumptions_t *stored);
 
-/// Where an item is configured; NULL: nowhere, and its value is "yes".
+/// Returns the configuration key of an item; NULL: it has no key, and its value is "yes".
 const char *brd_assumptions_key(iw_assumption_item_t item);
 
 #endif

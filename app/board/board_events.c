@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Events about what is learnt of the wheels: the server tells all others.
+// Events about learned facts. The server sends all other events.
 #include "host.h"
 
 static iwn_out_t begin(brd_host_t *self, const char *name) {
@@ -23,7 +23,7 @@ static void observe_assumptions(brd_host_t *self, const iw_snapshot_t *seen) {
     }
 }
 
-/// Of the zero in force: where it comes from is noted, then told. A tare has been noted with its window.
+/// Reports a change of the zero in force, and notes its source first. A tare was noted together with its window.
 static void observe_offset(brd_host_t *self, unsigned side, const iw_force_t *force) {
     brd_host_reported_t *const told = &self->told;
     const iw_offset_provenance_t former = (iw_offset_provenance_t)told->provenance[side];

@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/// The layout of a payload. What grows is put to the end: an older record has zeros there.
+/// Layout of a payload. New members go to the end: an older record has zeros there.
 typedef union {
     struct {
         uint32_t power_ons;
@@ -18,14 +18,14 @@ typedef union {
 
 IW_STATIC_ASSERT(sizeof(record_t) == BRD_STORE_WORDS * sizeof(uint32_t), a_record_fits);
 
-/// Fewer blank slots, and a start makes room: one for a configuration, one for what is learnt.
+/// With fewer blank slots a start erases a page: one is for a configuration, one for learned facts.
 #define ROOM_LEAST 2U
 
-#define HAS_SETTINGS 1U ///< There are settings.
-#define HAS_PAIR     2U ///< As this version writes it; else it is a record of version 0.2.
+#define HAS_SETTINGS 1U ///< The record contains settings.
+#define HAS_PAIR     2U ///< The record has the layout of this version; otherwise that of version 0.2.
 
 #define BEFORE_BYTES (BRD_SETTINGS_BEFORE * sizeof(uint16_t))
-/// Of the words of the record of version 0.2: settings, whether something is learnt, and that.
+/// Words in a record of version 0.2: settings, a flag for learned facts, and these facts.
 #define BEFORE_AT      2U
 #define BEFORE_LEARNED (BEFORE_AT + BEFORE_BYTES / sizeof(uint32_t))
 
@@ -35,7 +35,8 @@ static brd_settings_t from_before(const uint32_t *words) {
     return brd_settings_from_before(value);
 }
 
-/// What a record of version 0.2 holds moves to its new places, which lie behind: the last first.
+/// Moves the contents of a record of version 0.2 to their new places. These lie further back, so the last one moves
+/// first.
 static void convert(record_t *record) {
     const size_t rest = offsetof(brd_assumptions_t, zero);
     const uint8_t *const learned = (const uint8_t *)&record->words[BEFORE_LEARNED + 1U];
@@ -48,7 +49,7 @@ static void convert(record_t *record) {
 
 static void read(const brd_records_t *self, record_t *out_record) {
     if (!brd_store_read(&self->store, out_record->words)) {
-        *out_record = (record_t){.words = {0}}; // Converted, it has neither settings nor anything learnt.
+        *out_record = (record_t){.words = {0}}; // After the conversion it has neither settings nor learned facts.
     }
     if ((out_record->is.flags & HAS_PAIR) == 0U) {
         convert(out_record);
@@ -62,8 +63,9 @@ void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent) {
     record.is.power_ons += power_on ? 1U : 0U;
     self->power_ons = record.is.power_ons;
     const bool is_short = brd_store_blank(&self->store) < ROOM_LEAST;
-    if ((power_on || (is_short && !is_urgent)) && !brd_store_write(&self->store, record.words, !is_urgent)) {
-        self->power_ons = power_on ? 0U : self->power_ons;
+    const bool is_due = power_on || (is_short && !is_urgent);
+    if (is_due && !brd_store_write(&self->store, record.words, !is_urgent) && power_on) {
+        self->power_ons = 0;
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What this board keeps over power-off, in one record of store.h: how many power-ons there were, the configuration,
-/// and what was learnt of the wheels. It is read where it is kept: RAM holds no copy.
+/// Data that this board stores over power-off in one record of store.h: the number of power-ons, the configuration, and
+/// learned facts about the wheels. Each read accesses the flash: RAM has no copy.
 #ifndef BOARD_RECORDS_H
 #define BOARD_RECORDS_H
 
@@ -9,20 +9,22 @@
 
 typedef struct {
     brd_store_t store;
-    uint32_t power_ons; ///< This one among them. 0: the flash has failed.
+    uint32_t power_ons; ///< Number of power-ons, including the last one. 0: the flash has failed.
 } brd_records_t;
 
-/// Right after a start, before the watchdog runs. A power-on is counted; another start writes only where blank slots
-/// have run short. Either may take as long as an erase, unless `is_urgent`: the wheels may be turning.
+/// Call it directly after a start, before the watchdog runs. It counts a power-on; after another start it writes only
+/// if blank slots run short. Both may take as long as an erase, unless `is_urgent` is set, because the wheels may be
+/// turning.
 void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent);
 
-/// The configuration that was committed. False: none was, or it is none.
+/// Reads the committed configuration. Returns false if there is none, or if it is not valid.
 bool brd_records_settings(const brd_records_t *self, brd_settings_t *out_settings);
-/// What was learnt. False: nothing.
+/// Reads the learned facts. Returns false if there are none.
 bool brd_records_assumptions(const brd_records_t *self, brd_assumptions_t *out_learned);
 
-/// Each of both writes a record with the rest as it was. False if the flash did not take it: what was before stays. May
-/// stall the CPU for as long as store.h says. The last blank slot is not for what is learnt.
+/// Both functions write a record and leave the rest of it unchanged. They return false if the flash did not accept it;
+/// the previous record then stays. They may stall the CPU for the time that store.h states. The last blank slot is not
+/// for learned facts.
 bool brd_records_commit(brd_records_t *self, const brd_settings_t *settings);
 bool brd_records_write_assumptions(brd_records_t *self, const brd_assumptions_t *learned);
 

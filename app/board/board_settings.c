@@ -5,34 +5,34 @@
 
 #include <string.h>
 
-/// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
+/// Indices of values. Those below TYPE are numbers of the core, in the order of iw_config_t.
 enum { TYPE = 26, ROLE, SWITCHES, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == BRD_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
 IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (TYPE - 1U) * sizeof(uint16_t),
                  the_core_s_numbers_are_side_by_side);
 
-/// Bits of SWITCHES, in the order of version 0.2, which kept a number for each of the first five.
+/// Bits of SWITCHES, in the order of version 0.2, which had a number for each of the first five.
 enum { RPM_OF = 0, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, ASYMMETRIC, HOLD };
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
 #define NUMBER_DIGITS 5U
 
-/// How a value is written.
+/// Form of a value.
 typedef enum { NUMBER, BYTE, GEAR, WORDS, SWITCH } kind_t;
 
 typedef enum { S_WHEELS, S_LEFT, S_RIGHT, S_DRIVE, S_LIMITS } section_t;
 static const char *const sections[] = {"wheels", "left", "right", "drive", "limits"};
 
-/// Of SWITCH: the words for 0 and 1; of WORDS, the role: for 1 and 2.
+/// Pairs of words: for a SWITCH those of 0 and 1; for WORDS, the role, those of 1 and 2.
 typedef enum { W_NONE, W_ROLE, W_TURNS, W_YES, W_UNIT, W_HOLD } words_t;
 static const char *const words[][2] = {
     [W_NONE] = {NULL, NULL}, [W_ROLE] = {"limit", "setpoint"}, [W_TURNS] = {"wheel", "rotor"},
     [W_YES] = {"no", "yes"}, [W_UNIT] = {"cN", "dN"},          [W_HOLD] = {"release", "hold"},
 };
 
-/// As small as it can be: the flash of an F103 is full.
+/// As small as possible, because the flash of an F103 is full.
 typedef struct {
     const char *key;
     uint8_t section; ///< A section_t.
@@ -152,7 +152,8 @@ static const row_t *find(const char *key) {
     return NULL;
 }
 
-/// Digits up to the end, or up to `end`, which is then passed over.
+/// Reads digits up to the end of the text or up to `end`, which it skips. Returns false if there are no digits, too
+/// many, or another character follows.
 static bool read_number(const char **text, char end, uint32_t *out_number) {
     unsigned digits = 0;
     *out_number = 0;
@@ -277,7 +278,7 @@ static bool value_of(const brd_settings_t *self, const row_t *row, char out_text
         iwn_text_add(&text, "/");
         iwn_text_int(&text, self->value[row->at + 1U]);
     }
-    return within(value, range_of(row)); // Neither an unset type nor a track of 0 is.
+    return within(value, range_of(row)); // False for an unset type, and for a track of 0.
 }
 
 bool brd_settings_value(const brd_settings_t *self, const char *key, char out_text[BRD_SETTINGS_TEXT]) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// The configuration as numbers that flash can keep, and as the keys and values of the gateway's configuration file.
+/// The configuration as numbers that the flash can store, and as keys and values of the gateway's configuration file.
 ///
-/// Keys are "section.key" as in the file: drive.lease_ms. Those that only the daemon has (interfaces, sockets,
-/// recordings) are refused by name. The order of the numbers is what flash holds: new ones go to the end.
+/// Keys are "section.key" as in the file: drive.lease_ms. Keys that only the daemon has (interfaces, sockets,
+/// recordings) are refused, and the refusal contains the key. The order of the numbers is the layout in flash: new ones
+/// go to the end.
 #ifndef BOARD_SETTINGS_H
 #define BOARD_SETTINGS_H
 
@@ -11,7 +12,7 @@
 #include "iwheel_northbound/text.h"
 
 #define BRD_SETTINGS 29U
-/// Version 0.2 had so many, in its own order.
+/// Number of values in version 0.2, which had its own order.
 #define BRD_SETTINGS_BEFORE 26U
 
 typedef struct {
@@ -20,24 +21,24 @@ typedef struct {
 
 brd_settings_t brd_settings_from(const iw_config_t *config);
 
-/// Those that version 0.2 kept, with the defaults of the keys that came since.
+/// Converts the values of version 0.2. Keys that were added later get their defaults.
 brd_settings_t brd_settings_from_before(const uint16_t value[BRD_SETTINGS_BEFORE]);
 
-/// What the core is given; its other fields are left alone.
+/// Writes the values to `config` and leaves its other fields unchanged.
 void brd_settings_to(const brd_settings_t *self, iw_config_t *config);
 
-/// One key. False, with nothing changed and the reason and the cure in `why`, if there is no such key or it cannot have
-/// that value.
+/// Sets one key. Returns false, changes nothing and writes reason and fix to `why` if the key does not exist or cannot
+/// have that value.
 bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, iwn_text_t *why);
 
-/// The value as the file writes it. False if there is no such key, or it is not set.
+/// Writes the value in the form of the configuration file. Returns false if the key does not exist or is not set.
 #define BRD_SETTINGS_TEXT 16U
 bool brd_settings_value(const brd_settings_t *self, const char *key, char out_text[BRD_SETTINGS_TEXT]);
 
-/// The relations between keys. False, with the reason and the cure in `why`, if one does not hold.
+/// Checks the relations between keys. Returns false, and writes reason and fix to `why`, if one does not hold.
 bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why);
 
-/// The list `keys` of the reply to `config`, with the values as the file writes them; null where nothing is set.
+/// Writes the list `keys` of the reply to `config`, with values in the form of the configuration file; null: not set.
 void brd_settings_write(const brd_settings_t *self, iwn_out_t *json);
 
 #endif

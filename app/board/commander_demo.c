@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "commander.h"
 
-/// Both wheels slowly forward, rest, back, and rest: where it began.
+/// Profile: both wheels slowly forward, standstill, back, standstill. It ends at the starting point.
 typedef struct {
     uint32_t until_us;
     int32_t speed_mm_s;
@@ -29,7 +29,7 @@ static int32_t profile_speed_mm_s(brd_commander_t *self, iw_time_us_t now_us) {
     return 0;
 }
 
-/// One button: resets a latch; starts the profile; stops it. A press never does two of these.
+/// The button resets a latch, starts the profile, or stops it. A press never does two of these.
 void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
     const bool press = brd_commander_pressed(self, now_us);
     if (!brd_commander_arm(self, gateway, now_us)) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image that a host drives over the serial line: in the place of a command source, and of report and console, for
-// the serial port is the host's.
+// Image that a host drives over the serial line. It replaces the command source, and also report and console, because
+// the host uses the serial port.
 #include "commander.h"
 
 #include "bit_rate.h"
@@ -15,14 +15,14 @@
 static_assert(BRD_APB1_HZ >= 16U * BRD_SERIAL_BAUD,
               "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
 
-/// 40 % of the line's bytes, so that replies pass.
+/// 40 % of the bytes of the line, so that replies fit too.
 #define RATE_MAX_HZ                                                                                                    \
     ((BRD_SERIAL_BAUD / 25U / BRD_HOST_LINE_BYTES > 0U) ? BRD_SERIAL_BAUD / 25U / BRD_HOST_LINE_BYTES : 1U)
 
 static brd_host_t host;
-static brd_records_t kept;
+static brd_records_t records;
 static bool is_begun;
-static bool is_complete; // It is configured well enough to send.
+static bool is_complete; // The configuration is complete enough to send.
 
 const char *brd_commander_name(void) {
     return "is driven over the serial line";
@@ -33,30 +33,30 @@ bool brd_commander_sends(void) {
     return is_complete;
 }
 
-/// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
-/// number of starts since then is kept in RAM.
+/// The identifier of this start depends on the counter of power-ons, so the counter is written before the identifier is
+/// sent. RAM stores the number of starts since then.
 void brd_commander_open(bool power_on, bool in_motion) {
-    brd_records_open(&kept, power_on, in_motion);
+    brd_records_open(&records, power_on, in_motion);
 }
 
 void brd_commander_configure(iw_config_t *config) {
     brd_settings_t settings;
-    if (brd_records_settings(&kept, &settings)) {
+    if (brd_records_settings(&records, &settings)) {
         brd_settings_to(&settings, config);
     }
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
 bool brd_host_keep(const brd_settings_t *settings) {
-    return brd_records_commit(&kept, settings);
+    return brd_records_commit(&records, settings);
 }
 
 bool brd_host_read_assumptions(brd_assumptions_t *out_learned) {
-    return brd_records_assumptions(&kept, out_learned);
+    return brd_records_assumptions(&records, out_learned);
 }
 
 bool brd_host_write_assumptions(const brd_assumptions_t *learned) {
-    return brd_records_write_assumptions(&kept, learned);
+    return brd_records_write_assumptions(&records, learned);
 }
 
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
@@ -72,7 +72,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .sample_point_permille = (1U + BRD_BIT_BS1) * 1000U / BRD_BIT_QUANTA,
         .settings = brd_settings_from(brd_report_room()->config),
         .rate_max_hz = RATE_MAX_HZ,
-        .boot = brd_boot_id(kept.power_ons),
+        .boot = brd_boot_id(records.power_ons),
     };
     brd_host_init(&host, &place, now_us);
     is_begun = true;
@@ -84,7 +84,7 @@ void brd_commander_step(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us
         begin(gateway, now_us);
     }
     if (brd_host_take(&host, now_us)) {
-        brd_wake(); // More lines wait: once round the loop, with its look at the e-stop, and then they.
+        brd_wake(); // More lines wait. The loop reads the e-stop before the next one.
     }
 }
 
@@ -99,14 +99,14 @@ void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     }
 }
 
-/// The host is told by the event `link`, once there is a clock for the serial line.
+/// The event `link` informs the host as soon as the serial line has a clock.
 void brd_report_start(bool restarted) {
     (void)restarted;
 }
 
 void brd_report_no_crystal(void) {}
 
-/// The internal oscillator is too slow for fast lines and too inexact for all of them.
+/// The internal oscillator is too slow for fast lines and too inaccurate for all of them.
 void brd_console_start(uint32_t apb1_hz) {
     if (apb1_hz == BRD_APB1_HZ) {
         brd_serial_start(apb1_hz);
@@ -117,5 +117,5 @@ bool brd_console_step(void) {
     if (is_begun) {
         brd_serial_step();
     }
-    return false; // The DMA's end wakes the loop.
+    return false; // The end of the DMA transfer wakes the loop.
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The request config: keys are staged, and written to the flash by commit.
+// Request config: it stages keys, and commit writes them to the flash.
 #include "host.h"
 
 static bool stage(brd_host_t *self, iwn_text_t *why) {
@@ -15,7 +15,7 @@ static bool stage(brd_host_t *self, iwn_text_t *why) {
     return true;
 }
 
-/// True if what was asked for is done, or there was nothing to do. `*out_error` else.
+/// Returns true if the request was executed, or there was nothing to do. Otherwise the cause is in `*out_error`.
 static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
     const iwn_request_t *const request = &self->server.request;
     *out_error = IWN_BAD_VALUE;

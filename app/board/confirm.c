@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The assumption ledger for clients: the operator's word on an item, and how an entry is told.
+// Assumption store for clients: confirmation of an item by the operator, and output of an entry.
 #include "host.h"
 
 #include <string.h>
 
-/// Nobody measures a tyre better.
+/// A tyre cannot be measured more accurately than this.
 #define TOLERANCE_PERCENT 2U
 
 static bool is_near(uint32_t found, uint32_t wanted) {
@@ -12,7 +12,7 @@ static bool is_near(uint32_t found, uint32_t wanted) {
     return off * 100U <= wanted * TOLERANCE_PERCENT;
 }
 
-/// Whether what was found is what is in force. Only the item's own key differs between the two.
+/// Returns true if the found value is the one in force. Only the key of the item differs between the two settings.
 static bool is_same(iw_assumption_item_t item, const brd_settings_t *found, const brd_settings_t *wanted) {
     iw_config_t one;
     iw_config_t other;
@@ -30,7 +30,8 @@ static bool is_same(iw_assumption_item_t item, const brd_settings_t *found, cons
     }
 }
 
-/// False, with `self->server.refusal`, if the request's value is none of the item's.
+/// Compares the value of the request with the settings. Returns false, and sets `self->server.refusal`, if the item
+/// cannot have that value.
 static bool compare(brd_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->server.request;
     const char *const key = brd_assumptions_key(request->item);
@@ -67,7 +68,7 @@ void brd_host_write_item(brd_host_t *self, iw_assumption_item_t item, iwn_out_t 
     const bool is_set = key == NULL || brd_settings_value(&self->settings, key, plain);
     iwn_text_add(&text, plain);
     if (item == IW_ASSUMPTION_GEAR_RATIO && brd_settings_value(&self->settings, "wheels.rpm_of", whose)) {
-        IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon says it.
+        IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon writes it.
     }
     iwn_out_text(json, "item", iwn_assumption_item_name(item));
     iwn_out_text(json, "state", iwn_assumption_state_name(entry->state));

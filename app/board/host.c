@@ -17,7 +17,7 @@ void brd_host_observe(brd_host_t *self, const iw_snapshot_t *seen) {
     brd_host_report_assumptions(self, seen);
 }
 
-/// What comes of its leaving is told while it is still known who it was.
+/// Reports the effects of the disconnection while the server still knows the client's name.
 static void end_client(brd_host_t *self, brd_host_client_t *client) {
     if (client->served.id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->server.core, self->server.now_us, client->served.id);
@@ -35,13 +35,13 @@ static void end_all(brd_host_t *self) {
 
 static void open_client(brd_host_t *self, uint8_t channel, bool watches_only) {
     brd_host_client_t *const client = &self->client[channel - 1U];
-    end_client(self, client); // Its close was lost.
+    end_client(self, client); // The close of the former client was lost.
     client->opened_us = self->server.now_us;
     iwn_server_welcome(&client->served, ++self->last_id, watches_only);
     iwn_server_hello(&self->server, &client->served);
 }
 
-/// True with the channel of a client in `*out_channel`.
+/// Returns true, with the channel of a client in `*out_channel`, if the object has one.
 static bool find_channel(iwn_json_t root, uint8_t *out_channel) {
     iwn_json_t value;
     if (!iwn_json_find(root, "channel", &value) || iwn_json_kind(value) != IWN_JSON_INTEGER) {
@@ -52,7 +52,7 @@ static bool find_channel(iwn_json_t root, uint8_t *out_channel) {
     return channel >= 1 && channel <= (int64_t)IWN_LINE_CHANNELS;
 }
 
-/// A command of the relay's. False: it is none.
+/// Executes a command of the relay. Returns false if the object is no such command.
 static bool obey_link(brd_host_t *self, iwn_json_t root) {
     uint8_t channel = 0;
     iwn_json_t cmd;
@@ -64,7 +64,7 @@ static bool obey_link(brd_host_t *self, iwn_json_t root) {
         return true;
     }
     if (iwn_json_is(cmd, "link")) {
-        end_all(self); // Another relay, or the same one begun anew: its clients are not those of before.
+        end_all(self); // Another relay, or the same one after a restart, has other clients.
         brd_host_tell_link(self);
         return true;
     }
@@ -89,7 +89,7 @@ static bool read_object(brd_host_t *self, const char *json, size_t length, iwn_j
            iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
 }
 
-/// A reply or an event: an answer to it could be answered, and so on for ever.
+/// Returns true for a reply or an event. The board does not answer these: the answer could be answered, without end.
 static bool is_answer(brd_host_t *self, const char *json, size_t length) {
     iwn_json_t root;
     iwn_json_t value;
@@ -131,12 +131,12 @@ static void take_line(brd_host_t *self, const iwn_line_t *line) {
     }
 }
 
-/// Before the wheels are heard: what this run measures comes on top.
+/// Restores the learned facts before the wheels are online. The measurements of this run have priority.
 static void recall(brd_host_t *self) {
     brd_assumptions_t learned;
     if (brd_host_read_assumptions(&learned)) {
         brd_assumptions_restore(&learned, &self->settings, self->server.core, self->zero);
-        self->memory = BRD_RECORDS_STORED;
+        self->records = BRD_RECORDS_STORED;
     }
 }
 
@@ -145,10 +145,10 @@ bool brd_host_is_silent(const brd_host_t *self) {
            !iw_gateway_arming(self->server.core);
 }
 
-/// Looks now and then, in the silence, whether there is anything that flash has not.
+/// While nothing is sent, checks periodically whether there are facts that the flash does not contain.
 static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
     brd_assumptions_t now;
-    brd_assumptions_t kept;
+    brd_assumptions_t stored;
     if (!brd_host_is_silent(self) || self->learn_us == 0U || self->restart_us != 0U) {
         self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
         return;
@@ -157,11 +157,11 @@ static void learn(brd_host_t *self, const iw_snapshot_t *seen) {
         return;
     }
     self->learn_us = seen->at_us + BRD_ASSUMPTIONS_PERIOD_US;
-    memset(&kept, 0, sizeof kept);
-    (void)brd_host_read_assumptions(&kept);
+    memset(&stored, 0, sizeof stored);
+    (void)brd_host_read_assumptions(&stored);
     brd_assumptions_note(&now, seen, &self->settings, self->zero);
-    if (brd_assumptions_differs(&now, &kept)) {
-        self->memory = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
+    if (brd_assumptions_differs(&now, &stored)) {
+        self->records = brd_host_write_assumptions(&now) ? BRD_RECORDS_STORED : BRD_RECORDS_FAILED;
     }
 }
 
@@ -173,7 +173,7 @@ void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t
     server->max_age_ms = IWN_MAX_AGE_MS;
     server->rate_max_hz = place->rate_max_hz;
     server->topics =
-        (uint8_t)((1U << IWN_TOPICS) - 1U) & (uint8_t) ~(1U << IWN_TOPIC_FRAME); // The line cannot carry the bus.
+        (uint8_t)((1U << IWN_TOPICS) - 1U) & (uint8_t) ~(1U << IWN_TOPIC_FRAME); // The line is too slow for it.
     server->each_for_itself = true;
     server->now_us = now_us;
     server->estop.line = place->estop;
@@ -221,14 +221,14 @@ bool brd_host_take(brd_host_t *self, iw_time_us_t now_us) {
     return false;
 }
 
-/// One snapshot at a time, replies first, each client in its turn.
+/// Sends one snapshot at a time: replies first, the clients in turn.
 static void pay(brd_host_t *self, const iw_snapshot_t *seen) {
     for (unsigned turn = 0; turn < 2U * IWN_LINE_CHANNELS && !brd_serial_lends(); turn++) {
         const bool reply = turn < IWN_LINE_CHANNELS;
         brd_host_client_t *const client = &self->client[(self->next_owed + turn) % IWN_LINE_CHANNELS];
         bool *const owed = reply ? &client->owed_status : &client->owed_state;
         if ((client->served.topics & (1U << IWN_TOPIC_STATE)) == 0U) {
-            client->owed_state = false; // It watches no more.
+            client->owed_state = false; // It has ended its subscription.
         }
         if (client->served.id != IW_CLIENT_NONE && *owed) {
             *owed = false;

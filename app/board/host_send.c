@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lines to the host: where each is put, and what is dropped.
+// Lines to the host: where each is put, and which are dropped.
 #include "host.h"
 
 #include "serial.h"
@@ -22,8 +22,8 @@ static uint8_t channel_of(const brd_host_t *self, const brd_host_client_t *clien
     return (uint8_t)(client - self->client + 1);
 }
 
-/// Puts channel and stamp right before the JSON at `json`, and the CRC behind it. Where the line begins; its length, 0
-/// if it does not fit.
+/// Puts channel and stamp directly before the JSON at `json`, and the CRC after it. Returns the start of the line.
+/// `*out_length` is its length; 0: it does not fit.
 static const char *frame(brd_host_t *self, uint8_t channel, char *json, size_t length, size_t *out_length) {
     const iwn_line_t line = {.t_us = self->server.now_us, .channel = channel, .stamped = true};
     char prefix[IWN_LINE_PREFIX];
@@ -34,11 +34,11 @@ static const char *frame(brd_host_t *self, uint8_t channel, char *json, size_t l
     return begin;
 }
 
-/// Puts a line of `self->scratch.small` into the ring, leaving `reserve` bytes free.
+/// Puts a line of `self->scratch.small` into the ring, if that leaves `reserve` bytes free. Returns false if not.
 static bool put(brd_host_t *self, uint8_t channel, size_t length, size_t reserve) {
     size_t whole;
     if (length + reserve > brd_serial_room()) {
-        return false; // Without its CRC: that costs time, before the next look at the e-stop.
+        return false; // Skips the CRC, which would delay the next read of the e-stop.
     }
     const char *const line = frame(self, channel, &self->scratch.small[IWN_LINE_PREFIX], length, &whole);
     if (whole == 0U || whole + reserve > brd_serial_room()) {
@@ -48,7 +48,7 @@ static bool put(brd_host_t *self, uint8_t channel, size_t length, size_t reserve
     return brd_serial_write(line, whole);
 }
 
-/// Closes the object. Its length without the newline; 0 if it does not fit.
+/// Closes the object. Returns its length without the newline; 0 if it does not fit.
 static size_t finish(iwn_out_t *json) {
     iwn_out_close(json, '}');
     const size_t length = iwn_out_finish(json);
@@ -68,7 +68,7 @@ void iwn_target_reply(iwn_server_t *server, iwn_client_t *client, char *line, si
     }
 }
 
-/// With the number of those that were dropped before it, once there is room again.
+/// Drops the event while the client has not received the number of events that were dropped before it.
 void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, size_t length) {
     brd_host_t *const self = brd_host_of(server);
     brd_host_client_t *const whose = (brd_host_client_t *)client;
@@ -78,7 +78,7 @@ void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, si
     }
 }
 
-/// Before anything else is told to it: how much it has missed.
+/// Reports the number of dropped lines before any other event.
 void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client) {
     iwn_out_t json = iwn_server_begin_event(&self->server, "lost");
     iwn_out_int(&json, "count", client->lost);
@@ -88,15 +88,15 @@ void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client) {
     }
 }
 
-static void write_memory(const brd_host_t *self, iwn_out_t *json) {
+static void write_records(const brd_host_t *self, iwn_out_t *json) {
     static const char *const states[] = {
         [BRD_RECORDS_NEW] = "new", [BRD_RECORDS_STORED] = "kept", [BRD_RECORDS_FAILED] = "failed"};
     iwn_out_open(json, "memory", '{');
     iwn_out_text(json, "file", "flash");
-    iwn_out_text(json, "state", states[self->memory]);
+    iwn_out_text(json, "state", states[self->records]);
     iwn_out_text(json, "reason",
-                 (self->memory == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
-                                                      : NULL);
+                 (self->records == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
+                                                       : NULL);
     iwn_out_close(json, '}');
 }
 
@@ -104,7 +104,7 @@ static void write_assumptions(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_open(json, "ledger", '{');
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         iwn_out_open(json, iwn_assumption_item_name((iw_assumption_item_t)item), '{');
-        // No more of it: while a snapshot is written, the e-stop waits.
+        // Only these fields, because the e-stop is not read while a snapshot is written.
         iwn_out_text(json, "state", iwn_assumption_state_name(seen->assumed[item].state));
         iwn_out_text(json, "evidence", iwn_source_name(seen->assumed[item].source));
         iwn_out_close(json, '}');
@@ -114,7 +114,7 @@ static void write_assumptions(const iw_snapshot_t *seen, iwn_out_t *json) {
 
 void iwn_target_write_assumptions(iwn_server_t *server, const iw_snapshot_t *seen, iwn_out_t *json) {
     write_assumptions(seen, json);
-    write_memory(brd_host_of(server), json);
+    write_records(brd_host_of(server), json);
     iwn_out_null(json, "gaps");
 }
 
@@ -133,7 +133,6 @@ void brd_host_send_status(brd_host_t *self, brd_host_client_t *client, const iw_
     }
 }
 
-/// Who speaks here: on the link, whatever client there is.
 void brd_host_tell_link(brd_host_t *self) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_out_t json = iwn_server_begin_event(&self->server, "link");

@@ -11,7 +11,8 @@ static size_t place_of(const brd_pending_t *self, iw_client_t client, iwn_cmd_t 
     return at;
 }
 
-/// BRD_PENDING_MAX: none. The last places are those of arms, so that neither kind uses up the other's.
+/// Returns BRD_PENDING_MAX if no place is free. The last places are for arms, so that neither kind uses up the places
+/// of the other.
 static size_t free_place(const brd_pending_t *self, iwn_cmd_t cmd) {
     const bool arms = cmd == IWN_CMD_ARM;
     const size_t end = arms ? BRD_PENDING_MAX : IWN_LINE_CHANNELS;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// The ids of requests whose answers wait: an arm for its TX confirmation, a status for the long line. One pool for all
-/// clients, since an id takes 88 bytes and hardly ever more than one arm waits.
+/// Ids of requests whose replies wait: an arm for its TX confirmation, a status for the long line. All clients share
+/// one pool, because an id takes 88 bytes, and more than one arm rarely waits.
 ///
-/// Pure, no heap. All zero: nobody waits.
+/// Pure, no heap. All zero: no reply waits.
 #ifndef BRD_PENDING_H
 #define BRD_PENDING_H
 
@@ -10,7 +10,7 @@
 #include "iwheel_northbound/line.h"
 #include "iwheel_northbound/request.h"
 
-/// A status of every channel, and as many arms: one that waits, and one that takes the lease over.
+/// One status for every channel, and two arms: one that waits, and one that takes over the lease.
 #define BRD_PENDING_ARMS 2U
 #define BRD_PENDING_MAX  (IWN_LINE_CHANNELS + BRD_PENDING_ARMS)
 
@@ -24,17 +24,18 @@ typedef struct {
     brd_pending_place_t place[BRD_PENDING_MAX];
 } brd_pending_t;
 
-/// True if an answer to this client's `cmd` can wait: one of it waits already, or there is a place.
+/// Returns true if the reply to this client's `cmd` can wait: one already waits, or a place is free.
 bool brd_pending_has_room(const brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
 
-/// The answer waits, in the place of an earlier one to the same client's `cmd`. Only where there is room.
+/// Stores the id of a reply that waits. It replaces that of an earlier one to the same client and `cmd`. Call it only
+/// if there is room.
 void brd_pending_put(brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd, const iwn_id_t *id);
 
-/// The answer is given now: its place is free, and the id good until the next `brd_pending_put`. An id of no kind if
-/// none waits.
+/// Removes a waiting reply and returns its id, which is valid until the next `brd_pending_put`. Returns an id of kind
+/// IWN_ID_NONE if none waits.
 const iwn_id_t *brd_pending_take(brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
 
-/// The client is gone: nothing waits for it any more.
+/// Removes the waiting replies of a client that has disconnected.
 void brd_pending_forget(brd_pending_t *self, iw_client_t client);
 
 #endif

@@ -36,7 +36,7 @@ static const char *item_choice(unsigned number) {
 
 static const char *verb_choice(unsigned number);
 
-/// The page of a verb is the file of its name in help/.
+/// The page of a verb is the file with its name in help/.
 #define VERB(name_, run_) .name = #name_, .run = (run_), .page = help_##name_
 
 static const verb_t verbs[] = {
@@ -99,21 +99,21 @@ int help_unknown(const char *name) {
                           : ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", name, known);
 }
 
-/// What follows the name in the usage at the page's beginning.
+/// Returns the part of the usage line that follows the verb's name, and its length.
 static size_t words_of(const verb_t *verb, const char **out_words) {
     *out_words = verb->page + strlen("Usage: iwheelctl [--socket PATH]") +
                  strlen((verb->no_json == NULL) ? " [--json] " : " ") + strlen(verb->name);
     return (size_t)(strstr(*out_words, "\n\n") - *out_words);
 }
 
-/// The line behind the usage, without the name.
+/// Returns the line after the usage, without the name, and its length.
 static int summary_of(const verb_t *verb, const char **out_summary) {
     *out_summary = strstr(verb->page, "\n\n") + 2U + strlen(verb->name) + 2U;
     return (int)strcspn(*out_summary, "\n");
 }
 
 void help_print(FILE *out) {
-    static const char mark[] = "\nVERBS\n"; // Where they stand in the file.
+    static const char mark[] = "\nVERBS\n"; // Place of the verbs in the file.
     const char *const at = strstr(help_iwheelctl, mark) + 1U;
     (void)fprintf(out, "%.*s", (int)(at - help_iwheelctl), help_iwheelctl);
     for (size_t i = 0; i < VERBS; i++) {
@@ -124,7 +124,7 @@ void help_print(FILE *out) {
     (void)fputs(at + strlen(mark) - 1U, out);
 }
 
-/// The options in the verb's usage, and FILE and BUS where it takes such.
+/// Prints the options in the verb's usage, and FILE and BUS if it accepts them.
 static void list_words(const verb_t *verb, FILE *out) {
     char words[256];
     const char *begin = NULL;

@@ -9,13 +9,14 @@
 typedef struct {
     ctl_t *ctl;
     const char *verb;
-    char **words; ///< What is not for us, after the verb.
+    char **words; ///< Arguments of the verb.
     int count;
     bool help;
     bool version;
 } arguments_t;
 
-/// Takes one of the options that stand anywhere. How many arguments it used; 0: it is none of them; -1 after telling a mistake.
+/// Reads an option that is allowed anywhere. Returns the number of arguments that it used; 0: it is another argument;
+/// -1 after it has reported a mistake.
 static int take_option(arguments_t *self, int left, char **argument) {
     static const char socket[] = "--socket";
     const size_t length = sizeof socket - 1U;
@@ -39,7 +40,7 @@ static int take_option(arguments_t *self, int left, char **argument) {
     return 1;
 }
 
-/// False after telling a mistake.
+/// Reads the arguments. Returns false after it has reported a mistake.
 static bool take_arguments(arguments_t *self, int count, char **arguments) {
     for (int i = 1; i < count;) {
         const int used = take_option(self, count - i, &arguments[i]);

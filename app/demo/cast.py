@@ -39,11 +39,7 @@ class Driver:
         self.output = rig.path(f"driver{number}.out")
         with open(self.output, "wb") as file:
             self.child = subprocess.Popen(
-                [sys.executable, os.path.join(HERE, "driver.py"), rig.path("gateway.sock")],
-                stdin=subprocess.PIPE,
-                stdout=file,
-                stderr=file,
-                preexec_fn=prepare,
+                [sys.executable, os.path.join(HERE, "driver.py"), rig.path("gateway.sock")], stdin=subprocess.PIPE, stdout=file, stderr=file, preexec_fn=prepare
             )
 
     def want(self, left, right):

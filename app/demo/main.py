@@ -85,10 +85,7 @@ def report(story, rig, error, sleeper):
     print(f"\nFAILED in step {story.number} of {TOTAL}: {text}", file=sys.stderr)
     if sleeper.worst_s > STALL_S:
         stall_ms = sleeper.worst_s * 1000
-        print(
-            f"This machine was stalled for {stall_ms:.0f} ms meanwhile; try again when it is less busy.",
-            file=sys.stderr,
-        )
+        print(f"This machine was stalled for {stall_ms:.0f} ms meanwhile; try again when it is less busy.", file=sys.stderr)
 
 
 class Interrupts:

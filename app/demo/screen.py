@@ -117,10 +117,7 @@ class Screen:
         return [f" {mark} {tint(line, 2) if old else line}" for mark, line in zip(marks, lines, strict=False)]
 
     def _head(self):
-        left, right = (
-            " iWheel: the real gateway, two simulated wheels",
-            f"{self.number} of {self.total}   {self.elapsed_s:5.1f} s ",
-        )
+        left, right = (" iWheel: the real gateway, two simulated wheels", f"{self.number} of {self.total}   {self.elapsed_s:5.1f} s ")
         return tint(left + " " * (80 - len(left) - len(right)) + right, 7)
 
     def _state(self):
@@ -179,10 +176,7 @@ class Screen:
             if 0 <= row < MAP_HEIGHT and 0 <= column < MAP_WIDTH:
                 grid[row][column] = chr(0x2800 + sum(parts)) if self.glyphs.braille else "."
         if self.path:
-            row, column = (
-                int(down / 2 - (points[-1][1] - middle[1]) * scale) // 4,
-                int(across / 2 + (points[-1][0] - middle[0]) * scale) // 2,
-            )
+            row, column = (int(down / 2 - (points[-1][1] - middle[1]) * scale) // 4, int(across / 2 + (points[-1][0] - middle[0]) * scale) // 2)
             arrow = self.glyphs.arrows[round(self.path[-1][2] / (math.pi / 4)) % 8]
             if 0 <= row < MAP_HEIGHT and 0 <= column < MAP_WIDTH:
                 grid[row][column] = tint(arrow, 33, 1)
@@ -198,10 +192,7 @@ def choose(out, plain):
     if plain or not out.isatty():
         return Lines(out)
     if size.columns < 80 or size.lines < 24:
-        print(
-            f"this terminal has {size.columns} x {size.lines} characters; drawn from 80 x 24 on, so here come plain lines",
-            file=out,
-        )
+        print(f"this terminal has {size.columns} x {size.lines} characters; drawn from 80 x 24 on, so here come plain lines", file=out)
         return Lines(out)
     return Screen(out)
 

@@ -84,10 +84,7 @@ class Story:
         self.why()
 
     def find_wheels(self):
-        self.step(
-            "Finding the wheels",
-            "Simulator and gateway start. The gateway only listens: it sends nothing until somebody arms it.",
-        )
+        self.step("Finding the wheels", "Simulator and gateway start. The gateway only listens: it sends nothing until somebody arms it.")
         answered_ms = self.rig.start_gateway(wheels=False)
         self.client = self.rig.client("demo")
         self.client.request("watch", topics=["state"], rate_hz=20)
@@ -102,15 +99,9 @@ class Story:
             "Learning the force sensors' zero",
             "Each wheel takes the mean force of its first two seconds as its zero and sends it for a minute. Nobody leans on the handles, so it is a good one.",
         )
-        known = self.watch(
-            6,
-            lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None for side in ("left", "right")),
-        )
+        known = self.watch(6, lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None for side in ("left", "right")))
         offsets = [self.status[side]["force_offset_mN"] for side in ("left", "right")]
-        self.require(
-            known,
-            f"offsets: left {(offsets[0] or 0) / 1000:.1f} N, right {(offsets[1] or 0) / 1000:.1f} N, sent by the wheels",
-        )
+        self.require(known, f"offsets: left {(offsets[0] or 0) / 1000:.1f} N, right {(offsets[1] or 0) / 1000:.1f} N, sent by the wheels")
         self.rig.sim.ask("load both 60")
         self.watch(1.2)
         net = [self.status[side]["force_net_mN"] for side in ("left", "right")]
@@ -123,10 +114,7 @@ class Story:
         self.watch(0.8)
 
     def arm(self):
-        self.step(
-            "Arming",
-            "A joystick program asks for the right to drive. From now on both wheels hear a setpoint every 20 ms; zero, so far.",
-        )
+        self.step("Arming", "A joystick program asks for the right to drive. From now on both wheels hear a setpoint every 20 ms; zero, so far.")
         driver = self.driver()
         self.require(True, f"armed; {self.status['lease']['name']} holds the lease")
         budget = self.status["budget"]
@@ -143,34 +131,20 @@ class Story:
         return driver
 
     def forward(self, driver):
-        self.step(
-            "Driving forward",
-            "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is what the wheels measure.",
-        )
+        self.step("Driving forward", "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is what the wheels measure.")
         driver.want(400, 400)
         self.watch(3.0)
         left, right = self.measured()
-        self.require(
-            self.near(400, 400),
-            f"left {left} and right {right} mm/s measured",
-            f"400/400 mm/s, measured {left}/{right}",
-        )
+        self.require(self.near(400, 400), f"left {left} and right {right} mm/s measured", f"400/400 mm/s, measured {left}/{right}")
 
     def turn(self, driver):
-        self.step(
-            "A turn to the left",
-            "The right wheel is told to run faster than the left one. Both change together, so the curve is smooth.",
-        )
+        self.step("A turn to the left", "The right wheel is told to run faster than the left one. Both change together, so the curve is smooth.")
         driver.want(180, 480)
         before = self.status["pose"]["psi_mrad"]
         self.watch(3.2)
         left, right = self.measured()
         turned = self.status["pose"]["psi_mrad"] - before
-        self.require(
-            self.near(180, 480),
-            f"left {left} and right {right} mm/s measured",
-            f"180/480 mm/s, measured {left}/{right}",
-        )
+        self.require(self.near(180, 480), f"left {left} and right {right} mm/s measured", f"180/480 mm/s, measured {left}/{right}")
         self.require(abs(turned) > 500, f"the machine has turned by {abs(turned) * 180 / 3141.6:.0f} degrees")
         driver.want(400, 400)
         self.watch(1.4)
@@ -187,21 +161,14 @@ class Story:
         setpoints = self.rig.bus.setpoints(killed_us)
         slower_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed < 395), 9999)
         zero_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed == 0), 9999)
-        self.require(
-            stopped and slower_ms < 100,
-            f"the first slower setpoint was on the bus after {slower_ms:.0f} ms",
-            f"ramp after {slower_ms:.0f} ms",
-        )
+        self.require(stopped and slower_ms < 100, f"the first slower setpoint was on the bus after {slower_ms:.0f} ms", f"ramp after {slower_ms:.0f} ms")
         self.require(zero_ms < 900, f"zero after {zero_ms:.0f} ms, without a jerk", f"zero after {zero_ms:.0f} ms")
         silent = self.watch(4, lambda s: s["state"] == "listening")
         self.require(silent and self.near(0, 0), "the wheels stand, the gateway is silent")
         self.watch(1.0)
 
     def press(self):
-        self.step(
-            "E-stop",
-            "Another drive at 500 mm/s, and somebody presses the button. Now there is no ramp: zero at once, and it stays.",
-        )
+        self.step("E-stop", "Another drive at 500 mm/s, and somebody presses the button. Now there is no ramp: zero at once, and it stays.")
         driver = self.driver()
         driver.want(500, 500)
         if not self.watch(4, lambda s: self.near(500, 500, s)):
@@ -210,37 +177,20 @@ class Story:
         pressed_us = self.rig.press()
         latched = self.watch(1, lambda s: s["state"] == "latched")
         zeros = [
-            next(
-                ((t - pressed_us) / 1000 for t, name, speed in self.rig.bus.setpoints(pressed_us) if name == wanted and speed == 0),
-                9999,
-            )
+            next(((t - pressed_us) / 1000 for t, name, speed in self.rig.bus.setpoints(pressed_us) if name == wanted and speed == 0), 9999)
             for wanted in (266, 298)
         ]
-        self.require(
-            latched and max(zeros) < 50,
-            f"both wheels were told zero {max(zeros):.1f} ms after the press",
-            f"zero after {max(zeros):.1f} ms",
-        )
+        self.require(latched and max(zeros) < 50, f"both wheels were told zero {max(zeros):.1f} ms after the press", f"zero after {max(zeros):.1f} ms")
         self.watch(0.4)
-        self.require(
-            "refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(),
-            "the joystick program is refused from then on",
-        )
+        self.require("refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(), "the joystick program is refused from then on")
         stands = self.watch(3, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
         self.require(stands, "the wheels stand")
         self.watch(1.0)
 
     def reset(self):
-        self.step(
-            "Reset, too early and in time",
-            "A reset leads back to listening, not to motion. It is refused as long as something speaks against it.",
-        )
+        self.step("Reset, too early and in time", "A reset leads back to listening, not to motion. It is refused as long as something speaks against it.")
         reply = self.client.request("reset")
-        self.require(
-            not reply["ok"] and reply["error"] == "estop_pressed",
-            f"refused: {reply.get('message')}",
-            f"reset while pressed: {reply}",
-        )
+        self.require(not reply["ok"] and reply["error"] == "estop_pressed", f"refused: {reply.get('message')}", f"reset while pressed: {reply}")
         self.watch(2.2)
         self.rig.release()
         self.watch(1.0)
@@ -265,11 +215,7 @@ class Story:
             timeout=5,
             check=False,
         )
-        self.require(
-            tool.returncode == 0 and "500" in tool.stdout.split("\n")[0],
-            tool.stdout.splitlines()[0],
-            f"why: {tool.stdout}",
-        )
+        self.require(tool.returncode == 0 and "500" in tool.stdout.split("\n")[0], tool.stdout.splitlines()[0], f"why: {tool.stdout}")
         self.watch(2.5)
 
     def judge(self):

@@ -14,23 +14,23 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-/// Every descriptor at once, so that one that is not told of has nothing to tell.
+/// One event per descriptor, so that a descriptor without an event has nothing to read.
 #define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 7)
 
-/// While setpoints leave, bus and e-stop are looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
-/// While one of them waits for its echo, more often.
+/// While setpoints are sent, bus and e-stop are read at this interval even without a wake-up, because a GPIO chip that
+/// disappears causes none. While a setpoint waits for its echo, the interval is shorter.
 #define LOOK_US      3000U
 #define ECHO_LOOK_US 1000U
-/// The same while nothing is sent, if frames wait.
+/// The same interval while nothing is sent, if frames wait.
 #define REST_LOOK_US 6000U
-/// Frames that have not come for so long wake us again: nobody looks for nothing.
+/// After this time without frames the bus wakes the loop again, so that the loop does not poll without need.
 #define FRAMES_GONE_US 20000U
 #define BOX_LOOK_US    100000U
-/// What comes so late may have slept: the machine was suspended.
+/// After a lateness of this size the machine may have been suspended.
 #define ASLEEP_US 500U
-/// Both clocks are read this often in any case.
+/// Interval of reading both clocks in any case.
 #define CLOCKS_US 1000000U
-/// A crash marker that cannot be set or removed is tried again.
+/// Interval of attempts to set or remove a crash marker.
 #define MARK_AGAIN_US 100000U
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
@@ -80,7 +80,8 @@ void gw_loop_close(gw_daemon_t *daemon) {
 
 /// Leaves SERVES.
 static void shut_down(gw_daemon_t *daemon, gw_loop_phase_t phase) {
-    // Whatever is sent now would have become a hold: a ramp, and the zeros for a process that died.
+    // With a hold the gateway would continue to send; the ramp and the zeros on behalf of a process that died would
+    // also become a hold.
     if (daemon->config.core.hold && gw_wheels_are_sent_to(&daemon->wheels)) {
         sock_log(&daemon->log, SOCK_LOG_WARNING,
                  "the zeros of after_stop = hold end with the gateway, and then the machine rolls on a slope: use its "
@@ -101,7 +102,7 @@ static void take_signal(gw_daemon_t *daemon) {
     }
 }
 
-/// Root's and the service's gateways do not wait for one of another user's.
+/// Gateways of root and of the service do not wait for a gateway of another user.
 static void give_way(gw_daemon_t *daemon) {
     const gw_holder_t *holder = &daemon->runtime.lock.holder;
     if (daemon->loop.phase == GW_LOOP_SERVES && gw_bus_lock_poll(&daemon->runtime.lock, daemon->wheels.now_us)) {
@@ -113,8 +114,8 @@ static void give_way(gw_daemon_t *daemon) {
     }
 }
 
-/// Once something has been handed over, and not before: the start after a crash sends nothing if nothing was sent. What is handed over
-/// first is a zero pair, and another step comes before anything else.
+/// Returns true after the first accepted frame: a start after a crash sends nothing if nothing was sent before. The
+/// first frames are a zero pair, and another step precedes everything else.
 static bool needs_marker(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     if (!gw_wheels_are_sent_to(&daemon->wheels)) {
         daemon->loop.silent_pairs = seen->sent->pairs;
@@ -123,7 +124,7 @@ static bool needs_marker(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     return daemon->runtime.marked || seen->sent->pairs != daemon->loop.silent_pairs;
 }
 
-/// What has failed is told once and tried again.
+/// A failure is logged once and tried again.
 static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     const bool needed = needs_marker(daemon, seen);
     if (daemon->config.core.listen_only || daemon->wheels.now_us < daemon->loop.mark_us) {
@@ -143,7 +144,7 @@ static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     daemon->loop.mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
 }
 
-/// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
+/// During a suspend of the machine the monotonic clock stopped, but the wheels did not.
 static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     if (suspended_us > daemon->loop.suspended_us + IW_GATEWAY_LATE_US) {
         gw_wheels_slept(&daemon->wheels, suspended_us - daemon->loop.suspended_us);
@@ -155,15 +156,15 @@ static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     }
 }
 
-/// The next of looks no further apart than `most_us`, the last of which comes at `until_us`: none right before it, which would hold
-/// it up.
+/// Returns the time of the next reading: at most `most_us` apart, with the last one at `until_us`. There is none
+/// shortly before it, which would delay it.
 static iw_time_us_t evenly(iw_time_us_t now_us, iw_time_us_t until_us, iw_time_us_t most_us) {
     const iw_time_us_t left_us = (until_us > now_us) ? until_us - now_us : 0U;
     return (left_us > most_us) ? now_us + left_us / ((left_us + most_us - 1U) / most_us) : now_us + most_us;
 }
 
-/// Frames may wait while nothing depends on one of them immediately. Every step reads them before it judges, and what it judges is tens of
-/// milliseconds old. The e-stop and the clients always wake the loop.
+/// Frames may wait while nothing depends on one of them immediately. Every step receives them before it judges, and its
+/// limits are tens of milliseconds. The e-stop and the clients always wake the loop.
 static gw_pace_t pace_of(const gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     if (!gw_wheels_are_sent_to(&daemon->wheels)) {
         return GW_PACE_RESTING;
@@ -180,7 +181,7 @@ static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
                         : evenly(seen->at_us, daemon->wheels.step_us, echo_waits ? ECHO_LOOK_US : LOOK_US);
 }
 
-/// By one clock, in which a suspend shows as lateness: what is late is looked at by both, and all is now and then.
+/// Reads one clock, in which a suspend appears as lateness. After a lateness, and periodically, it reads both.
 static void read_clock(gw_daemon_t *daemon) {
     const iw_time_us_t now_us = iwl_clock_awake_us(daemon->loop.suspended_us);
     if (now_us < daemon->loop.awaited_us + ASLEEP_US && now_us < daemon->loop.clocks_us) {
@@ -193,7 +194,7 @@ static void read_clock(gw_daemon_t *daemon) {
     note_suspend(daemon, suspended_us);
 }
 
-/// The core's cycle, and what follows from it at once.
+/// Runs the cycle of the core, and its immediate effects.
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
     iwl_hal_poll(&wheels->hal, wheels->now_us);
@@ -216,7 +217,7 @@ static bool looks(const gw_daemon_t *daemon) {
            (daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels));
 }
 
-/// When there is something to do though nothing comes; 0: at once.
+/// Returns the time of the next action without input; 0 for immediately.
 static iw_time_us_t next_us(gw_daemon_t *daemon) {
     if (daemon->wheels.requested || sock_service_is_busy(&daemon->clients)) {
         return 0;
@@ -228,7 +229,7 @@ static iw_time_us_t next_us(gw_daemon_t *daemon) {
     return looks(daemon) ? earlier(next_us, daemon->loop.look_us) : next_us;
 }
 
-/// Whether the bus is to wake us. Frames that keep coming wait, unless somebody watches them.
+/// Sets whether the bus wakes the loop. Frames that arrive regularly may wait, unless a client watches them.
 static void handle_bus(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     if (wheels->tape.tapped > 0U) {
@@ -244,7 +245,7 @@ static void handle_bus(gw_daemon_t *daemon) {
     }
 }
 
-/// Notes what the wait has found; nothing is done about it yet.
+/// Records the results of the wait, and does not act on them yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     switch (event->data.u64) {
     case SOCK_TAG_SIGNAL:
@@ -256,7 +257,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     case SOCK_TAG_BOX:
         daemon->loop.box_look_us = 0;
         return false;
-    case SOCK_TAG_BUS: // Looked at in every cycle.
+    case SOCK_TAG_BUS: // Read in every cycle.
     case SOCK_TAG_ESTOP:
         return false;
     default: {
@@ -273,7 +274,7 @@ static bool has_come_to_rest(const gw_daemon_t *daemon) {
     return daemon->loop.phase != GW_LOOP_SERVES && !gw_wheels_are_sent_to(&daemon->wheels);
 }
 
-/// Told of by the wait, unless the writer had to be started anew: then by a look now and then.
+/// Receives from the writer after an event, or periodically if the writer was restarted.
 static void listen_to_writer(gw_daemon_t *daemon) {
     if (daemon->wheels.now_us >= daemon->loop.box_look_us) {
         daemon->loop.box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
@@ -286,8 +287,9 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     }
 }
 
-/// Who drives, if it has said something while nothing else is due: its command is heard before the look at bus and e-stop, which
-/// then judges it too, so that it leaves after one look and not after two. NULL: the look comes first.
+/// Returns the lease holder if it has sent something while nothing else is due. Its command is executed before the
+/// reading of bus and e-stop, which then judges it too, so that it is sent after one reading instead of two. Returns
+/// NULL if the reading comes first.
 static sock_client_t *heard_first(gw_daemon_t *daemon) {
     const gw_wheels_t *wheels = &daemon->wheels;
     const bool due = wheels->now_us >= wheels->step_us || wheels->requested;
@@ -297,7 +299,7 @@ static sock_client_t *heard_first(gw_daemon_t *daemon) {
     return (holder != NULL && holder->readable && !holder->leaving) ? holder : NULL;
 }
 
-/// The core's step, in which everything is looked at before anything leaves.
+/// Runs the step of the core, which reads everything before it sends.
 static void hear_and_step(gw_daemon_t *daemon, iwl_reported_t told) {
     sock_client_t *first = told.estop ? NULL : heard_first(daemon);
     told.estop = told.estop || first != NULL; // Edges since the wait count too.
@@ -312,7 +314,7 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     sock_service_clients(&daemon->clients, daemon->loop.holder);
     if (daemon->wheels.requested) {
         read_clock(daemon);
-        step(daemon); // A new command leaves at once.
+        step(daemon); // A new command is sent immediately.
     }
     if (somebody_knocks) {
         sock_service_accept(&daemon->clients);
@@ -332,14 +334,14 @@ int gw_loop_run(gw_daemon_t *daemon) {
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
         daemon->loop.awaited_us = next_us(daemon);
-        // What leaves has its time; all else may come later by as long as this cycle took.
+        // Setpoints are sent in time; everything else may be late by the duration of this cycle.
         const iw_time_us_t now_us = gw_wheels_are_sent_to(&daemon->wheels) ? 0U : daemon->wheels.now_us;
         const int count = sock_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->loop.awaited_us);
         if (count < 0 && errno != EINTR) {
             return errno;
         }
         bool somebody_knocks = false;
-        // Interrupted, it has found nothing out.
+        // An interrupted wait has no result.
         iwl_reported_t told = {.bus = count < 0, .estop = count < 0};
         read_clock(daemon);
         daemon->clients.now_us = daemon->wheels.now_us;

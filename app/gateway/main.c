@@ -49,7 +49,7 @@ static int start_core(gw_daemon_t *daemon) {
     return 0;
 }
 
-/// Who only watches must not keep anybody from driving: without its socket the gateway serves all the same.
+/// Watchers must not prevent driving: without their socket the gateway serves anyway.
 static void listen_to_watchers(gw_daemon_t *daemon) {
     const sock_listener_config_t wanted = gw_report_socket(&daemon->config, SOCK_WATCH);
     sock_listener_t *watch = &daemon->clients.listener[SOCK_WATCH];
@@ -70,7 +70,7 @@ static void tell_start(gw_daemon_t *daemon) {
     }
 }
 
-/// Everything between the start of the core and the loop, in the reverse order at the end.
+/// Starts everything between the core and the loop, and ends it in reverse order.
 static int serve(gw_daemon_t *daemon) {
     int result = sock_listener_open(&daemon->clients.listener[SOCK_DRIVE], &daemon->log, stderr);
     if (result != 0) {
@@ -104,14 +104,14 @@ static int serve(gw_daemon_t *daemon) {
     return result;
 }
 
-/// The configuration in force, as its file would be; NULL: no memory. To be freed.
+/// Returns the configuration as a file; NULL if there is no memory. The caller frees it.
 static char *print_config(const gateway_config_t *config) {
     char *text = NULL;
     size_t size;
-    FILE *memory = open_memstream(&text, &size);
-    if (memory != NULL) {
-        gateway_config_print(config, memory);
-        (void)fclose(memory);
+    FILE *stream = open_memstream(&text, &size);
+    if (stream != NULL) {
+        gateway_config_print(config, stream);
+        (void)fclose(stream);
     }
     return text;
 }

@@ -1,38 +1,38 @@
 // SPDX-License-Identifier: MIT
-/// What was on the bus, as a candump log: `(seconds.micros) sim ID#DATA`, stamped on CLOCK_MONOTONIC when the frame
-/// ended.
+/// Log of the frames on the bus in candump format: `(seconds.micros) sim ID#DATA`. The stamp is CLOCK_MONOTONIC at the
+/// end of the frame.
 ///
-/// Between the frames, lines that begin with `# seconds.micros` tell what was done to the world: every fault, every
-/// press of the button, every `log mark`. Written in blocks at most SIM_LOG_HOLD_US after the frame.
+/// Between the frames, lines that begin with `# seconds.micros` report each change of the world: every fault, every
+/// press of the button, every `log mark`. Lines are written in blocks, at most SIM_LOG_HOLD_US after the frame.
 #ifndef SIM_BUS_LOG_H
 #define SIM_BUS_LOG_H
 
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
-/// Nothing waits longer than this to be written.
+/// Longest time for which a line waits before it is written.
 #define SIM_LOG_HOLD_US 20000U
 #define SIM_LOG_BUFFER  65536U
 
 typedef struct {
-    iw_time_us_t oldest_us; ///< IW_NEVER: nothing waits.
+    iw_time_us_t oldest_us; ///< Time of the oldest waiting line; IW_NEVER: no line waits.
     size_t used;
     int fd; ///< -1: no log.
     bool tell_direction;
     char buffer[SIM_LOG_BUFFER];
 } sim_bus_log_t;
 
-/// `path` NULL: no log; "-": standard output. With `tell_direction` a line ends in " T" (a client sent it) or " R".
-/// False, with errno, if the file cannot be made.
+/// Opens the log. `path` NULL: no log; "-": standard output. With `tell_direction` a line ends in " T" (a client sent
+/// the frame) or " R". Returns false, with errno, if the file cannot be created.
 bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool tell_direction);
 
 void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_frame_t *frame, bool from_client);
 void sim_bus_log_mark(sim_bus_log_t *self, iw_time_us_t at_us, const char *text);
 
-/// Writes what waits if it is old enough; when to call again.
+/// Writes the waiting lines if they are old enough. Returns the time of the next call; IW_NEVER if no line waits.
 iw_time_us_t sim_bus_log_step(sim_bus_log_t *self, iw_time_us_t now_us);
 
-/// Writes all that waits. A file that refuses is told on standard error, once, and ends the log.
+/// Writes all waiting lines. If the file cannot be written, this is printed on standard error once, and the log ends.
 void sim_bus_log_flush(sim_bus_log_t *self);
 
 #endif

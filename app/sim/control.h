@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// The control socket: a unix stream socket, one command a line, one answer to each (see panel.h).
+/// Control socket: a unix stream socket with one command per line and one answer to each command (see panel.h).
 ///
-/// A line longer than SIM_LINE_BYTES, or a client that does not read its answers, ends that connection.
+/// The simulator closes a connection if a line is longer than SIM_LINE_BYTES, or if the client does not read its
+/// answers.
 #ifndef SIM_CONTROL_H
 #define SIM_CONTROL_H
 
@@ -21,12 +22,12 @@ typedef struct sim_control {
     sim_listener_t listener;
     sim_control_client_t client[SIM_CONTROL_CLIENTS];
     const sim_loop_t *loop;
-    /// Does what the line says; the answer stays valid until the next call.
+    /// Executes the command in `line`. The answer stays valid until the next call.
     const char *(*execute)(void *context, const char *line);
     void *context;
 } sim_control_t;
 
-/// `loop`, `execute` and `context` must be set.
+/// Opens the socket. `loop`, `execute` and `context` must be set. Returns false, with the reason, if that fails.
 bool sim_control_open(sim_control_t *self, const char *path, sim_reason_t *out_reason);
 void sim_control_close(sim_control_t *self);
 

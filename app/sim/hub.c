@@ -7,9 +7,9 @@
 #include <string.h>
 #include <sys/socket.h>
 
-/// Messages taken from one client before the others have their turn.
+/// Maximum number of messages read from one client before the other clients have their turn.
 #define BATCH 32
-/// What `__res0` tells.
+/// Values of `__res0`.
 #define MARK_NONE   0U
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
@@ -105,7 +105,7 @@ static void client_ready(sim_watch_t *watch) {
     }
 }
 
-/// Gives the connection a free place; false if there is none.
+/// Connects the new client to a free port of the world. Returns false if the hub cannot accept it.
 static bool admit(void *owner, int fd) {
     sim_hub_t *const self = owner;
     uint8_t const port = self->down ? SIM_BUS_NONE : sim_world_connect(self->world);

@@ -7,9 +7,9 @@
 
 typedef struct {
     char key;
-    const char *what; ///< What the key does.
+    const char *what; ///< Description of the key.
     const char *set;
-    const char *undo; ///< NULL: nothing to be taken back.
+    const char *undo; ///< NULL: the command cannot be undone.
 } sim_key_t;
 
 #define NORMAL "normal"
@@ -38,7 +38,7 @@ static const sim_key_t keys[] = {
 
 _Static_assert(KEYS <= 32U, "one bit each");
 
-/// The table on the screen; a star marks what is on.
+/// Prints the table; a star marks each key whose fault is on.
 static void show(const sim_keys_t *self) {
     for (size_t i = 0U; i < KEYS; i++) {
         bool const last = i % COLUMNS == COLUMNS - 1U || i == KEYS - 1U;
@@ -85,7 +85,7 @@ static bool is_ours(int fd) {
 static void typed(sim_watch_t *watch) {
     sim_keys_t *const self = watch->owner;
     char letters[16];
-    // In the background a read would stop the whole process.
+    // A read in the background would stop the whole process.
     ssize_t const length = (watch->fd >= 0 && is_ours(watch->fd)) ? read(watch->fd, letters, sizeof letters) : 0;
     if (length <= 0 && watch->fd >= 0) {
         let_go(self);

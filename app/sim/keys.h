@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// Faults at the touch of a key, while the simulator is in the foreground of a terminal.
+/// Keys that set and clear faults while the simulator runs in the foreground of a terminal.
 ///
-/// A key stands for a command of the panel and, pressed again, for the one that takes it back. What others do through the control
-/// socket is not followed; `normal` clears all.
+/// The first press of a key executes a command of the panel, the second press the command that undoes it. Commands from
+/// the control socket do not change the state of the keys; the key of `normal` clears all.
 #ifndef SIM_KEYS_H
 #define SIM_KEYS_H
 
@@ -12,20 +12,20 @@
 #include <termios.h>
 
 typedef struct {
-    sim_watch_t watch; ///< Of standard input; fd -1: no keys.
+    sim_watch_t watch; ///< Watch of standard input; fd -1: no keys.
     const sim_loop_t *loop;
-    /// Does what the line says; the answer begins with "error" if it cannot.
+    /// Executes the command in `line`. The answer begins with "error" if that fails.
     const char *(*execute)(void *context, const char *line);
     void *context;
-    struct termios before; ///< The terminal as it was.
+    struct termios before; ///< Settings of the terminal before.
     unsigned on;           ///< One bit for each row of the table.
 } sim_keys_t;
 
-/// Takes the keys if standard input and output are a terminal that is ours; else there are none. `loop`, `execute` and
-/// `context` must be set.
+/// Enables the keys if standard input and output are a terminal and this process is in its foreground; otherwise there
+/// are no keys. `loop`, `execute` and `context` must be set.
 void sim_keys_open(sim_keys_t *self);
 
-/// Leaves the terminal as it was.
+/// Restores the settings of the terminal.
 void sim_keys_close(sim_keys_t *self);
 
 #endif

@@ -13,7 +13,8 @@
 
 #define ANSWER_WITHIN_S 2
 
-/// The answer to `help` ends in a line with a single dot, every other one in its first newline.
+/// Returns true if the answer is complete. The answer to `help` ends in a line with a single dot, every other answer at
+/// its first newline.
 static bool complete(const char *answer, size_t length, bool help) {
     if (!help || strncmp(answer, "error", 5U) == 0) {
         return memchr(answer, '\n', length) != NULL;
@@ -37,7 +38,8 @@ static int receive(int fd, bool help) {
     return (strncmp(answer, "error", 5U) == 0) ? 1 : EX_OK;
 }
 
-/// Gives one command to a running simulator and prints the answer. The exit code: 0 ok, 1 refused, 69 nobody there, 75 no answer.
+/// Sends one command to a running simulator and prints the answer. Returns the exit code: 0 ok, 1 refused, 69 no
+/// simulator there, 75 no answer.
 static int tell(const char *control_path, const char *command) {
     char line[SIM_LINE_BYTES + 1U];
     struct timeval const limit = {.tv_sec = ANSWER_WITHIN_S};

@@ -21,13 +21,14 @@ static sim_outcome_t help(sim_panel_t *self) {
     return SIM_ASKED;
 }
 
-/// The beginning of the command's line in its list: name and arguments, up to where they are explained.
+/// Finds the usage in the command's line of its list: name and arguments, up to their explanation. Returns its length;
+/// 0 if no list has the command.
 static int usage_of(const char *name, const char **out_usage) {
     size_t const length = strlen(name);
     for (size_t i = 0U; i < TABLES; i++) {
         for (const char *line = lists[i]; *line != '\0'; line = strchr(line, '\n') + 1U) {
             if (strncmp(line, name, length) == 0 && line[length] == ' ') {
-                size_t used = SIM_USAGE_COLUMNS + strcspn(line + SIM_USAGE_COLUMNS, " "); // Some are longer.
+                size_t used = SIM_USAGE_COLUMNS + strcspn(line + SIM_USAGE_COLUMNS, " "); // Some usages are longer.
                 for (; line[used - 1U] == ' '; used--) {
                 }
                 *out_usage = line;
@@ -80,7 +81,7 @@ static bool read_argument(const sim_argument_t *argument, const char *word, int6
     }
 }
 
-/// False if the words are not those that the command takes.
+/// Reads the arguments. Returns false if the words are not those that the command accepts.
 static bool read_arguments(const sim_command_t *command, sim_call_t *call) {
     const unsigned given = call->words->count - 1U;
     unsigned values = 0U;

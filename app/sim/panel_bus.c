@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Commands that concern the bus, other nodes, the button and the simulator itself.
+// Commands for the bus, other nodes, the button and the simulator itself.
 #include "sim_command.h"
 
 #include <stdio.h>
@@ -7,9 +7,9 @@
 
 #define PULSE_MAX_milli_ms 60000000
 #define STATUS_BYTES       4096U
-/// Not given.
+/// Value of an argument that was not given.
 #define UNTOLD INT64_MIN
-/// Beside on and off.
+/// Value of `once`; on and off are 1 and 0.
 #define BUT_ONCE 2
 
 typedef const char *result_t;
@@ -94,7 +94,7 @@ static result_t set_babble(const sim_call_t *call) {
     return NULL;
 }
 
-/// What is asked of a button: everything but a pulse is on or off.
+/// Action on a button: a pulse; or press and release (`on`); or, with `plug`, unplug and plug (`on`).
 typedef struct {
     bool plug;
     bool pulses;
@@ -114,13 +114,13 @@ static result_t obey(const wish_t *config, sim_button_t *button) {
     return NULL;
 }
 
-/// A button moves all its contacts.
+/// Applies the action to all contacts of the button.
 static result_t obey_all(const wish_t *config, const sim_hooks_t *hooks) {
     result_t result = (hooks->button != NULL) ? obey(config, hooks->button) : NULL;
     return (result == NULL && hooks->second != NULL) ? obey(config, hooks->second) : result;
 }
 
-/// False: there is no such action. `span` is that of a pulse, or UNTOLD.
+/// Reads the action. Returns false if it does not exist. `span` is the duration of a pulse in us, or UNTOLD.
 static bool read_wish(const sim_call_t *call, const char *action, int64_t span, wish_t *out_config) {
     *out_config = (wish_t){.pulses = strcmp(action, "pulse") == 0, .until_us = call->now_us + (iw_time_us_t)span};
     out_config->plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &out_config->on);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Commands that concern the wheels.
+// Commands for the wheels.
 #include "sim_command.h"
 
 #define RUNAWAY_DEFAULT_MM_S 1000
@@ -81,7 +81,7 @@ static void set_sign(const sim_call_t *call, sim_wheel_t *wheel) {
     wheel->motion.swapped = call->value[0] != 0;
 }
 
-/// A speed belongs to `on` only.
+/// A speed is valid with `on` only.
 static result_t check_runaway(const sim_call_t *call) {
     return (call->value[0] == 0 && call->value[1] != 0) ? SIM_USAGE : NULL;
 }
@@ -112,7 +112,7 @@ static void push(const sim_call_t *call, sim_wheel_t *wheel) {
     sim_motion_push(&wheel->motion, call->now_us, (int32_t)call->value[0]);
 }
 
-/// On the spot: each wheel rolls along a circle as wide as the track; 355 / 113 is pi.
+/// Turns the machine on the spot: each wheel rolls along a circle whose diameter is the track; 355 / 113 is pi.
 static void turn(const sim_call_t *call, sim_wheel_t *wheel) {
     const sim_pose_t *pose = &call->world->pair.pose;
     const int32_t way_mm = (int32_t)(call->value[0] * 355 * pose->track_mm / 113000);

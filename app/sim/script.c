@@ -14,7 +14,7 @@ static bool fail(sim_script_fault_t *out_fault, unsigned line, const char *reaso
     return false;
 }
 
-/// What follows the first `words` words.
+/// Returns the text after the first `words` words.
 static const char *after(const char *line, unsigned words) {
     const char *at = line + strspn(line, " \t");
     for (unsigned i = 0U; i < words; i++) {
@@ -24,8 +24,8 @@ static const char *after(const char *line, unsigned words) {
     return at;
 }
 
-/// Understands `at` and `wait`: moves `*time_us`, and `*out_command` to what is left. False: no number, or back in
-/// time.
+/// Reads `at` and `wait`: advances `*time_us` and sets `*out_command` to the rest of the line. Returns false if the
+/// number is not valid or the time goes back.
 static bool read_time(const char *line, iw_time_us_t *time_us, const char **out_command) {
     sim_words_t words;
     bool is_at = false;

@@ -99,7 +99,7 @@ static bool refuse(sim_reason_t *out_reason, const char *path, const char *why) 
     return false;
 }
 
-/// Makes room at `path`: nothing there, or a dead socket that is removed.
+/// Makes `path` free: there is no file, or only a socket without a listener, which is removed.
 static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
     struct stat there;
     if (lstat(path, &there) != 0) {
@@ -126,7 +126,7 @@ static void somebody_connects(sim_watch_t *watch) {
     }
 }
 
-/// A socket that listens at the address, and the file it made; -1 with errno.
+/// Returns a socket that listens at the address, and in `*out_made` the status of its file; -1 with errno on failure.
 static int listen_at(const struct sockaddr_un *address, int type, struct stat *out_made) {
     const char *path = address->sun_path;
     const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);

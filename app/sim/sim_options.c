@@ -14,7 +14,7 @@
 
 #define AGE_MAX_ms INT64_C(86400000)
 
-/// Only q, V and h are letters of the command line as well.
+/// Only q, V and h are also short options.
 static const struct option long_options[] = {
     {"can", required_argument, NULL, 'c'},     {"estop", required_argument, NULL, 'e'},
     {"estop2", required_argument, NULL, 'f'},  {"control", required_argument, NULL, 'k'},
@@ -30,7 +30,7 @@ static int complain(const char *what, const char *value) {
     return EX_USAGE;
 }
 
-/// A per-user folder that ends with the session, if there is one.
+/// Sets the default path: in the user's folder that ends with the session, otherwise in /tmp.
 static void default_path(char *out, const char *suffix) {
     const char *const runtime = getenv("XDG_RUNTIME_DIR");
     if (runtime != NULL && runtime[0] == '/') {

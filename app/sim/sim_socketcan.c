@@ -6,7 +6,7 @@
 #include <string.h>
 
 static void nothing_to_do(sim_watch_t *watch) {
-    (void)watch; // The step that precedes every handler has read it.
+    (void)watch; // sim_socketcan_step has read the socket: it runs before every handler.
 }
 
 static void explain(int error, const char *interface, sim_reason_t *out_reason) {
@@ -37,7 +37,7 @@ bool sim_socketcan_open(sim_socketcan_t *self, const char *interface, const sim_
     self->lost = 0U;
     self->state = IW_BUS_DOWN;
     self->port = sim_world_connect(world);
-    sim_world_queue(world, SIM_BUS_QUEUE_MAX); // The interface has queued already; nothing more is lost here.
+    sim_world_queue(world, SIM_BUS_QUEUE_MAX); // The interface has its own queue; no more frames are lost here.
     self->watch = (sim_watch_t){nothing_to_do, self, iwl_bus_fd(&self->bus)};
     return sim_loop_add(loop, &self->watch);
 }

@@ -57,7 +57,7 @@ static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-/// Appends the digits at `*at`, at most `most`, to `*value`; how many there were.
+/// Appends the digits at `*at`, at most `most`, to `*value`. Returns their number.
 static unsigned read_digits(const char **at, unsigned most, int64_t *value) {
     unsigned digits = 0U;
     for (; digits < most && is_digit(**at); ++*at) {
@@ -67,7 +67,7 @@ static unsigned read_digits(const char **at, unsigned most, int64_t *value) {
     return digits;
 }
 
-/// Digits with a sign and a point, scaled by 10^`places`. At most 12 before the point, so that nothing overflows.
+/// Reads digits with a sign and a point, scaled by 10^`places`. At most 12 before the point, so that nothing overflows.
 static bool read_scaled(const char *word, unsigned places, int64_t *out_value) {
     bool const negative = word[0] == '-';
     const char *at = negative ? word + 1 : word;
@@ -116,7 +116,7 @@ bool sim_words_frame(const char *word, iw_can_frame_t *out_frame) {
     candump_t frame;
     const char *why = NULL;
     const int length = snprintf(line, sizeof line, "(0) sim %s", word);
-    // Its own marks, lengths of remote frames and dots between bytes are not for the panel.
+    // The panel does not accept candump's marks, lengths of remote frames, and dots between bytes.
     if (strspn(word, "0123456789ABCDEFabcdefRr#") != strlen(word) || (size_t)length >= sizeof line ||
         candump_parse(line, (size_t)length, &frame, &why) != CANDUMP_FRAME) {
         return false;

@@ -14,7 +14,7 @@
 
 #define MESSAGE_BYTES 1024U
 
-/// Prints a line, unless nobody takes it: a full pipe must not hold up the wheels.
+/// Prints a line, unless standard output cannot accept it now: a full pipe must not delay the wheels.
 __attribute__((format(printf, 2, 3))) static void say(const sim_simulator_t *self, const char *format, ...) {
     char text[MESSAGE_BYTES];
     struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
@@ -48,7 +48,7 @@ static void quit(void *context) {
     self->ended = true;
 }
 
-/// Answers a command that the bus in use cannot obey. False: it can.
+/// Refuses a command that the bus in use does not support. Returns false if it supports the command.
 static bool refuse(sim_panel_t *panel, const char *line) {
     if (!sim_socketcan_refuses(line)) {
         return false;
@@ -95,7 +95,7 @@ static int load_script(sim_simulator_t *self, const char *path) {
     return EX_DATAERR;
 }
 
-/// Takes all that happened up to now from the world and passes it on.
+/// Reads all frames that were on the bus by now from the world and passes them on.
 static void catch_up(sim_simulator_t *self) {
     sim_delivery_t delivery;
     while (sim_world_step(&self->world, self->now_us, &delivery)) {
@@ -117,7 +117,7 @@ static const char *interface_state(iw_bus_state_t state) {
     return names[state];
 }
 
-/// Called at every wake-up before anything that came in is looked at.
+/// Called at every wake-up before any input is read.
 static void awake(void *context) {
     sim_simulator_t *const self = context;
     iw_time_us_t now_us = sim_loop_clock_us() - self->skipped_us;
@@ -164,7 +164,7 @@ void sim_simulator_run(sim_simulator_t *self) {
     while (!self->ended) {
         iw_time_us_t const log_us = sim_bus_log_step(&self->log, real_us(self, self->now_us));
         iw_time_us_t const due_us = next_us(self);
-        self->wake_us = (due_us > self->now_us) ? due_us : self->now_us; // What is overdue was not slept through.
+        self->wake_us = (due_us > self->now_us) ? due_us : self->now_us; // An overdue action is not a pause.
         iw_time_us_t const world_us = (self->wake_us == IW_NEVER) ? IW_NEVER : real_us(self, self->wake_us);
         sim_loop_wait(&self->loop, earlier(world_us, log_us), awake, self);
     }
@@ -196,7 +196,7 @@ static bool open_bus(sim_simulator_t *self, const sim_options_t *options, sim_re
     return sim_hub_open(&self->hub, options->can_path, out_reason);
 }
 
-/// True without one too.
+/// Opens the second contact. Returns true also without one.
 static bool open_second(sim_simulator_t *self, const sim_options_t *options, sim_reason_t *out_reason) {
     return options->estop2_path[0] == '\0' || sim_button_open(&self->second, options->estop2_path, out_reason);
 }

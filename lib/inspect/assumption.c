@@ -89,7 +89,7 @@ const char *inspect_assumption_values(iw_assumption_item_t item) {
     }
 }
 
-/// Decimal digits only, with nothing behind them but what `*out_rest` points to. At most five of them.
+/// Reads at most five decimal digits. `*out_rest` points to the rest.
 static bool read_number(const char *text, unsigned *out_number, const char **out_rest) {
     unsigned number = 0;
     unsigned digits = 0;
@@ -126,7 +126,7 @@ static inspect_found_t compare_gear(const char *found, const iw_config_t *config
     return (turns * config->gear_per == per * config->gear_turns) ? INSPECT_FOUND_SAME : INSPECT_FOUND_DIFFERENT;
 }
 
-/// One of two words.
+/// Compares one of two words.
 static inspect_found_t compare_word(const char *found, const char *wanted, const char *one, const char *other) {
     if (strcmp(found, one) != 0 && strcmp(found, other) != 0) {
         return INSPECT_FOUND_IMPOSSIBLE;
@@ -164,7 +164,7 @@ inspect_found_t inspect_assumption_compare(const inspect_configured_t *configure
     }
 }
 
-/// What was measured.
+/// Writes the measured value.
 static void write_figure(iw_assumption_item_t item, const iw_assumption_entry_t *entry,
                          char out_text[INSPECT_SOURCE_SIZE]) {
     const int figure = (int)entry->figure;
@@ -203,7 +203,8 @@ static void write_figure(iw_assumption_item_t item, const iw_assumption_entry_t 
     }
 }
 
-/// "the operator found 181 by a tape", "found by bringup: 5.00 m pushed ..."; without `how` only the operator's word.
+/// Writes "the operator found 181 by a tape", "found by bringup: 5.00 m pushed ..."; without `how` only the operator's
+/// value.
 static void write_word(bool denied, const inspect_word_t *word, char out_text[INSPECT_SOURCE_SIZE]) {
     const char *found = (word->found[0] != '\0') ? word->found : "something else";
     const char *by = (word->how[0] != '\0') ? " by " : "";

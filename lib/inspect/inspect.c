@@ -49,7 +49,7 @@ void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t s
     (void)snprintf(out_text, size, "%s%s%s", finding->text, (finding->cure[0] != '\0') ? "; " : "", finding->cure);
 }
 
-/// How often the bus is looked at although nothing wakes us: unknown ids come through a socket that is not watched.
+/// Interval of reading the bus without a wake-up: unknown ids arrive through a socket that is not watched.
 #define LOOK_MS 10
 
 uint32_t inspect_nominal_mHz(const iw_codec_row_t *row) {
@@ -123,7 +123,7 @@ static void look(iwl_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_hea
 void inspect_listen(iwl_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard) {
     inspect_heard_begin(out_heard);
     struct pollfd wait = {.fd = iwl_hal_bus_fd(hal), .events = POLLIN};
-    look(hal, iwl_clock_now_us(), false, out_heard); // What waited since the bus was opened has no time.
+    look(hal, iwl_clock_now_us(), false, out_heard); // Frames from before the first reading have no time.
     const iw_time_us_t begin_us = iwl_clock_now_us();
     for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iwl_clock_now_us()) {
         look(hal, now_us, true, out_heard);

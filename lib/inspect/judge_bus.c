@@ -5,10 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A rate this far from the nominal one is worth a warning; and a frame or two may lie outside the time listened.
+/// A rate that differs from the nominal one by this share causes a warning, with a tolerance of two frames.
 #define RATE_OFF_PERMILLE 100U
 #define RATE_OFF_FRAMES   2U
-/// More of the bus than this delays setpoints (their ids lose arbitration to the wheels' speeds and to all lower ids).
+/// A higher load delays setpoints: their ids have lower priority than those of the wheels' speeds and all lower ids.
 #define LOAD_HIGH_PERMILLE 500U
 
 #define MESSAGE_FORMAT "%s %s %u (0x%03X)"
@@ -25,12 +25,12 @@ static const char *wheel_check(iw_side_t side) {
     return (side == IW_LEFT) ? "left_wheel" : "right_wheel";
 }
 
-/// "250.0"
+/// Writes "250.0".
 static void write_rate(uint32_t rate_mHz, char out_text[16]) {
     (void)snprintf(out_text, 16, "%" PRIu32 ".%" PRIu32, rate_mHz / 1000U, rate_mHz % 1000U / 100U);
 }
 
-/// True if the message does not come as often as it should.
+/// Returns true if the message does not arrive at its rate.
 static bool rate_is_off(const inspect_heard_t *heard, unsigned index) {
     const iw_codec_row_t *row = &iw_codec_rows[index];
     const uint64_t wanted = (uint64_t)inspect_nominal_mHz(row) * heard->span_us / 1000000U / 1000U;
@@ -59,7 +59,7 @@ static void judge_rate(const inspect_heard_t *heard, unsigned index, inspect_fin
                            "this wheel's firmware is another");
 }
 
-/// Whether a wheel is there, and what it sends how often.
+/// Judges the presence of a wheel and the rates of its messages.
 static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_findings_t *findings) {
     const char *name = (side == IW_LEFT) ? "left" : "right";
     const uint64_t span_ms = heard->span_us / IW_US_PER_MS;
@@ -148,7 +148,7 @@ static void judge_load(const inspect_heard_t *heard, const inspect_config_t *con
     }
 }
 
-/// The controller has left the bus: what it does not hear says nothing about wheels and cables.
+/// Reports a controller that is bus-off: missing frames then say nothing about wheels and cables.
 static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
     inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off: too many errors, it takes no part any more",
                 bus);
@@ -160,7 +160,7 @@ static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_fin
     }
 }
 
-/// False if nothing more can be said of the bus.
+/// Returns false if nothing more can be judged.
 static bool judge_life(const iwl_bus_link_t *link, const inspect_heard_t *heard, const inspect_config_t *config,
                        inspect_findings_t *findings) {
     const char *bus = config->name;

@@ -5,7 +5,7 @@
 #include <glob.h>
 #include <string.h>
 
-/// A bus on which nobody ever is, to open an e-stop without one.
+/// Name of a bus without any node, to open an e-stop without a bus.
 #define NO_BUS "unix:/dev/null/none"
 
 static bool has_gpio(void) {

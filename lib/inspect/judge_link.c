@@ -4,10 +4,10 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-/// 21 frames, as many as a full bus brings, as the kernel counts them.
+/// Size of 21 frames in the kernel: a full bus carries as many in a millisecond.
 #define BYTES_PER_MS 16384U
 
-/// The commands that set an interface as the wheels need it.
+/// Writes the commands that configure the interface for the wheels.
 static void cure_timing(const inspect_config_t *config, inspect_findings_t *findings) {
     const char *bus = config->name;
     inspect_cure(findings,

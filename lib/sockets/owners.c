@@ -41,7 +41,7 @@ static int open_unlinked(const char *path) {
     memcpy(bare, path, length);
     bare[length] = '\0';
     const int fd = open(bare, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0 && errno == ENOTDIR) { // "Not a directory" would be misleading.
+    if (fd < 0 && errno == ENOTDIR) { // This errno would be misleading.
         errno = (lstat(bare, &status) == 0 && S_ISLNK(status.st_mode)) ? ELOOP : ENOTDIR;
     }
     return fd;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// The bus of the iWheel, exactly: 1 Mbit/s, sampled at 62.5 %, computed from the board's APB1 clock by the compiler.
+/// Bit timing of the iWheel bus: exactly 1 Mbit/s with the sample point at 62.5 %. The compiler computes it from the
+/// board's APB1 clock.
 ///
-/// 62.5 % is 5/8, so a bit must have a multiple of 8 quanta, and the most that bxCAN can have is 25 (bxCAN 7.7: 1 + 16
-/// + 8). 24 quanta would need 14 before and 9 after the sample, one more than there is. Remain 8 and 16, so APB1 must
-/// be a multiple of 8 MHz; another clock does not compile. 16 quanta are taken where they can be had: the finer the
-/// quanta, the finer the resynchronisation.
+/// 62.5 % is 5/8, so a bit must have a multiple of 8 quanta, and a bit of bxCAN has at most 25 (bxCAN 7.7: 1 + 16 + 8).
+/// 24 quanta would need 14 before and 9 after the sample point, one more than bxCAN allows. 8 and 16 remain, so APB1
+/// must be a multiple of 8 MHz; another clock does not compile. A bit has 16 quanta if the clock allows it, because
+/// finer quanta make the resynchronisation finer.
 #ifndef BRD_BIT_RATE_H
 #define BRD_BIT_RATE_H
 
@@ -17,10 +18,10 @@
 #define BRD_BIT_PRESCALER (BRD_APB1_HZ / IW_BUS_BITRATE_HZ / BRD_BIT_QUANTA)
 #define BRD_BIT_BS1       (BRD_BIT_QUANTA * 5U / 8U - 1U)
 #define BRD_BIT_BS2       (BRD_BIT_QUANTA * 3U / 8U)
-/// Resynchronisation jump width: as wide as possible, so that the wheels' oscillators need not be ours.
+/// Resynchronisation jump width: as wide as possible, to tolerate different oscillators on the wheels and on the board.
 #define BRD_BIT_SJW ((BRD_BIT_BS2 < 4U) ? BRD_BIT_BS2 : 4U)
 
-/// The value of BTR, bxCAN 9.2: each field holds one less than its meaning.
+/// Value of BTR (bxCAN 9.2): each field contains its number minus one.
 #define BRD_BIT_BTR                                                                                                    \
     (((BRD_BIT_SJW - 1U) << 24) | ((BRD_BIT_BS2 - 1U) << 20) | ((BRD_BIT_BS1 - 1U) << 16) | (BRD_BIT_PRESCALER - 1U))
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008 and RM0090: 7 reset and clock control. What is used here means the same in both.
+// Section numbers refer to RM0008 and RM0090: 7 reset and clock control. The bits used here mean the same in both.
 #include "board_clock.h"
 
 #include "board.h"
@@ -25,8 +25,8 @@
 
 #define CRYSTAL_INPUT (BRD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
-// A poll takes 8 cycles at the least, on the internal oscillator: 1 ms. The PLL needs 0.3 ms at the most; the crystal
-// goes on starting between the calls.
+// A poll takes at least 8 cycles of the internal oscillator, so these polls take at least 1 ms. The PLL needs at most
+// 0.3 ms. The crystal continues to start between the calls.
 #define POLLS_MAX (BRD_INTERNAL_HZ / 8U / 1000U)
 
 bool brd_clock_wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t value) {
@@ -39,7 +39,7 @@ bool brd_clock_wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t 
 }
 
 static bool try_start(void) {
-    RCC_CR |= CRYSTAL_INPUT; // 7.2.1: the input's kind only while it is off.
+    RCC_CR |= CRYSTAL_INPUT; // 7.2.1: the kind of input can change only while it is off.
     RCC_CR |= HSEON;
     if (!brd_clock_wait_for(&RCC_CR, HSERDY, HSERDY) || !brd_clock_prepare()) {
         return false;
@@ -52,10 +52,10 @@ static bool try_start(void) {
     return brd_clock_wait_for(&RCC_CFGR, SWS, SWS_PLL);
 }
 
-/// The crystal stays on after a failure: one that needs longer goes on starting while the call is repeated.
+/// The crystal stays on after a failure, so that a slow one continues to start while the caller repeats the call.
 bool brd_clock_start(void) {
     if (try_start()) {
-        RCC_CR |= CSSON; // 7.2.7: a failing crystal raises the NMI and the internal oscillator takes over.
+        RCC_CR |= CSSON; // 7.2.7: a failure of the crystal raises the NMI and selects the internal oscillator.
         return true;
     }
     RCC_CFGR &= ~SW;

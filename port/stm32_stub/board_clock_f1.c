@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008: 7 reset and clock control, 3.3 flash.
+// Section numbers refer to RM0008: 7 reset and clock control, 3.3 flash.
 #include "board_clock.h"
 
 #include "board.h"

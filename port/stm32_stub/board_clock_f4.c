@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 7 reset and clock control, 3 flash. RM0390 (F446) has the same registers.
+// Section numbers refer to RM0090: 7 reset and clock control, 3 flash. RM0390 (F446) has the same registers.
 #include "board_clock.h"
 
 #include "board.h"
@@ -11,7 +11,7 @@
 #define FLASH_ACR   (*(volatile uint32_t *)0x40023C00U)
 
 #define PLLSRC_HSE    (1U << 22) // 7.3.2 RCC_PLLCFGR
-#define PLLR_LEAST    (2U << 28) // F446: not used, but 0 is not allowed. Others: reserved, as after reset.
+#define PLLR_LEAST    (2U << 28) // F446: not used, but 0 is not allowed. Other chips: reserved, value after reset.
 #define PPRE1_QUARTER (5U << 10) // 7.3.3 RCC_CFGR
 #define PPRE2_HALF    (4U << 13)
 #define LATENCY       0xFU // FLASH_ACR
@@ -29,7 +29,7 @@ static_assert(BRD_PLL_INPUT_HZ * BRD_PLL_N / BRD_PLL_P == BRD_CORE_HZ, "the PLL'
 static_assert(BRD_CORE_HZ <= 168000000U, "faster needs overdrive, and an F407 cannot");
 static_assert(BRD_APB1_HZ * 4U == BRD_CORE_HZ, "PPRE1_QUARTER is what is written");
 
-// The voltage scale stays as it is after reset: 1, good for 168 MHz (5.4.1).
+// Leaves the voltage scale at its value after reset: 1, which allows 168 MHz (5.4.1).
 bool brd_clock_prepare(void) {
     FLASH_ACR = PRFTEN | ICEN | DCEN | BRD_FLASH_WAIT_STATES; // 3.5.1: before the clock rises, and read back.
     RCC_PLLCFGR =

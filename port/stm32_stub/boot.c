@@ -7,7 +7,8 @@
 
 __attribute__((section(".noinit"))) static volatile uint32_t count, inverse;
 
-/// One to one, so that two counts never give the same; the constants are those of a well-known mixer (splitmix64).
+/// Maps different values to different results, so that two counts never give the same id. The constants are those of
+/// the splitmix64 mixer.
 static uint64_t mix(uint64_t value) {
     value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9U;
     value = (value ^ value >> 27) * 0x94D049BB133111EBU;

@@ -10,8 +10,9 @@
 #define ABORT      (BRD_TSR_ABRQ(0) | BRD_TSR_ABRQ(1) | BRD_TSR_ABRQ(2))
 #define EMPTY      (BRD_TSR_TME(0) | BRD_TSR_TME(1) | BRD_TSR_TME(2))
 
-/// MCR, bxCAN 9.2. Zero are NART (unacknowledged frames are repeated until aborted), TXFP (the lowest id first, so left
-/// before right), RFLM (a full FIFO keeps the newest), ABOM (bus-off is left by us) and SLEEP.
+/// Writes MCR (bxCAN 9.2). These bits stay zero: NART (the controller repeats an unacknowledged frame until it is
+/// aborted), TXFP (the lowest id is sent first, so left before right), RFLM (a full FIFO keeps the newest frame), ABOM
+/// (the driver itself ends bus-off) and SLEEP.
 static void write_mcr(const brd_bxcan_t *self, uint32_t request) {
     brd_register_write(&self->config.registers->MCR, BRD_MCR_DBF | request);
 }
@@ -22,7 +23,7 @@ void brd_bxcan_init(brd_bxcan_t *self, const brd_bxcan_config_t *config) {
     write_mcr(self, BRD_MCR_INRQ);
 }
 
-/// In initialisation mode only, bxCAN 4.1 and 9.1.
+/// Call it only in initialisation mode (bxCAN 4.1 and 9.1).
 static void configure(brd_bxcan_t *self) {
     brd_bxcan_registers_t *const registers = self->config.registers;
     brd_register_write(&registers->BTR, self->config.bit_timing | (self->config.silent ? BRD_BTR_SILM : 0U));
@@ -44,7 +45,7 @@ static void bytes_of(uint32_t word, uint8_t *out_bytes) {
     }
 }
 
-/// While masked, `brd_bxcan_on_transmit` does not run. Reading back makes sure that the write has arrived.
+/// Masks the interrupt, so that `brd_bxcan_on_transmit` does not run. The read makes sure that the write has arrived.
 static void mask_transmit(const brd_bxcan_t *self) {
     brd_register_t *const ier = &self->config.registers->IER;
     brd_register_write(ier, INTERRUPTS & ~BRD_IER_TMEIE);
@@ -58,7 +59,7 @@ static void unmask_transmit(const brd_bxcan_t *self) {
 }
 
 static bool poll_tsr(const brd_bxcan_t *self, uint32_t flags) {
-    // Bounded: an abort ends at the latest with the frame that is on the bus, unless the controller is stuck.
+    // The loop is limited: an abort ends at the latest with the frame that is on the bus, unless the controller hangs.
     for (uint32_t poll = 0; poll < self->config.poll_limit; poll++) {
         if ((brd_register_read(&self->config.registers->TSR) & flags) == flags) {
             return true;
@@ -67,8 +68,9 @@ static bool poll_tsr(const brd_bxcan_t *self, uint32_t flags) {
     return false;
 }
 
-/// Aborts the mailbox, bxCAN 7.1, and hands the echoes it owes on to `heir`, the frame that replaces it. False if the
-/// abort does not end. If the frame was sent after all, mailbox and echoes are left to `brd_bxcan_on_transmit`.
+/// Aborts the mailbox (bxCAN 7.1) and passes the echoes that it owes to `heir`, the frame that replaces it. Returns
+/// false if the abort does not end. If the frame was sent after all, mailbox and echoes stay for
+/// `brd_bxcan_on_transmit`.
 static bool withdraw(brd_bxcan_t *self, uint32_t mailbox, brd_bxcan_outgoing_t *heir) {
     brd_register_t *const tsr = &self->config.registers->TSR;
     brd_register_write(tsr, BRD_TSR_ABRQ(mailbox));
@@ -83,8 +85,8 @@ static bool withdraw(brd_bxcan_t *self, uint32_t mailbox, brd_bxcan_outgoing_t *
     return true;
 }
 
-/// What waits with this id is withdrawn; at most one does. False if it cannot be, or owes as many echoes as can be
-/// kept.
+/// Aborts the waiting frame with this id, if there is one; there is at most one. Returns false if the abort does not
+/// end, or if the mailbox already owes the maximum of echoes.
 static bool withdraw_id(brd_bxcan_t *self, uint32_t id, brd_bxcan_outgoing_t *heir) {
     bool done = true;
     for (uint32_t mailbox = 0; mailbox < BRD_BXCAN_MAILBOXES && done; mailbox++) {
@@ -96,8 +98,8 @@ static bool withdraw_id(brd_bxcan_t *self, uint32_t id, brd_bxcan_outgoing_t *he
     return done;
 }
 
-/// Transmit mailbox registers, bxCAN 9.3: all but TIR, which makes the request. Returns the mailbox, or
-/// BRD_BXCAN_MAILBOXES if none is free.
+/// Writes the registers of a free transmit mailbox (bxCAN 9.3) except TIR, which makes the request. Returns the
+/// mailbox, or BRD_BXCAN_MAILBOXES if none is free.
 static uint32_t load_free_mailbox(brd_bxcan_t *self, const iw_can_frame_t *frame, brd_bxcan_outgoing_t *heir) {
     for (uint32_t i = 0; i < BRD_BXCAN_MAILBOXES; i++) {
         if (self->outgoing[i].owed == 0U) {
@@ -115,8 +117,8 @@ static uint32_t load_free_mailbox(brd_bxcan_t *self, const iw_can_frame_t *frame
     return BRD_BXCAN_MAILBOXES;
 }
 
-/// Takes the place of what waits with this id. The interrupt is masked for each frame apart: what was sent while the
-/// first one was placed frees its mailbox before the second one needs it.
+/// Puts the frame into a mailbox in place of a waiting frame with the same id. The interrupt is masked for each frame
+/// separately: a frame that was sent during the first call frees its mailbox before the second call needs one.
 static uint32_t place(brd_bxcan_t *self, const iw_can_frame_t *frame) {
     brd_bxcan_outgoing_t heir;
     heir.owed = 0;
@@ -135,11 +137,11 @@ static bool can_be_sent(const brd_bxcan_t *self, const iw_can_frame_t *frames, u
     return good;
 }
 
-/// Every mailbox is filled before the first one is requested. The controller has no request for two mailboxes: TXRQ is
-/// a bit of each TIR (bxCAN 9.3), and on an idle bus the left frame begins with the first write. The second write comes
-/// a few cycles later, long before that frame ends, so the right one is next in this controller. Not guaranteed:
-/// another node's lower id goes between, a frame that fails is repeated first, and a reset of the CPU between both
-/// writes leaves the left one alone.
+/// Fills every mailbox before it requests the first one. The controller has no request for two mailboxes: TXRQ is a bit
+/// of each TIR (bxCAN 9.3), and on an idle bus the left frame begins with the first write. The second write comes a few
+/// cycles later, long before that frame ends, so the right frame is the next one from this controller. This is not
+/// guaranteed: a lower id of another node goes between, a frame that fails is repeated first, and a reset of the CPU
+/// between both writes leaves the left frame alone.
 int brd_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     brd_bxcan_t *const self = context;
     uint32_t mailbox[IW_SIDES];
@@ -161,7 +163,7 @@ int brd_bxcan_send(void *context, const iw_can_frame_t *frames, uint32_t count) 
     return (int)filled;
 }
 
-/// True once after frames were lost: the controller's report of it, which the core counts.
+/// Returns true once after a loss of frames, with the report of the controller in `*out_frame`. The core counts it.
 static bool tell_loss(brd_bxcan_t *self, iw_can_frame_t *out_frame) {
     const uint32_t losses = self->overruns + self->lost;
     if (losses == self->losses_told) {
@@ -188,8 +190,8 @@ int brd_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
     return (self->phase == BRD_BXCAN_RUNNING) ? 0 : -1;
 }
 
-/// Aborts all mailboxes, bxCAN 7.1, and forgets what they owe. TSR is written, never read and written back: a
-/// completion that comes between would be cleared with it.
+/// Aborts all mailboxes (bxCAN 7.1) and clears their completions. Returns false if an abort does not end. It writes TSR
+/// without a read before, because writing back a read value would also clear a completion that came in between.
 static bool abort_all(brd_bxcan_t *self) {
     brd_register_t *const tsr = &self->config.registers->TSR;
     brd_register_write(tsr, ABORT);
@@ -200,13 +202,14 @@ static bool abort_all(brd_bxcan_t *self) {
     return true;
 }
 
-/// After a purge no echo may reach the core (hal.h): those already in the ring have the old epoch.
+/// Drops all owed echoes. After a purge no echo may reach the core (hal.h): those in the ring have the old epoch, so
+/// that `receive` drops them.
 static void forget(brd_bxcan_t *self) {
     memset(self->outgoing, 0, sizeof self->outgoing);
     self->epoch++;
 }
 
-/// Takes back all that waits, or leaves it to a later call. The interrupts are masked meanwhile.
+/// Aborts all waiting frames with the interrupt masked. Returns false if this is left to a later call.
 static bool take_back(brd_bxcan_t *self) {
     mask_transmit(self);
     const bool done = abort_all(self);
@@ -217,8 +220,9 @@ static bool take_back(brd_bxcan_t *self) {
     return done;
 }
 
-/// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told
-/// as a loss of the bus, and nothing is sent before it has been joined anew: until then the reset masks the interrupts.
+/// Resets the controller with its mailboxes after an abort that does not end. `bus_state` reports STARTING as a loss of
+/// the bus, and nothing is sent before the controller has joined the bus again. Until then the reset masks its
+/// interrupts.
 static void start_anew(brd_bxcan_t *self) {
     brd_register_t *const reset = self->config.reset_register;
     brd_register_write(reset, brd_register_read(reset) | self->config.reset_bits);
@@ -229,8 +233,8 @@ static void start_anew(brd_bxcan_t *self) {
     write_mcr(self, BRD_MCR_INRQ);
 }
 
-/// Off the bus nothing leaves: not in bus-off, which only `bus_state` ends, and it joins no bus before all is taken
-/// back.
+/// Off the bus no frame leaves the controller, so 0 is safe: only `bus_state` ends bus-off, and the driver joins no bus
+/// before all frames are aborted.
 int brd_bxcan_purge(void *context) {
     brd_bxcan_t *const self = context;
     if (take_back(self)) {
@@ -243,8 +247,8 @@ int brd_bxcan_purge(void *context) {
     return 1;
 }
 
-/// Both lead through initialisation mode: bus-off is left by entering and leaving it (bxCAN 7.6), and a device that
-/// somebody has reset or put to sleep begins anew. What waits to be sent must not survive either.
+/// Both phases start with initialisation mode: the driver ends bus-off by entering and leaving it (bxCAN 7.6), and it
+/// starts a device again that was reset or put to sleep from outside. Waiting frames must survive neither of them.
 static void begin(brd_bxcan_t *self, brd_bxcan_phase_t phase) {
     self->phase = phase;
     (void)take_back(self);
@@ -262,7 +266,7 @@ static void leave_init(brd_bxcan_t *self) {
     write_mcr(self, 0);
 }
 
-/// Takes the step that the hardware is ready for, bxCAN 4.1 and 4.2.
+/// Does the next step if the hardware is ready for it (bxCAN 4.1 and 4.2).
 static void advance(brd_bxcan_t *self, uint32_t msr) {
     const bool in_init = (msr & BRD_MSR_INAK) != 0U;
     if (self->phase == BRD_BXCAN_STARTING || self->phase == BRD_BXCAN_RECOVERING) {
@@ -302,7 +306,7 @@ iw_bus_state_t brd_bxcan_bus_state(void *context) {
     return (self->phase < BRD_BXCAN_RUNNING) ? IW_BUS_DOWN : IW_BUS_OFF;
 }
 
-/// Lost frames are counted, not waited for: this runs in an interrupt.
+/// Counts a lost frame and does not wait, because it runs in an interrupt.
 static void put(brd_bxcan_t *self, const iw_can_frame_t *frame) {
     if (!brd_frame_ring_put(&self->ring, frame, self->epoch)) {
         self->lost++;
@@ -324,8 +328,8 @@ void brd_bxcan_on_transmit(brd_bxcan_t *self) {
     }
 }
 
-/// One frame of FIFO 0, bxCAN 7.3 and 9.3. The interrupt comes again while there are more; a release still under way
-/// shows the old frame, so it is left for the next time.
+/// Reads one frame of FIFO 0 (bxCAN 7.3 and 9.3). The interrupt is raised again while there are more. While a release
+/// is in progress the FIFO still shows the old frame, so the handler leaves it for the next interrupt.
 void brd_bxcan_on_receive(brd_bxcan_t *self) {
     brd_bxcan_registers_t *const registers = self->config.registers;
     const uint32_t status = brd_register_read(&registers->RF0R);

@@ -8,19 +8,19 @@
 #define RETRY_US  100000U
 #define STABLE_US 20000U
 
-/// Nothing is kept over power-off.
+/// This source stores nothing over power-off.
 void brd_commander_open(bool power_on, bool in_motion) {
     (void)power_on;
     (void)in_motion;
 }
 
-/// The options of the build are all there is.
+/// The build options are the whole configuration.
 void brd_commander_configure(iw_config_t *config) {
     (void)config;
 }
 
-/// Debounced both ways. A button that is stuck or held from before power-on never makes a press (R3: nothing moves by
-/// itself).
+/// Debounces both edges. A button that is stuck, or that is pressed since before power-on, never counts as a press (R3:
+/// motion never begins on its own).
 bool brd_commander_pressed(brd_commander_t *self, iw_time_us_t now_us) {
     const bool level = brd_pins_button_low();
     if (level != self->level) {
@@ -54,7 +54,7 @@ bool brd_commander_arm(brd_commander_t *self, iw_gateway_t *gateway, iw_time_us_
 }
 
 iw_refusal_t brd_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
-    // As a setpoint, a current of 0: how much of it moves the machine is not known here.
+    // With the role setpoint the current is 0, because this source does not know which current moves the machine.
     const iw_drive_t drive = {
         .speed_mm_s = {speed_mm_s, speed_mm_s},
         .current_mA = {0, 0},

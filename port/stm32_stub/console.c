@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008: 27.6, which RM0090 (30.6) shares.
+// Section numbers refer to RM0008: 27.6; in RM0090 it is 30.6.
 #include "console.h"
 
 #include <assert.h>
@@ -23,11 +23,11 @@ static char waiting[LENGTH];
 static uint32_t put, taken; // Characters since the start.
 
 void brd_console_start(uint32_t apb1_hz) {
-    USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: sixteenths.
+    USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: in sixteenths.
     USART2->CR1 = UE | TE | RE;
 }
 
-/// What does not fit is dropped: the control loop never waits for a terminal (R11).
+/// Drops a character that does not fit: the control loop never waits for a terminal (R11).
 static void append(char character) {
     if (put - taken < LENGTH - 1U) {
         waiting[put++ % LENGTH] = character;
@@ -40,7 +40,7 @@ void brd_console_text(const char *text) {
     }
 }
 
-/// No printf: newlib's would bring the heap.
+/// Does not use printf, because that of newlib needs the heap.
 void brd_console_number(uint32_t value) {
     char digit[10];
     uint32_t digits = 0;
@@ -71,6 +71,6 @@ bool brd_console_asked(void) {
     if ((USART2->SR & RXNE) == 0U) {
         return false;
     }
-    (void)USART2->DR; // Clears RXNE, and the overrun of what came before (27.6.1).
+    (void)USART2->DR; // Clears RXNE, and the overrun of earlier characters (27.6.1).
     return true;
 }

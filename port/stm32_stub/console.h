@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: MIT
-/// Text to a terminal on USART2 (board_pins.h), 115200 baud 8N1. Nobody ever waits for it.
+/// Text output to a terminal on USART2 (board_pins.h), 115200 baud, 8N1. No function waits for the terminal.
 #ifndef BRD_CONSOLE_H
 #define BRD_CONSOLE_H
 
 #include "iwheel/types.h"
 
-/// After `brd_pins_init`, and again after every change of the clock. What waits to be sent is kept.
+/// Call it after `brd_pins_init`, and again after every change of the clock. Waiting characters are retained.
 void brd_console_start(uint32_t apb1_hz);
 
-/// Appends to what waits. What does not fit, 511 characters in all, is left out.
+/// Appends to the waiting characters. It drops characters that do not fit; 511 characters can wait.
 void brd_console_text(const char *text);
 void brd_console_number(uint32_t value);
-void brd_console_hex(uint32_t value); ///< With 0x and eight digits.
+void brd_console_hex(uint32_t value); ///< Writes 0x and eight digits.
 
-/// Hands over one character if the last one has gone. True while there are more: call again within a millisecond, or
-/// later.
+/// Passes one character to the USART if the previous one has left. Returns true while more characters wait: call it
+/// again after about a millisecond.
 bool brd_console_step(void);
 
-/// True if a character came since the last call; which one does not matter.
+/// Returns true if a character was received since the last call; its value does not matter.
 bool brd_console_asked(void);
 
 #endif

@@ -13,9 +13,9 @@
 
 void brd_systick_handler(void);
 
-// Written by interrupt handlers, which get no argument: so they stand at file scope.
+// Interrupt handlers write these variables. They have no argument, so the variables have file scope.
 static volatile uint64_t ticks_ms;
-static volatile uint32_t ticks_slept; // The lower half once more, read in one access.
+static volatile uint32_t ticks_slept; // Lower half of ticks_ms, which one access reads.
 static atomic_bool is_woken;
 static uint32_t cycles_per_us = 1;
 
@@ -35,7 +35,7 @@ void brd_time_start(uint32_t core_hz) {
     SYST_CSR = 7U;
 }
 
-/// A tick that came between the halves has either been counted meanwhile or is still pending.
+/// Repeats the reads if a tick came between them: either the handler has counted it, or it is still pending.
 iw_time_us_t brd_time_now_us(void) {
     uint64_t now_ms;
     uint32_t left;
@@ -50,7 +50,7 @@ void brd_wake(void) {
     atomic_store_explicit(&is_woken, true, memory_order_relaxed);
 }
 
-/// WFI returns for an interrupt that is pending although held off, so none is missed between the look and the sleep.
+/// WFI also returns for an interrupt that is pending but masked, so none is missed between the check and the sleep.
 static void sleep_unless_woken(uint32_t tick) {
     __asm volatile("cpsid i" ::: "memory");
     if (!atomic_load_explicit(&is_woken, memory_order_relaxed) && ticks_slept == tick) {

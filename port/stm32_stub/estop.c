@@ -7,7 +7,7 @@
 
 #include <stdatomic.h>
 
-// RM0008 10.3, RM0090 12.3: interrupt mask, event mask, rising, falling, software event, pending (written 1: cleared).
+// RM0008 10.3, RM0090 12.3: interrupt mask, event mask, rising, falling, software event, pending (writing 1 clears).
 typedef struct {
     volatile uint32_t IMR, EMR, RTSR, FTSR, SWIER, PR;
 } exti_t;
@@ -24,14 +24,14 @@ void brd_estop_init(void) {
     EXTI->IMR |= LINE;
 }
 
-/// Any edge counts, also the falling one: of a short pulse the level may be gone, and so may the first edge (fault 12).
+/// Any edge counts, also a falling one: after a short pulse the level, and even the first edge, may be gone (fault 12).
 void brd_estop_on_edge(void) {
     EXTI->PR = LINE;
     atomic_store_explicit(&had_edge, true, memory_order_relaxed);
     brd_wake();
 }
 
-/// An edge between load and store is covered by the 1 of this same call, so none is lost.
+/// An edge between load and store is not lost, because this same call returns 1.
 int brd_estop_pressed(void *context) {
     (void)context;
     if (atomic_load_explicit(&had_edge, memory_order_relaxed)) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of PM0075: 2.3.3 programming, 2.3.4 erase, 3 registers.
+// Section numbers refer to PM0075: 2.3.3 programming, 2.3.4 erase, 3 registers.
 #include "flash.h"
 
 #include "board.h"
@@ -21,8 +21,7 @@ typedef struct {
 
 #define PAGE_BYTES 1024U
 
-// The CPU stands still while it fetches from a flash that is busy, so that few polls are ever made; the bound is for a
-// chip that is broken.
+// The CPU stalls while it fetches from a busy flash, so the loop makes few polls. The limit is for a defective chip.
 #define POLLS_MAX (BRD_CORE_HZ / 8U / 20U)
 
 static uint32_t address_of(unsigned page, unsigned word) {
@@ -62,7 +61,7 @@ bool brd_flash_erase(unsigned page) {
     return end();
 }
 
-/// Half a word at a time is all that this family can.
+/// This family can write only half a word at a time.
 static bool write_half(uint32_t address, uint16_t value) {
     if (!begin(PG)) {
         return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 3.6 erase and program, 3.9 registers.
+// Section numbers refer to RM0090: 3.6 erase and program, 3.9 registers.
 #include "flash.h"
 
 #include "board.h"
@@ -14,7 +14,7 @@ typedef struct {
 #define PG     (1U << 0)
 #define SER    (1U << 1)
 #define SNB(n) ((n) << 3)
-#define BY_32  (2U << 8) // 2.7 to 3.6 V.
+#define BY_32  (2U << 8) // For a supply of 2.7 to 3.6 V.
 #define STRT   (1U << 16)
 #define LOCK   (1U << 31)
 #define BSY    (1U << 16)
@@ -25,12 +25,11 @@ typedef struct {
 
 #define FIRST_SECTOR 4U
 
-// The CPU stands still while it fetches from a flash that is busy, so that few polls are ever made; the bound is for a
-// chip that is broken.
+// The CPU stalls while it fetches from a busy flash, so the loop makes few polls. The limit is for a defective chip.
 #define POLLS_MAX (BRD_CORE_HZ / 8U * 2U)
 
 static uint32_t address_of(unsigned page, unsigned word) {
-    static const uint32_t sectors[BRD_FLASH_PAGES] = {0x08010000U, 0x08020000U}; // 3.3; memory.ld leaves them out.
+    static const uint32_t sectors[BRD_FLASH_PAGES] = {0x08010000U, 0x08020000U}; // 3.3; memory.ld excludes them.
     return sectors[page] + 4U * word;
 }
 
@@ -48,7 +47,7 @@ static bool begin(uint32_t what) {
     return (FLASH->CR & LOCK) == 0U;
 }
 
-/// 3.5.2: the data cache still has what was there before.
+/// Clears the data cache, which still contains the words from before the write (3.5.2).
 static void empty_cache(void) {
     const uint32_t acr = FLASH->ACR;
     FLASH->ACR = acr & ~DCEN;

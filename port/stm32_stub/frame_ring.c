@@ -5,7 +5,8 @@
 
 static_assert((BRD_FRAME_RING_LENGTH & (BRD_FRAME_RING_LENGTH - 1U)) == 0U, "the indices wrap at a power of two");
 
-/// Release after the frame is written, acquire before it is read: the other side never sees an index without its frame.
+/// Releases the index after the frame is written and acquires it before the frame is read, so that the other side never
+/// sees an index without its frame.
 bool brd_frame_ring_put(brd_frame_ring_t *self, const iw_can_frame_t *frame, uint8_t tag) {
     const unsigned head = atomic_load_explicit(&self->head, memory_order_relaxed);
     const unsigned tail = atomic_load_explicit(&self->tail, memory_order_acquire);

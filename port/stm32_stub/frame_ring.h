@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// A queue of frames between interrupts and the main loop.
+/// Queue of frames from interrupts to the main loop.
 ///
-/// One producer, one consumer: interrupts of equal priority put frames in, the main loop takes them out. No lock: each
-/// index is written by one side only. At most 21 frames come in a millisecond at 1 Mbit/s, so the ring outlasts 3 ms of
-/// a full bus.
+/// It has one producer and one consumer: interrupts of equal priority put frames in, the main loop takes them out. It
+/// needs no lock, because only one side writes each index. At most 21 frames arrive per millisecond at 1 Mbit/s, so the
+/// ring has room for 3 ms of a full bus.
 #ifndef BRD_FRAME_RING_H
 #define BRD_FRAME_RING_H
 
@@ -16,15 +16,15 @@
 
 typedef struct {
     iw_can_frame_t frame[BRD_FRAME_RING_LENGTH];
-    uint8_t tag[BRD_FRAME_RING_LENGTH]; ///< The producer's, handed back with the frame.
-    atomic_uint head;                   ///< Frames put in since the start. Written by the producer.
-    atomic_uint tail;                   ///< Frames taken out since the start. Written by the consumer.
+    uint8_t tag[BRD_FRAME_RING_LENGTH]; ///< Tag of the producer, returned with the frame.
+    atomic_uint head;                   ///< Number of frames put in since the start; written by the producer.
+    atomic_uint tail;                   ///< Number of frames taken out since the start; written by the consumer.
 } brd_frame_ring_t;
 
-/// From an interrupt. False if the ring is full: the frame is lost and the caller counts it.
+/// Call it from an interrupt. Returns false if the ring is full: the frame is lost, and the caller must count it.
 bool brd_frame_ring_put(brd_frame_ring_t *self, const iw_can_frame_t *frame, uint8_t tag);
 
-/// Not from an interrupt. False, outputs untouched, if the ring is empty.
+/// Call it from the main loop. Returns false and leaves the outputs unchanged if the ring is empty.
 bool brd_frame_ring_take(brd_frame_ring_t *self, iw_can_frame_t *out_frame, uint8_t *out_tag);
 
 #endif

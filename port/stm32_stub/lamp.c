@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "lamp.h"
 
-/// The button comes first: while it is pressed no other cure helps.
+/// The e-stop has priority: while it is pressed, no other action of the operator helps.
 uint16_t brd_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed) {
     if (estop_pressed) {
         return BRD_LAMP_ESTOP;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// One lamp tells the state: a pattern of 16 slots of 62.5 ms, repeated every second.
+/// The lamp shows the state: a pattern of 16 slots of 62.5 ms, repeated every second.
 ///
 /// | lamp                  | state                                                        |
 /// |-----------------------|--------------------------------------------------------------|
 /// | one short flash       | listening                                                    |
-/// | two short flashes     | listening, and the bus is down, off, or not there yet        |
-/// | three short flashes   | no crystal: the bus is left alone                            |
+/// | two short flashes     | listening, and the bus is down, off, or not joined yet       |
+/// | three short flashes   | the crystal does not run: the board does not use the bus     |
 /// | steady                | armed                                                        |
 /// | fast, 8 Hz            | stopping                                                     |
 /// | half on, half off     | e-stop pressed                                               |
@@ -26,7 +26,7 @@
 #define BRD_LAMP_ESTOP      0x00FFU
 #define BRD_LAMP_LATCHED    0x0F0FU
 
-/// The pattern for what the gateway does; `estop_pressed` is the contact's level.
+/// Returns the pattern for the state of the gateway. `estop_pressed` is the level of the contact.
 uint16_t brd_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed);
 
 bool brd_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);

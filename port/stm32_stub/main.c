@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The gateway on bare metal: one loop around the core that sleeps until there is something to do.
+/// Gateway on bare metal: one loop around the core. It sleeps until there is something to do.
 #include "bit_rate.h"
 #include "board_clock.h"
 #include "bxcan.h"
@@ -14,13 +14,13 @@
 #include "report.h"
 #include "watchdog.h"
 
-// A poll takes 4 cycles at the least, and the longest frame with an error at its end 200 us: 250 us, and 1.5 ms at the
-// most.
+// A poll takes at least 4 cycles, and the longest frame with an error at its end takes 200 us. This number of polls
+// takes at least 250 us and at most 1.5 ms.
 #define ABORT_POLLS (BRD_CORE_HZ / 4U / 4000U)
-#define CAN_RESET   (1U << 25) // In RCC's APB1RSTR, RM0008 7.3.4 and RM0090 7.3.8.
-// A crystal that has not started by now is reported.
+#define CAN_RESET   (1U << 25) // In APB1RSTR of the RCC: RM0008 7.3.4 and RM0090 7.3.8.
+// Time after which a crystal that has not started is reported.
 #define CRYSTAL_LATE_US 100000U
-// While text waits the loop goes round this often.
+// Period of the loop while text waits.
 #define CHARACTER_US 1000U
 
 void brd_exti0_handler(void);
@@ -28,7 +28,7 @@ void brd_can_transmit_handler(void);
 void brd_can_receive_handler(void);
 void brd_can_error_handler(void);
 
-static brd_bxcan_t bus; // The interrupts' handlers have no argument to bring it.
+static brd_bxcan_t bus; // At file scope, because interrupt handlers have no argument.
 
 void brd_exti0_handler(void) {
     brd_estop_on_edge();
@@ -49,7 +49,7 @@ void brd_can_error_handler(void) {
     brd_wake();
 }
 
-/// Tries until the crystal runs; meanwhile time is counted on the internal oscillator, and lamp and console tell.
+/// Tries until the crystal runs. Until then the internal oscillator counts the time; lamp and console report the state.
 static void wait_for_crystal(void) {
     bool is_told = false;
     brd_time_start(BRD_INTERNAL_HZ);
@@ -67,8 +67,8 @@ static void wait_for_crystal(void) {
     brd_console_start(BRD_APB1_HZ);
 }
 
-/// Silent without a command source: the acknowledgement of an image that only listens would pass for a wheel's, and
-/// confirm frames to another master that no wheel has heard.
+/// Sets silent mode if there is no command source. The acknowledgement of an image that only listens would look like
+/// that of a wheel, and would confirm frames of another master that no wheel has received.
 static void start_bus(void) {
     const brd_bxcan_config_t config = {
         .registers = (brd_bxcan_registers_t *)BRD_BXCAN_ADDRESS,
@@ -107,9 +107,9 @@ static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool
     return true;
 }
 
-/// Steps the gateway before and after the commander: a request and a report can each take milliseconds, and the e-stop
-/// is read between any two of them. The watchdog is fed at the end: only a cycle that got through all of it counts as
-/// alive (fault 26).
+/// Steps the gateway before and after the commander, because a request and a report can each take milliseconds, and the
+/// e-stop is read between any two of them. The watchdog is fed at the end: only a complete cycle counts as alive (fault
+/// 26).
 static void cycle(iw_gateway_t *gateway, brd_commander_t *commander) {
     iw_time_us_t now_us = brd_time_now_us();
     (void)iw_gateway_step(gateway, now_us);

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "marker.h"
 
-#define SENDING 0x5E4D146BU // Two words, one the other's inverse: RAM after power-on does not look like this.
+#define SENDING 0x5E4D146BU // Stored with its inverse: RAM does not contain such a pair after power-on.
 
 __attribute__((section(".noinit"))) static volatile uint32_t word, inverse;
 
-static iw_time_us_t zeros_us; // Since when nothing but zeros is demanded; 0: something else is, or nothing.
-static bool zeros_proven;     // Both wheels' zeros of this hold have been acknowledged.
+static iw_time_us_t zeros_us; // Time since which only zeros are demanded; 0: something else is demanded, or nothing.
+static bool zeros_proven;     // Both wheels have acknowledged zeros in this hold.
 
 static void set(bool sending) {
     word = sending ? SENDING : 0U;
     inverse = sending ? ~SENDING : 0U;
 }
 
-/// Not cleared here when set: a run that dies before its zeros are acknowledged must find it again.
+/// Does not clear a set marker: if this run ends before its zeros are acknowledged, the next run must find it.
 bool brd_marker_take(bool power_on) {
     const bool was_sending = !power_on && word == SENDING && inverse == ~SENDING;
     if (!was_sending) {
@@ -22,7 +22,7 @@ bool brd_marker_take(bool power_on) {
     return was_sending;
 }
 
-/// A zero that was only handed over proves nothing; the marker goes with the first zeros that both wheels acknowledged.
+/// A zero that was only passed to the bus proves nothing. Only zeros that both wheels acknowledged clear the marker.
 void brd_marker_step(const iw_snapshot_t *seen) {
     const bool silent = seen->demand == IW_DEMAND_SILENCE;
     if (!silent) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008: 7.3 clock enables, 9.2 ports, 9.4 alternate functions.
+// Section numbers refer to RM0008: 7.3 clock enables, 9.2 ports, 9.4 alternate functions.
 #include "pins.h"
 
 typedef struct {
@@ -15,17 +15,17 @@ static_assert(sizeof(port_t) == 0x400, "port B follows port A");
 #define AFIO_EXTICR1 (*(volatile uint32_t *)0x40010008U)
 #define PORTS        ((port_t *)0x40010800U)
 
-// Four bits a pin, 9.2.1 and 9.2.2.
+// Four bits per pin: 9.2.1 and 9.2.2.
 #define INPUT_PULLED 0x8U
 #define OUTPUT_SLOW  0x2U
-#define ALTERNATE    0x9U // Push-pull, 10 MHz: enough for 1 Mbit/s, and quiet.
+#define ALTERNATE    0x9U // Push-pull, 10 MHz: fast enough for 1 Mbit/s, with low emission.
 
 static port_t *port_of(uint32_t pin) {
     return &PORTS[pin / 16U];
 }
 
 static void set_level(uint32_t pin, bool high) {
-    port_of(pin)->BSRR = (high ? 1U : 0x10000U) << (pin % 16U); // 9.2.5: the upper half clears.
+    port_of(pin)->BSRR = (high ? 1U : 0x10000U) << (pin % 16U); // 9.2.5: the upper half clears pins.
 }
 
 static bool is_high(uint32_t pin) {
@@ -38,7 +38,7 @@ static void set_mode(uint32_t pin, uint32_t mode) {
     *fields = (*fields & ~(0xFU << shift)) | (mode << shift);
 }
 
-/// 9.1.1: an input's output bit chooses up.
+/// 9.1.1: the output bit of an input selects the pull-up.
 static void pull_up(uint32_t pin) {
     set_level(pin, true);
     set_mode(pin, INPUT_PULLED);
@@ -54,19 +54,19 @@ static void enable_clocks(void) {
     APB1ENR |= (1U << 25) | (1U << 17);  // 7.3.8: CAN, USART2.
 }
 
-/// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
+/// Sets the pull-ups before the first read, so that an open contact or a cut wire reads high from the beginning.
 void brd_pins_init(void) {
     enable_clocks();
     pull_up(BRD_ESTOP);
     pull_up(BRD_BUTTON);
-    pull_up(BRD_CAN_RX); // No transceiver reads recessive.
+    pull_up(BRD_CAN_RX); // Without a transceiver the pin reads recessive.
     pull_up(BRD_UART_RX);
     brd_pins_lamp(false);
     set_mode(BRD_LAMP, OUTPUT_SLOW);
     AFIO_MAPR = (BRD_CAN_ON_PA11 != 0) ? 0U : (2U << 13); // 9.4.2: CAN_REMAP; SWJ_CFG 0 leaves the debugger its pins.
     set_mode(BRD_CAN_TX, ALTERNATE);
     set_mode(BRD_UART_TX, ALTERNATE);
-    AFIO_EXTICR1 = (AFIO_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.4.3: EXTI0's port.
+    AFIO_EXTICR1 = (AFIO_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.4.3: port of EXTI0.
 }
 
 bool brd_pins_estop_high(void) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 7.3 clock enables, 8.4 ports, 9.2 system configuration.
+// Section numbers refer to RM0090: 7.3 clock enables, 8.4 ports, 9.2 system configuration.
 #include "pins.h"
 
 typedef struct {
@@ -15,10 +15,10 @@ static_assert(sizeof(port_t) == 0x400, "port B follows port A");
 #define SYSCFG_EXTICR1 (*(volatile uint32_t *)0x40013808U)
 #define PORTS          ((port_t *)0x40020000U)
 
-// Two bits a pin in MODER (8.4.1), OSPEEDR (8.4.3) and PUPDR (8.4.4), four in AFR (8.4.9).
+// Two bits per pin in MODER (8.4.1), OSPEEDR (8.4.3) and PUPDR (8.4.4), four in AFR (8.4.9).
 #define OUTPUT    1U
 #define ALTERNATE 2U
-#define MEDIUM    1U // The slowest, after reset, has edges of up to 100 ns: a tenth of a bit.
+#define MEDIUM    1U // The slowest setting, that after reset, has edges of up to 100 ns: a tenth of a bit.
 #define PULL_UP   1U
 #define AF_USART2 7U
 #define AF_CAN1   9U
@@ -60,20 +60,20 @@ static void enable_clocks(void) {
     APB2ENR |= 1U << 14;                // 7.3.14: SYSCFG.
 }
 
-/// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
+/// Sets the pull-ups before the first read, so that an open contact or a cut wire reads high from the beginning.
 void brd_pins_init(void) {
     enable_clocks();
     brd_pins_lamp(false);
     set_two(&port_of(BRD_LAMP)->MODER, BRD_LAMP, OUTPUT);
     pull_up(BRD_ESTOP);
     pull_up(BRD_BUTTON);
-    pull_up(BRD_CAN_RX); // No transceiver reads recessive.
+    pull_up(BRD_CAN_RX); // Without a transceiver the pin reads recessive.
     pull_up(BRD_UART_RX);
     set_alternate(BRD_CAN_RX, AF_CAN1);
     set_alternate(BRD_CAN_TX, AF_CAN1);
     set_alternate(BRD_UART_RX, AF_USART2);
     set_alternate(BRD_UART_TX, AF_USART2);
-    SYSCFG_EXTICR1 = (SYSCFG_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.2.3: EXTI0's port.
+    SYSCFG_EXTICR1 = (SYSCFG_EXTICR1 & ~0xFU) | (BRD_ESTOP / 16U); // 9.2.3: port of EXTI0.
 }
 
 bool brd_pins_estop_high(void) {
@@ -86,5 +86,5 @@ bool brd_pins_button_low(void) {
 
 void brd_pins_lamp(bool lit) {
     const bool high = lit == (BRD_LAMP_LIT != 0);
-    port_of(BRD_LAMP)->BSRR = (high ? 1U : 0x10000U) << (BRD_LAMP % 16U); // 8.4.7: the upper half clears.
+    port_of(BRD_LAMP)->BSRR = (high ? 1U : 0x10000U) << (BRD_LAMP % 16U); // 8.4.7: the upper half clears pins.
 }

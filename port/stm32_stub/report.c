@@ -8,7 +8,7 @@
 
 #include "iwheel_northbound/words.h"
 
-// What is shown now, in one number; 0: nothing was shown yet.
+// State that was printed last, as one number; 0: none was printed yet.
 static uint32_t shown;
 
 static void pin(uint32_t number) {
@@ -49,7 +49,7 @@ void brd_report_start(bool restarted) {
     shown = 0;
 }
 
-/// The words are those of the gateway's protocol (docs/user/northbound.md), so that one manual serves both.
+/// Uses the words of the gateway's protocol (docs/user/northbound.md), so that one manual covers both.
 static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     const iw_state_t state = seen->state;
     brd_console_text(iwn_state_name(state));
@@ -74,7 +74,7 @@ iw_snapshot_t *brd_report_room(void) {
 
 void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     const uint32_t state = (uint32_t)seen->state;
-    // The top bit tells "nothing happens" from "nothing was shown".
+    // The top bit distinguishes the state 0 from "nothing was printed yet".
     const uint32_t now = 0x80000000U | (estop_pressed ? 0x10000U : 0U) | ((uint32_t)seen->stop->cause << 8) |
                          ((uint32_t)seen->bus << 4) | state;
     if (brd_console_asked()) {
@@ -86,7 +86,7 @@ void brd_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     }
 }
 
-/// With the cure where the operator at the machine has one.
+/// The text contains the fix if the operator at the machine can do one.
 void brd_report_reset(iw_refusal_t refusal) {
     static const char *const words[] = {
         [IW_REFUSE_NONE] = "done",

@@ -25,15 +25,15 @@ static_assert((BRD_SERIAL_RECEIVE_BYTES & (BRD_SERIAL_RECEIVE_BYTES - 1U)) == 0U
                   (BRD_SERIAL_SEND_BYTES & (BRD_SERIAL_SEND_BYTES - 1U)) == 0U,
               "the indices wrap at a power of two");
 
-// The DMA writes and reads these, and the interrupts' handlers have no argument: so they stand at file scope.
+// The DMA accesses these, and interrupt handlers have no argument, so they have file scope.
 static char received[BRD_SERIAL_RECEIVE_BYTES];
 static char waiting[BRD_SERIAL_SEND_BYTES];
-static uint32_t taken;     // Where the next byte received is read.
-static uint32_t put, sent; // Bytes of `waiting` since the start.
-static uint32_t sending;   // Of them, how many the DMA has now.
-static const char *lent;   // A buffer of somebody else's; NULL: none.
+static uint32_t taken;     // Position of the next received byte to read.
+static uint32_t put, sent; // Bytes put into and sent from `waiting` since the start.
+static uint32_t sending;   // Number of these bytes that the DMA sends now.
+static const char *lent;   // Buffer of a caller; NULL: none.
 static uint32_t lent_bytes;
-static uint32_t lent_at; // It goes before this byte of `waiting`.
+static uint32_t lent_at; // The buffer is sent before this byte of `waiting`.
 static bool lent_is_sending;
 static atomic_bool had_error;
 
@@ -99,7 +99,7 @@ bool brd_serial_is_idle(void) {
     return put == sent && lent == NULL && !brd_serial_dma_sends() && (USART2->SR & TC) != 0U;
 }
 
-/// What the DMA had is on its way.
+/// Marks the bytes as sent that the DMA has passed to the USART.
 static void settle(void) {
     if (lent_is_sending) {
         lent_is_sending = false;
@@ -127,7 +127,7 @@ void brd_serial_step(void) {
     }
 }
 
-/// Reading SR, then DR, ends pause and errors (27.6.1). The byte in DR has been fetched by the DMA already, or is
+/// Reading SR, then DR, clears pause and errors (27.6.1). The DMA has already fetched the byte in DR, or the byte is
 /// damaged.
 void brd_serial_usart_handler(void) {
     if ((USART2->SR & ERRORS) != 0U) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// Bytes to and from a host on USART2 (board_pins.h), 8N1, by DMA both ways: the CPU is woken for a pause, for half a
-/// buffer and for the end of what was sent, not for each byte. Nobody ever waits in here.
+/// Bytes to and from a host on USART2 (board_pins.h), 8N1, by DMA in both directions. The CPU wakes for a pause on the
+/// line, for half a buffer and for the end of a transmission, not for each byte. No function waits.
 ///
-/// What comes goes round in a buffer of BRD_SERIAL_RECEIVE_BYTES; who reads later than that long (10 ms at 1 Mbaud)
-/// gets bytes that are not in their order, which the lines' CRC tells. Sections are those of RM0008: 13 DMA, 27 USART;
-/// RM0090: 10 and 30.
+/// Received bytes go into a circular buffer of BRD_SERIAL_RECEIVE_BYTES. A caller that reads later than one length of
+/// the buffer (10 ms at 1 Mbaud) gets bytes in the wrong order, which the CRC of the lines detects. Section numbers
+/// refer to RM0008: 13 DMA, 27 USART; in RM0090 they are 10 and 30.
 #ifndef BRD_SERIAL_H
 #define BRD_SERIAL_H
 
@@ -13,52 +13,54 @@
 #include <assert.h>
 
 #ifndef BRD_SERIAL_BAUD
-#define BRD_SERIAL_BAUD 1000000U ///< 115200 to 2000000: -DIWHEEL_BAUD.
+#define BRD_SERIAL_BAUD 1000000U ///< 115200 to 2000000; set by -DIWHEEL_BAUD.
 #endif
 #define BRD_SERIAL_RECEIVE_BYTES 1024U ///< A power of two.
 #define BRD_SERIAL_SEND_BYTES    2048U ///< A power of two.
 
 static_assert(BRD_SERIAL_BAUD >= 115200U && BRD_SERIAL_BAUD <= 2000000U, "see BRD_SERIAL_BAUD");
 
-/// After `brd_pins_init`, and again after every change of the clock: begins anew, with nothing received and nothing to
-/// send.
+/// Call it after `brd_pins_init`, and again after every change of the clock. It discards all bytes that were received
+/// or wait to be sent.
 void brd_serial_start(uint32_t apb1_hz);
 
-/// Takes at most `size` bytes of what came; how many.
+/// Copies at most `size` received bytes to `out`. Returns their number.
 size_t brd_serial_read(char *out, size_t size);
 
-/// True once after a byte was lost or damaged on the wire (overrun, noise, framing).
+/// Returns true once after the line lost or damaged a byte (overrun, noise, framing).
 bool brd_serial_had_error(void);
 
-/// Bytes that `brd_serial_write` takes now.
+/// Returns the number of bytes that `brd_serial_write` accepts now.
 size_t brd_serial_room(void);
 
-/// Appends to what waits to be sent: all of it, or nothing and false.
+/// Appends the bytes to those that wait to be sent. If they do not all fit, it appends none and returns false.
 bool brd_serial_write(const char *bytes, size_t length);
 
-/// Sends from the caller's own buffer, after what waits now. False if it still sends one. Until `brd_serial_lends` is
-/// false the buffer must stay as it is.
+/// Sends from the caller's own buffer, after the bytes that wait now. Returns false if the previous such buffer is
+/// still in use. The buffer must not change until `brd_serial_lends` returns false.
 bool brd_serial_lend(const char *bytes, size_t length);
 bool brd_serial_lends(void);
 
-/// True when all is on the wire.
+/// Returns true when the last bit of all bytes is on the wire.
 bool brd_serial_is_idle(void);
 
-/// Goes on sending. After anything was written, and after each wake-up.
+/// Continues to send. Call it after every write and after each wake-up.
 void brd_serial_step(void);
 
-/// By one file per family: clocks the DMA and starts the channel that never ends.
+/// One file per family implements these functions. This one enables the clock of the DMA and starts the circular
+/// receive channel.
 void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length);
-/// Bytes until the receive buffer begins anew: `length` down to 1.
+/// Returns the number of bytes until the receive buffer wraps: `length` down to 1.
 uint32_t brd_serial_dma_left(void);
-/// Begins to send; only while nothing is sent.
+/// Starts to send. Call it only while the DMA sends nothing.
 void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length);
-/// False once all has been handed to the USART.
+/// Returns false when all bytes have been passed to the USART.
 bool brd_serial_dma_sends(void);
-/// Ends both interrupts of the DMA.
+/// Clears the flags of both DMA interrupts.
 void brd_serial_dma_acknowledge(void);
 
-/// The interrupts: pause on the line, DMA to and from memory. They only wake the main loop.
+/// Interrupt handlers: pause or error on the line, DMA to memory, DMA from memory. They clear their flags, note errors
+/// and wake the main loop.
 void brd_serial_usart_handler(void);
 void brd_serial_receive_handler(void);
 void brd_serial_transmit_handler(void);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008: 7.3.6 clock enable, 13.4 DMA; table 78: USART2 is on channels 6 (receive) and 7
+// Section numbers refer to RM0008: 7.3.6 clock enable, 13.4 DMA. Table 78: USART2 uses channels 6 (receive) and 7
 // (transmit) of DMA1.
 #include "serial.h"
 
@@ -24,7 +24,7 @@ typedef struct {
 #define FROM_MEMORY (1U << 4)
 #define CIRCULAR    (1U << 5)
 #define MEMORY_NEXT (1U << 7)
-#define HIGH        (2U << 12) // Priority: a byte that waits too long is lost, one to be sent is not.
+#define HIGH        (2U << 12) // Priority: a received byte that waits too long is lost, a byte to send is not.
 
 #define ALL_FLAGS (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
 

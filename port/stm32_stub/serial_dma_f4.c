@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 7.3.10 clock enable, 10.5 DMA; table 42: USART2 is channel 4 of DMA1's streams 5
+// Section numbers refer to RM0090: 7.3.10 clock enable, 10.5 DMA. Table 42: USART2 uses channel 4 of DMA1's streams 5
 // (receive) and 6 (transmit).
 #include "serial.h"
 
@@ -23,7 +23,7 @@ typedef struct {
 #define FROM_MEMORY (1U << 6)
 #define CIRCULAR    (1U << 8)
 #define MEMORY_NEXT (1U << 10)
-#define HIGH        (2U << 16) // Priority: a byte that waits too long is lost, one to be sent is not.
+#define HIGH        (2U << 16) // Priority: a received byte that waits too long is lost, a byte to send is not.
 #define CHANNEL_4   (4U << 25)
 
 #define ALL_FLAGS ((0x3DU << 6) | (0x3DU << 16)) // 10.5.4: streams 5 and 6.
@@ -32,8 +32,8 @@ void brd_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32
     AHB1ENR |= 1U << 21;
     RECEIVE->CR = 0;
     TRANSMIT->CR = 0;
-    // 10.3.17: off at once unless a byte is on its way, and then after it: here both are off since the
-    // reset, so that nothing is waited for.
+    // 10.3.17: a stream stops immediately, or after the byte in progress. Here both streams have been off since the
+    // reset, so the code does not wait.
     DMA1->HIFCR = ALL_FLAGS;
     RECEIVE->PAR = (uint32_t)(uintptr_t)data_register;
     RECEIVE->M0AR = (uint32_t)(uintptr_t)buffer;
@@ -45,7 +45,7 @@ uint32_t brd_serial_dma_left(void) {
     return RECEIVE->NDTR;
 }
 
-/// 10.3.17: the flags of the last time must be cleared before a stream is enabled again. It has disabled itself.
+/// 10.3.17: the flags of the last transfer must be cleared before a stream is enabled again. It has disabled itself.
 void brd_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     DMA1->HIFCR = 0x3DU << 16;
     TRANSMIT->PAR = (uint32_t)(uintptr_t)data_register;

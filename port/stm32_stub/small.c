@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What the C library and the compiler's own library have in faster and larger forms: the gateway image would not fit
-// into the 62 KiB of an STM32F103. Nothing here runs within a step of the core; texts and lines use it.
-// memcpy is the library's: with a slower one a line keeps the main loop from the e-stop for too long.
+// Small versions of functions for which the C library and the library of the compiler have larger, faster ones. With
+// those the gateway image would not fit into the 62 KiB of an STM32F103. A step of the core calls none of them; code
+// for texts and lines does. memcpy is that of the library, because with a slower one a line would delay the next read
+// of the e-stop for too long.
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -15,7 +16,7 @@ int strcmp(const char *one, const char *other);
 char *strchr(const char *text, int wanted);
 uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest);
 
-/// Four bytes anywhere: these processors read and write them in one instruction.
+/// Four bytes at any address: these processors read and write them in one instruction.
 typedef struct __attribute__((packed, may_alias)) {
     uint32_t value;
 } word_t;
@@ -96,7 +97,7 @@ char *strchr(const char *text, int wanted) {
     return (char *)(uintptr_t)text;
 }
 
-/// By 16 bits at a time, for which the processor has a division. Below 65536 only.
+/// Divides 16 bits at a time, for which the processor has a division. The divisor must be 1..65535.
 static uint64_t divide_by_small(uint64_t number, uint32_t divisor, uint32_t *out_rest) {
     uint64_t quotient = 0;
     uint32_t rest = 0;
@@ -109,7 +110,7 @@ static uint64_t divide_by_small(uint64_t number, uint32_t divisor, uint32_t *out
     return quotient;
 }
 
-/// By one bit at a time. By 0: 0.
+/// Divides one bit at a time. The quotient by 0 is 0.
 static uint64_t divide_by_large(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
     uint64_t quotient = 0;
     uint64_t rest = 0;
@@ -127,7 +128,8 @@ static uint64_t divide_by_large(uint64_t number, uint64_t divisor, uint64_t *out
     return quotient;
 }
 
-/// For the run-time functions of a division of 64 bits. Most of ours are by 1000, and the main loop waits for each.
+/// Serves the run-time functions for 64-bit division. Most divisors here are 1000, and the main loop waits for each
+/// call.
 uint64_t __udivmoddi4(uint64_t number, uint64_t divisor, uint64_t *out_rest) {
     uint64_t rest = 0;
     uint32_t small = 0;

@@ -8,7 +8,7 @@ void brd_exti0_handler(void);
 void brd_can_transmit_handler(void);
 void brd_can_receive_handler(void);
 void brd_can_error_handler(void);
-// Of serial.c: an image without it never enables them.
+// serial.c defines these handlers. An image without serial.c never enables their interrupts.
 __attribute__((weak)) void brd_serial_usart_handler(void);
 __attribute__((weak)) void brd_serial_receive_handler(void);
 __attribute__((weak)) void brd_serial_transmit_handler(void);
@@ -16,10 +16,10 @@ __attribute__((weak)) void brd_serial_transmit_handler(void);
 extern uint32_t brd_link_stack_top[], brd_link_data_load[], brd_link_data_start[], brd_link_data_end[];
 extern uint32_t brd_link_bss_start[], brd_link_bss_end[];
 
-/// Any fault, the failure of the crystal (NMI) and every unexpected exception: reset. If setpoints were being sent
-/// the next run begins with zeros; see marker.h. An overflow of the stack ends here too (see sections.ld), so the stack
-/// is not used; what the core makes of a fault without a stack, if not this handler, is a lockup, which the watchdog
-/// ends.
+/// Resets the chip after any fault, a failure of the crystal (NMI) or an unexpected exception. If setpoints were being
+/// sent, the next run begins with zeros; see marker.h. A stack overflow ends here too (see sections.ld), so the handler
+/// does not use the old stack. If the CPU cannot enter this handler without a stack, it locks up, and the watchdog
+/// resets the chip.
 __attribute__((naked)) static void fault_handler(void) {
     __asm volatile("ldr r0, =brd_link_stack_top\n msr msp, r0\n b brd_system_reset");
 }
@@ -44,7 +44,7 @@ typedef union {
 #define EXCEPTIONS 16
 #define VECTORS    (EXCEPTIONS + BRD_IRQ_SERIAL + 1)
 
-/// The vectors up to the last interrupt that is enabled. Empty ones cannot come.
+/// Vector table up to the last enabled interrupt. The exceptions without an entry cannot occur.
 __attribute__((section(".vectors"), used)) static const brd_vector_t vectors[VECTORS] = {
     [0] = {.stack_top = brd_link_stack_top},
     [1] = {.handler = brd_reset_handler},

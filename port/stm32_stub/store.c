@@ -11,7 +11,7 @@
 #define SLOTS      (BRD_FLASH_PAGE_WORDS / SLOT_WORDS)
 #define CRC_AT     (SLOT_WORDS - 1U)
 #define BLANK      0xFFFFFFFFU
-/// Fewer, and a start makes room: one for a configuration, one for what is learnt.
+/// With fewer blank slots a start erases the other page: one is for a configuration, one for learned facts.
 #define BLANK_LEAST 3U
 
 static_assert(BRD_STORE_WORDS + 2U <= CRC_AT, "sequence, payload and CRC fit a slot");
@@ -72,7 +72,7 @@ unsigned brd_store_blank(const brd_store_t *self) {
     return blank;
 }
 
-/// The CRC last: before it the record does not count.
+/// Writes the CRC last: without it the record is not valid.
 static bool write_slot(unsigned page, unsigned slot, uint32_t sequence, const uint32_t *payload) {
     bool good = brd_flash_write(page, slot * SLOT_WORDS, sequence);
     for (unsigned word = 0; word < BRD_STORE_WORDS && good; word++) {
@@ -81,7 +81,8 @@ static bool write_slot(unsigned page, unsigned slot, uint32_t sequence, const ui
     return good && brd_flash_write(page, slot * SLOT_WORDS + CRC_AT, crc_of(page, slot)) && is_right(page, slot);
 }
 
-/// Into the first blank slot of the page. One that fails is not blank any more, and the next is tried.
+/// Writes into the first blank slot of the page. After a failure that slot is not blank any more, and the next is
+/// tried.
 static bool write_in(brd_store_t *self, unsigned page, const uint32_t *payload) {
     for (unsigned slot = 0; slot < SLOTS; slot++) {
         if (is_blank(page, slot) && write_slot(page, slot, self->sequence + 1U, payload)) {
@@ -100,7 +101,7 @@ bool brd_store_write(brd_store_t *self, const uint32_t payload[BRD_STORE_WORDS],
     if (!may_erase || brd_store_blank(self) >= BLANK_LEAST) {
         good = write_in(self, self->page, payload);
     }
-    if (!good && may_erase) { // The newest record is on the page that stays.
+    if (!good && may_erase) { // The newest record is on the page that is not erased.
         good = brd_flash_erase(other) && write_in(self, other, payload);
     }
     self->failed = !good;

@@ -6,7 +6,7 @@
 #include <assert.h>
 #include <stdint.h>
 
-// RM0008 19.4, RM0090 21.4: key, prescaler, reload, status.
+// Registers (RM0008 19.4, RM0090 21.4): key, prescaler, reload, status.
 typedef struct {
     volatile uint32_t KR, PR, RLR, SR;
 } iwdg_t;
@@ -18,8 +18,8 @@ typedef struct {
 #define BY_4   0U
 #define RELOAD (BRD_LSI_MAX_HZ / 4U * BRD_WATCHDOG_MS / 1000U + 1U)
 
-// The registers take the values within 5 cycles of the slow oscillator; reads of SR take 8 cycles of the core at the
-// least.
+// The registers accept the values within 5 cycles of the slow oscillator. A read of SR takes at least 8 cycles of the
+// core.
 #define POLLS_MAX (BRD_INTERNAL_HZ / 8U / 1000U)
 
 static_assert(RELOAD <= 0xFFFU, "12 bits");

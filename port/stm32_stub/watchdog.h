@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// The independent watchdog: its own oscillator, never to be stopped again. Fed by a complete cycle of the main loop,
-/// before that loop by a complete attempt to start the crystal (nothing can be sent yet), and by nothing else.
+/// Independent watchdog with its own oscillator; it cannot be stopped. A complete cycle of the main loop feeds it.
+/// Before that loop, when nothing can be sent yet, a complete attempt to start the crystal feeds it. Nothing else does.
 #ifndef BRD_WATCHDOG_H
 #define BRD_WATCHDOG_H
 
-/// It resets the chip unless fed at least every this many milliseconds, however fast its oscillator.
+/// The longest time in milliseconds between two feeds that never resets the chip, even with the fastest oscillator.
 #define BRD_WATCHDOG_MS 60U
 
 void brd_watchdog_start(void);

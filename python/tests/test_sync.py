@@ -155,13 +155,7 @@ class Driving(RigCase):
 
     def python(self, script):
         environment = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python", "src")}
-        child = subprocess.Popen(
-            [sys.executable, "-c", script, self.socket],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        child = subprocess.Popen([sys.executable, "-c", script, self.socket], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
         def end():
             child.kill()

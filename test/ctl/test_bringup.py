@@ -34,7 +34,7 @@ class Bringup(unittest.TestCase):
         self.records = os.path.join(self.folder.name, "records")
         with open(self.out + ".from", "w", encoding="utf-8") as file:
             file.write(f"[record]\ndirectory = {self.records}\n")
-        self.runtime = tempfile.mkdtemp(prefix="iwbr-")
+        self.runtime = tempfile.mkdtemp(prefix="iwbr-", dir="/tmp")  # bringup uses a folder of at most 30 characters.
         self.addCleanup(self.nothing_left_behind)
         time.sleep(0.5)
 
@@ -54,7 +54,7 @@ class Bringup(unittest.TestCase):
             self.assertLess(time.monotonic(), end, "bringup's folder is left behind")
             time.sleep(0.05)
 
-    def start(self, *words):
+    def start(self, *words, variables=None):
         operator = Operator(
             [
                 find_program(BUILD, "iwheelctl"),
@@ -68,7 +68,7 @@ class Bringup(unittest.TestCase):
                 self.out + ".from",
                 *words,
             ],
-            environment(self.runtime),
+            variables or environment(self.runtime),
         )
         self.addCleanup(self.end, operator)
         return operator
@@ -363,6 +363,16 @@ class Bringup(unittest.TestCase):
         operator.answer("Did both wheels turn", "q")
         self.assertEqual(1, operator.wait())
         self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
+
+    def test_recording_without_a_speed_leaves_the_types_to_try(self):
+        recording = os.path.join(self.folder.name, "zeros.log")
+        with open(recording, "w", encoding="utf-8") as file:
+            file.writelines(f"({at * 0.02:.6f}) can0 10A#0300000000\n" for at in range(50))
+        operator = self.begin("--learn", recording)
+        operator.expect("there is no setpoint with a speed")
+        operator.expect("types to try [0-7] ")
+        operator.type("q\n")
+        self.assertEqual(1, operator.wait())
 
     def test_any_key_stops_the_wheels_at_once(self):
         operator = self.begin()
@@ -788,21 +798,7 @@ class Bringup(unittest.TestCase):
             self.ends_soon(operator)
 
     def test_folder_in_tmp_is_removed_when_there_is_no_runtime_directory(self):
-        operator = Operator(
-            [
-                find_program(BUILD, "iwheelctl"),
-                "bringup",
-                self.out,
-                "--can",
-                f"unix:{self.rig.path('bus')}",
-                "--estop",
-                f"unix:{self.rig.path('button')}",
-                "--from",
-                self.out + ".from",
-            ],
-            environment(),
-        )
-        self.addCleanup(operator.close)
+        operator = self.start(variables=environment())
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
         with open(f"/proc/{children(operator.process.pid)['iwheel-gateway']}/cmdline", "rb") as file:

@@ -4,6 +4,7 @@
 #include "old_reader.h"
 
 #include "iwheel_northbound/text.h"
+#include "request_fields.h"
 
 #include <inttypes.h>
 #include <jansson.h>
@@ -89,9 +90,10 @@ static const field_t fields[] = {
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-static const char *const cmd_names[IWN_CMDS] = {"hello", "status",  "watch",      "arm",       "drive",   "twist",
-                                                "stop",  "disarm",  "estop",      "reset",     "release", "tare",
-                                                "why",   "confirm", "recordings", "recording", "config"};
+// The names alone are those of the description: test/northbound and the unit tests judge them.
+#define NAME(name) #name,
+#define WORD(name) " " #name
+static const char *const cmd_names[IWN_CMDS] = {IWN_REQUEST_NAMES(NAME)};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
                                                          const char *format, ...) {
@@ -277,10 +279,7 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
             return true;
         }
     }
-    return refuse(
-        out_refusal, IWN_UNKNOWN_CMD,
-        "cmd must be one of hello status watch arm drive twist stop disarm estop reset release tare why confirm "
-        "recordings recording config");
+    return refuse(out_refusal, IWN_UNKNOWN_CMD, "cmd must be one of" IWN_REQUEST_NAMES(WORD));
 }
 
 static const field_t *find_field(const char *name, iwn_cmd_t cmd) {

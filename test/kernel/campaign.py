@@ -203,8 +203,7 @@ class Campaign:
 
 def parse(arguments):
     parser = argparse.ArgumentParser(
-        prog="test/kernel/run",
-        description="Tests on a real Linux kernel that runs as an ordinary process, in virtual and in real time.",
+        prog="test/kernel/run", description="Tests on a real Linux kernel that runs as an ordinary process, in virtual and in real time."
     )
     root = os.path.dirname(os.path.dirname(HERE))
     parser.add_argument("--build", default=os.path.join(root, "build", "default"), metavar="DIR", help="build directory")

@@ -16,69 +16,93 @@ ROWS = {
     2: "client frozen, its socket open",
     3: "client sends and never reads",
     4: "two clients command",
-    5: "observers die, flood, connect 1000 times; no descriptor left",
-    6: "client comes back with an old intention",
-    7: "nonzero command already there at start and at reset",
+    5: "observers end, flood, connect 1000 times; no descriptor left",
+    6: "client returns and continues with an old command",
+    7: "nonzero command present at start and at reset",
     8: "1 MB line, no newline, bytes one by one",
-    9: "JSON that is none, or is too much",
-    10: "value out of range, one wheel good and the other bad",
+    9: "invalid JSON, too much JSON",
+    10: "value out of range, one wheel valid and the other invalid",
     11: "e-stop in motion, at random phase",
     12: "e-stop pulse of 0 to 20 ms",
     13: "e-stop pressed at start, chattering, reset repeated",
-    14: "GPIO chip vanishes, line busy, no such line",
-    15: "interface down, deleted and made again, adapter unplugged",
+    14: "GPIO chip disappears, line busy, line missing",
+    15: "interface down, deleted and created again, adapter unplugged",
     16: "bus-off, error passive, flood of error frames",
     17: "no buffers, stalled adapter, late or missing echo",
-    18: "wheel power cut for 10 s at full command, then back",
+    18: "wheel power off for 10 s at full command, then on",
     19: "foreign setpoints, forged error frames",
     20: "remote, extended, FD and short frames on known ids",
     21: "a full bus",
-    22: "wheels silent, or not doing what they are told",
+    22: "wheels offline, or not following their setpoints",
     23: "force in the wrong unit, loaded or late start, reboot",
     24: "wall clock stepped, process stopped, CPU starved",
     25: "gateway killed, aborted, terminated",
     26: "loop alive but stuck",
     27: "disk full or read-only, stderr blocked",
-    28: "something else at the socket's path",
-    29: "bad configuration",
+    28: "another file at the path of the socket",
+    29: "invalid configuration",
     30: "two gateways on one interface",
 }
 HEAD = """# The fault catalogue, measured
 
-What happens when something goes wrong, row by row, as measured on a real Linux kernel that runs as an ordinary process
-(SocketCAN, slcan, GPIO lines). This page is written by one command, which runs every test anew:
+This page shows how the gateway reacts to each fault. The figures are measured on a real Linux kernel that runs as an
+ordinary process (SocketCAN, slcan, GPIO lines).
 
-    test/kernel/run --report
+| command | result |
+|---|---|
+| `test/kernel/run --list` | lists the tests |
+| `test/kernel/run --only NAME` | runs the tests whose name contains NAME |
+| `test/kernel/run --report` | runs every test and writes this page |
 
-In **virtual time** the processor is infinitely fast, so those figures show what the rules cost, not the machine. In **real time**
-the kernel runs on the machine of this run; its timer ticks every 10 ms, and between left and right it may let another process run for
-that long, so that pairs are allowed one tick more than the 5 ms of virtual time.
+There are two kinds of time:
 
-Row 31, one wheel that does something else than the other, is measured in degrees: [pair.md](../user/pair.md) has the table, before and after.
+- In **virtual time** the processor is infinitely fast. Its figures show the effect of the rules, without the machine.
+- In **real time** the kernel runs on the machine of this run. Its timer ticks every 10 ms. Between the left and the
+  right setpoint, the kernel may run another process for that long. Pairs may therefore need one tick more than the 5 ms
+  of virtual time.
+
+In row 31, one wheel moves differently from the other. [pair.md](../user/pair.md) has the angles, before and after. The
+[safety case](safety-case.md#the-fault-catalogue) has the rows 32 to 34, and the tests of all other rows.
 
 | # | fault | tests: kernel | tests: local bus | longest gap | stop begins within | old frames |
 |---|---|---|---|---|---|---|
 """
 LEGEND = """
-*Longest gap*: between setpoints of one wheel while the bus took frames (100 ms allowed). *Stop begins within*: from the fault to the
-first setpoint that is slower, the worst of all tests of the row. *Old frames*: nonzero setpoints that came out on the bus after a
-stall, an outage or a stop was over, the most of all tests of the row; on an adapter whose echo proves nothing they cannot be ruled
-out (see below). `--`: not measured by any test of the row. Tests in real time beside which the machine stalled each time, at the
-end and alone too, are not judged, and not counted.
+- *tests: kernel*: passed tests of all judged tests. *tests: local bus*: number of tests in `test/system`.
+- *longest gap*: the longest time between setpoints of one wheel while the bus accepted frames. The limit is 100 ms.
+- *stop begins within*: the time from the fault to the first slower setpoint, the worst of all tests of the row.
+- *old frames*: nonzero setpoints that reached the bus after a stall, an outage or a stop was over, the most of all
+  tests of the row. They are possible on an adapter whose echo proves nothing (see below).
+- `--`: no test of the row measures this value.
+
+A test in real time is not judged and not counted if the machine stalled during each attempt, even during the last one,
+which runs alone.
 """
 NATIVE = """
-`test/kernel/run --native`, the tests in real time on a machine's own kernel with its modules vcan, slcan and gpio-sim, has not been run on
-such a machine: none was at hand. It has been run inside the kernel of these tests, which has all it asks for (`plumbing_native`: nine
-tests with vcan, an adapter, GPIO lines and a planted late gateway); what it answers where something is missing is tested by
-`test/kernel/test_native.py`.
+## What is not covered
 
-**A kernel that nobody here configured.** The group `controllers` runs on the distribution's own kernel in an emulated machine with two
-Kvaser PCI cards (SJA1000) on one bus: gateway on one, wheels and recorder on the other. Bit timing goes over netlink, the echo is the
-driver's, and another rate or sample point is told and refused. Neither bus errors nor the time of a frame are modelled there, and
-Debian 12's kernel has no gpio-sim, so that the button is the local one. Row 20 is left out: after a remote frame the emulated controller
-receives nothing any more, not even after down and up. A few tests run each time, all of them with `--full`. So do, with
-`--full`, two other machines: `controllers-ctucan` with CTU CAN FD, whose driver is built from the source of Debian's kernel (it says STOPPED
-until an error, so that the carrier decides), and `controllers-arm64` with the packages for arm64 on Debian's kernel and libraries for it.
+**The machine's own kernel.** `test/kernel/run --native` runs the tests in real time on the machine's own kernel, with
+the modules vcan, slcan and gpio-sim. It has not been run on such a machine, because none was available. It has been run
+inside the kernel of these tests, which has everything that they need (`plumbing_native`: nine tests with vcan, an
+adapter, GPIO lines and a gateway with a seeded delay). `test/kernel/test_native.py` tests the messages about missing
+modules.
+
+**A kernel of a distribution.** The group `controllers` runs on the distribution's own kernel in an emulated machine
+with two Kvaser PCI cards (SJA1000) on one bus. The gateway uses one card, the wheels and the recorder use the other.
+The gateway sets no bit timing: it reads it over netlink, and reports and refuses another bit rate or sample point. The
+driver sends the echo. A few tests run each time, all of them with `--full`.
+
+The emulated machine has these limits:
+
+- It models neither bus errors nor the duration of a frame.
+- The kernel of Debian 12 has no gpio-sim, so the button is the one of the local bus.
+- Row 20 is left out. After a remote frame, the emulated controller receives nothing, not even after down and up.
+
+With `--full`, two other machines run the same tests:
+
+- `controllers-ctucan` has CTU CAN FD. Its driver is built from the source of Debian's kernel. The driver reports
+  STOPPED until an error happens, so the gateway uses the carrier.
+- `controllers-arm64` has the packages for arm64, on Debian's kernel and libraries for arm64.
 """
 
 
@@ -105,11 +129,16 @@ ESTOP = """
 |---|---|---|---|---|---|
 """
 ESTOP_LEGEND = """
-To the second of both zeros. *From the edge*: since the kernel's stamp of the line's edge. *From the level*: since the moment at which the
-test began to write the line's level. That is 0.7 ms before a tick of that kernel, because its simulated line tells of an edge at the next
-tick only; what is left of that wait is in the figure, and so is the gateway's next look at the level, which may come before the edge: it
-looks whenever a frame, a client or its own period of 20 ms wakes it. A stop that was complete at the edge has no time from the edge, so
-those presses are fewer in real time.
+The time ends with the second of the two zeros.
+
+- *the edge*: the time starts at the kernel's time stamp of the edge of the line.
+- *the level*: the time starts when the test begins to write the level of the line. That is 0.7 ms before a tick of that
+  kernel, because its simulated line reports an edge only at the next tick. The figure contains the rest of this wait.
+  It also contains the time until the gateway reads the level again. The gateway can read the level before the edge: a
+  frame, a client or its own period of 20 ms wakes it.
+
+If the stop was complete at the edge, the press has no time from the edge. The row in real time therefore counts fewer
+presses from the edge.
 """
 
 
@@ -133,10 +162,10 @@ def estop_text(results, real_time):
 
 
 def figure_lines(results, title, names):
-    lines = ["", f"## {title}", ""]
+    lines = ["", f"## {title}", "", "| test | group | figures |", "|---|---|---|"]
     for r in results:
         if any(r["name"].startswith(name) for name in names) and r["figures"] and r["verdict"] != "skipped":
-            lines.append(f"- {ENTRIES[r['name']].title} ({r['group']}): {', '.join(r['figures'])}")
+            lines.append(f"| {ENTRIES[r['name']].title} | `{r['group']}` | {', '.join(r['figures'])} |")
     return lines
 
 
@@ -148,9 +177,9 @@ def run_text(outcomes, options):
     if options.full:
         text += " With `--full`: 1000 presses, in virtual and in real time, "
     else:
-        text += "\n100 presses in motion (and 25 for each other way of wiring), "
+        text += "\n100 presses in motion (and 25 for each other wiring), "
     text += f"a soak of {options.hours:g} virtual h."
-    for word, tests in (("Failed", last.names("failed")), ("Not judged, because the machine was late each time", last.names("skipped"))):
+    for word, tests in (("Failed", last.names("failed")), ("Not judged, because the machine stalled each time", last.names("skipped"))):
         text += f"\n{word}: {', '.join(tests)}." if tests else ""
     if not options.full:
         text += "\nNot run for this page: `--full`, with a soak of 24 virtual hours and 1000 presses."
@@ -162,7 +191,7 @@ def row_text(outcomes):
     if len(outcomes) == 1:
         return "Not run for this page: several campaigns in a row (`--repeat`).\n"
     lines = "".join(f"- {line}\n" for line in repeated.summary(outcomes, len(outcomes)))
-    return f"\nIt was the last of {len(outcomes)} campaigns in a row, whose presses are all in the table of the e-stop:\n\n{lines}"
+    return f"\nThis is the last of {len(outcomes)} campaigns in a row. The table of the e-stop contains the presses of all of them:\n\n{lines}"
 
 
 def write(outcomes, options):

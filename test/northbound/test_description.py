@@ -31,7 +31,7 @@ SOURCES = {
     "ledger_state": ("lib/northbound/protocol/src/words.c", "iwn_assumption_state_name", set()),
     "evidence": ("lib/northbound/protocol/src/words.c", "iwn_source_name", set()),
     "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
-    "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "memory_state": ("app/gateway/assumptions/assumptions_json.c", "write_store", {"memory", "file", "state", "reason"}),
     "fault_alone": [
         ("lib/northbound/server/src/observe.c", "observe_faults", set()),
         ("lib/northbound/server/src/observe.c", "observe_rolling_fault", set()),

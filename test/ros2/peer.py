@@ -42,10 +42,7 @@ def store(release="JAZZY"):
 class Types:
     """DDS types by their ROS names, such as nav_msgs/msg/Odometry."""
 
-    ODD = {
-        "std_srvs/msg/TriggerRequest": "std_srvs::srv::dds_::Trigger_Request_",
-        "std_srvs/msg/TriggerResponse": "std_srvs::srv::dds_::Trigger_Response_",
-    }
+    ODD = {"std_srvs/msg/TriggerRequest": "std_srvs::srv::dds_::Trigger_Request_", "std_srvs/msg/TriggerResponse": "std_srvs::srv::dds_::Trigger_Response_"}
 
     def __init__(self, typestore):
         self.store, self.made = typestore, {}

@@ -206,6 +206,7 @@ def typed_drive(t):
     time.sleep(0.6)
     t.check(not typed.ride.moving(now_us() - 100_000), "Ctrl-C stops")
     t.stopped_by(typed.ride.client, "client_stop", typed.ride.client.request("status")["state"])
+    typed.ride.silence()  # An e-stop begins the hold of zero anew.
     typed.ride.client.request("estop")
     said = typed.jazzy.type(DRIVES[0])
     t.check("iwheel/arm: " in said and "reset" in said, f"refused with the fix: {said[-300:]}")

@@ -102,12 +102,7 @@ class Units(unittest.TestCase):
         limits = {**dict.fromkeys(GATEWAYS, EXPOSURE_MAX), "iwheel-can-restart@.service": RESTART_EXPOSURE_MAX, ROS2: ROS2_EXPOSURE_MAX, SERIAL: EXPOSURE_MAX}
         for unit, limit in limits.items():
             path = os.path.join(SHARE, "systemd", unit)
-            done = subprocess.run(
-                ["systemd-analyze", "security", "--offline=true", f"--threshold={limit}", path],
-                capture_output=True,
-                text=True,
-                check=False,
-            )
+            done = subprocess.run(["systemd-analyze", "security", "--offline=true", f"--threshold={limit}", path], capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stdout[-200:])
 
     def test_the_units_are_clean(self):

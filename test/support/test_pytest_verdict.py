@@ -78,7 +78,7 @@ FAULTS = (
         'report.told, report.longrepr = "skipped"',
         "test_late_on_a_late_machine_is_not_judged",
     ),
-    ("pytest's own status wins", "session.exitstatus = run.end()", "run.end()", "test_late_on_a_late_machine_is_not_judged"),
+    ("pytest's own status wins", "session.exitstatus = MISSING if", "_ = MISSING if", "test_late_on_a_late_machine_is_not_judged"),
     ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),

@@ -27,11 +27,7 @@ SERVICE_NICE = -10
 PACE = {"slow": 1}  # how many times slower than documented telemetry comes, where time is virtual: test/kernel/catalogue.py
 WORDS = 800  # of a program's, beside a failure
 RESTART_US = 300_000  # row 25: it answers, and so sends its zeros, this soon after a restart
-DEFAULTS = {
-    "wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540},
-    "drive": {},
-    "northbound": {"mode": "0600"},
-}
+DEFAULTS = {"wheels": {"setpoint_type": 1, "current_role": "limit", "track_mm": 540}, "drive": {}, "northbound": {"mode": "0600"}}
 
 
 STRANGER = 65534
@@ -115,14 +111,7 @@ class Process:
                 setup()
 
         with open(output, "ab") as file:
-            self.child = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=options.pop("stdout", file),
-                stderr=file,
-                preexec_fn=prepare,
-                **options,
-            )
+            self.child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=options.pop("stdout", file), stderr=file, preexec_fn=prepare, **options)
 
     def signal(self, number):
         if self.child.poll() is None:

@@ -119,12 +119,7 @@ class Judge(Reading):
         limit_us = last.done_us + (config.lease_ms + config.period_ms) * 1000 + self._ramp_us(config.max_speed_mm_s) + JITTER_US
         if setpoint.t_us > limit_us:
             excess_us = setpoint.t_us - limit_us
-            self._say(
-                "lease",
-                setpoint.t_us,
-                f"{name} later than lease, period and ramp by {excess_us / 1000:.0f} ms",
-                excess_us,
-            )
+            self._say("lease", setpoint.t_us, f"{name} later than lease, period and ramp by {excess_us / 1000:.0f} ms", excess_us)
 
     def _speed_at(self, t_us):
         before = [abs(s.speed) for s in self._setpoints_between(t_us - GAP_US, t_us + JITTER_US + 1)]
@@ -324,12 +319,7 @@ class Judge(Reading):
         limit_us = min(limit_us, max(hold_us, zero_us + HOLD_MAX_US)) + GAP_US
         if times[-1] > limit_us and not self._is_dead(zero_us, times[-1]):
             late_us = times[-1] - limit_us
-            self._say(
-                "no_silence",
-                times[-1],
-                f"still sending {late_us / 1000:.0f} ms after the hold should have ended",
-                late_us,
-            )
+            self._say("no_silence", times[-1], f"still sending {late_us / 1000:.0f} ms after the hold should have ended", late_us)
 
     def _listening(self):
         """Nothing is sent before arm, and nothing while no gateway runs."""

@@ -137,8 +137,7 @@ class Reading:
     def _first_out_us(self, alive_us):
         """The bus takes frames again when one comes out: a wheel that has power first starts, then acknowledges."""
         return next(
-            (frame.t_us for frame in self.frames if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US),
-            alive_us,
+            (frame.t_us for frame in self.frames if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US), alive_us
         )
 
     def bus_stalls(self):
@@ -230,15 +229,7 @@ class Reading:
             if event.t_us > min((at + within for at, _, within in session.ends), default=event.t_us) + ECHO_US:
                 self._say("drive_after_end", event.t_us, "a drive was accepted although the session had ended")
             session.drives.append(event)
-        kinds = {
-            "stop": "ramp",
-            "gone": "ramp",
-            "ramp": "ramp",
-            "press": "press",
-            "estop": "press",
-            "cut": "cut",
-            "end": "killed",
-        }
+        kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}
         if event.kind in kinds:
             session.ends.append((event.t_us, kinds[event.kind], event.within_us))
 
@@ -249,11 +240,7 @@ class Reading:
             if previous is not None and drive.kind == "drive":
                 late_us = drive.t_us - (previous.done_us + self._lease_us(previous)) - config.period_ms * 1000
                 if late_us > JITTER_US:
-                    self._say(
-                        "late_drive",
-                        drive.t_us,
-                        f"a drive was accepted {late_us / 1000:.0f} ms after the lease had ended",
-                    )
+                    self._say("late_drive", drive.t_us, f"a drive was accepted {late_us / 1000:.0f} ms after the lease had ended")
             previous = drive
         if previous is not None:
             end_us = previous.done_us + self._lease_us(previous)

@@ -208,11 +208,7 @@ def faults():
     yield "a latching fault answered late", f, [*e, Event(3000 * MS, "cut", within_us=100 * MS)], "nonzero_after_cut"
     yield "old setpoints out of a queue", f, [*e, Event(2500 * MS, "dead"), Event(3300 * MS, "alive", 3300 * MS)], "motion_on_dead_bus"
     yield "a bus that lives again before it died", f, [*e, Event(2500 * MS, "alive", 2500 * MS), Event(2501 * MS, "dead")], "timeline"
-    off = [
-        Event(9_500 * MS, "dead"),
-        Event(9_500 * MS, "cut", within_us=50 * MS),
-        Event(12_000 * MS, "alive", 12_000 * MS),
-    ]
+    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
     dark = between(f, 9_500, 99_999, drop)
     yield "two old frames after the bus lives again", add(dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)), e + off, "old_frame"
     yield "an old frame without its zero", add(dark, *pair(12_001, -200, 200)), e + off, "old_frame"
@@ -248,11 +244,7 @@ def goods():
         yield name, good(config), e, {"config": config}
     yield "foreign frames of the scenario's own", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
     yield "one pair on its way at the e-stop", add(f, *pair(3_520.2, 300, 300)), e, {}
-    off = [
-        Event(9_500 * MS, "dead"),
-        Event(9_500 * MS, "cut", within_us=50 * MS),
-        Event(12_000 * MS, "alive", 12_000 * MS),
-    ]
+    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
     yield (
         "one old frame per wheel and its zero",
         add(between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)),

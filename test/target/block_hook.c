@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The emulated CPU's clock: called by Unicorn before each block of code, half a million times in a second of virtual time. And what ends
-// a run of code for another reason: an exception's end, or an abort.
+// The clock of the emulated CPU: Unicorn calls it before each block of code, half a million times per second of virtual
+// time. The second hook handles the other reasons that end a run of code: the end of an exception, or an abort.
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -11,7 +11,7 @@ typedef struct {
     int64_t spent; ///< Cycles since the user set it to 0.
     int32_t is_asked_to_stop;
     int32_t has_stopped;
-    int32_t trap;              ///< Unicorn's number of what ended the run, or -1.
+    int32_t trap;              ///< Unicorn's number of the exception that ended the run, or -1.
     int (*stop)(void *engine); ///< uc_emu_stop.
 } block_clock_t;
 

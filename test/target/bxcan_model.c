@@ -34,7 +34,7 @@ void bxcan_model_reset(bxcan_model_t *self, uint32_t banks) {
     self->fmr = 0x2A1C0E01U;
 }
 
-/// The handshakes of chapter 4: what is asked for by INRQ and SLEEP, and when it is acknowledged.
+/// The handshakes of chapter 4: the requests of INRQ and SLEEP, and the time of their acknowledgement.
 static void settle_mode(bxcan_model_t *self) {
     bool on_bus = false;
     for (int i = 0; i < MODEL_MAILBOXES; i++) {
@@ -77,7 +77,7 @@ static void complete(bxcan_model_t *self, int mailbox, uint32_t flags) {
     self->tsr = (self->tsr & ~(0xFU << (8U * (uint32_t)mailbox))) | ((TSR_RQCP | flags) << (8U * (uint32_t)mailbox));
 }
 
-/// An abort of a scheduled mailbox: what the last attempt came to stays readable.
+/// Aborts a scheduled mailbox. The result of the last attempt stays readable.
 static void complete_abort(bxcan_model_t *self, int mailbox) {
     complete(self, mailbox, (self->tsr >> (8U * (uint32_t)mailbox)) & (TSR_ALST | TSR_TERR));
 }
@@ -248,7 +248,8 @@ bool bxcan_model_is_on(const bxcan_model_t *self) {
     return (self->msr & (MSR_INAK | MSR_SLAK)) == 0U && !self->bus_off;
 }
 
-/// 4.2: normal mode begins after 11 recessive bits. 7.6: bus-off ends after 128 times 11, if software has begun the recovery.
+/// 4.2: normal mode begins after 11 recessive bits. 7.6: bus-off ends after 128 times 11, if software has begun the
+/// recovery.
 static void look_for_idle(bxcan_model_t *self) {
     if (self->joining) {
         self->joining = false;
@@ -281,7 +282,8 @@ void bxcan_model_dominant(bxcan_model_t *self) {
     self->recessive_bits = 0;
 }
 
-/// 7.1: the lowest identifier first, of equal ones the lowest mailbox; with TXFP in the order of the requests.
+/// 7.1: the lowest identifier is first; of equal identifiers, the lowest mailbox. With TXFP, the order of the requests
+/// applies.
 static uint64_t rank(const bxcan_model_t *self, const model_mailbox_t *box) {
     if ((self->mcr & MCR_TXFP) != 0U) {
         return box->order;
@@ -290,7 +292,7 @@ static uint64_t rank(const bxcan_model_t *self, const model_mailbox_t *box) {
     const uint64_t base = box->tir >> 21;
     const uint64_t rest = extended ? (box->tir >> 3) & 0x3FFFFU : 0U;
     const uint64_t remote = (box->tir >> 1) & 1U;
-    // On the bus: 11 bits, RTR or SRR, IDE, 18 bits, RTR.
+    // Order on the bus: 11 bits, RTR or SRR, IDE, 18 bits, RTR.
     return (base << 21) | ((extended ? 1U : remote) << 20) | ((extended ? 1ULL : 0ULL) << 19) | (rest << 1) |
            (extended ? remote : 0U);
 }
@@ -330,8 +332,8 @@ static void count_transmit_error(bxcan_model_t *self, model_end_t end) {
     model_note_errors(self);
 }
 
-/// 7.1 and 9.2: ALST and TERR tell about the last attempt, also while the mailbox is scheduled again; RQCP comes with the end of the
-/// request, and TXOK only with a success.
+/// 7.1 and 9.2: ALST and TERR describe the last attempt, also while the mailbox is scheduled again. RQCP is set at the
+/// end of the request, and TXOK only with a success.
 static void note_failure(bxcan_model_t *self, int mailbox, model_end_t end) {
     const uint32_t flag = (end == MODEL_LOST_ARBITRATION) ? TSR_ALST : TSR_TERR;
     if (end != MODEL_LOST_ARBITRATION) {

@@ -46,7 +46,8 @@ uint32_t model_filter_read(bxcan_model_t *self, uint32_t offset) {
     return *found;
 }
 
-/// 9.4: mode, scale and assignment only in filter initialisation; a bank's values only there or while the bank is inactive.
+/// 9.4: mode, scale and assignment can change only in filter initialisation. The values of a bank can change only there
+/// or while the bank is inactive.
 void model_filter_write(bxcan_model_t *self, uint32_t offset, uint32_t value) {
     uint32_t *const found = filter_register(self, offset);
     const bool initialising = (self->fmr & 1U) != 0U;
@@ -68,13 +69,13 @@ void model_filter_write(bxcan_model_t *self, uint32_t offset, uint32_t value) {
     *found = (offset == 0x200U) ? (value & 0x00003F01U) | 0x2A1C0000U : value;
 }
 
-/// The identifier as a 32-bit filter sees it: STID, EXID, IDE, RTR, 0.
+/// Returns the identifier as a 32-bit filter reads it: STID, EXID, IDE, RTR, 0.
 static uint32_t wide_of(const model_frame_t *frame) {
     const uint32_t identifier = frame->extended ? frame->id << 3 : frame->id << 21;
     return identifier | (frame->extended ? 4U : 0U) | (frame->remote ? 2U : 0U);
 }
 
-/// ... and a 16-bit one: STID, RTR, IDE, the upper three bits of EXID.
+/// Returns the identifier as a 16-bit filter reads it: STID, RTR, IDE, the upper three bits of EXID.
 static uint32_t narrow_of(const model_frame_t *frame) {
     const uint32_t wide = wide_of(frame);
     return ((wide >> 16) & 0xFFE0U) | (frame->remote ? 0x10U : 0U) | (frame->extended ? 0x08U : 0U) |
@@ -109,7 +110,7 @@ static void store(bxcan_model_t *self, model_fifo_t *fifo, const model_frame_t *
     }
     fifo->overrun = true;
     self->overruns++;
-    if ((self->mcr & MCR_RFLM) == 0U) { // 7.3: the last one stored is overwritten; with RFLM the new one is lost.
+    if ((self->mcr & MCR_RFLM) == 0U) { // 7.3: overwrites the last stored frame; with RFLM the new one is lost.
         fifo->entry[MODEL_DEPTH - 1] = entry;
     }
 }
@@ -141,8 +142,8 @@ void model_note_errors(bxcan_model_t *self) {
     }
 }
 
-/// The bus's rule, not the controller's: after the error flag every 8 dominant bits cost 8, the first time after 14. A receiver
-/// becomes passive by that, a transmitter bus-off.
+/// Rule of the bus, not of the controller: after the error flag every 8 dominant bits add 8 to the counter, the first
+/// time after 14. A receiver becomes error passive, a transmitter bus-off.
 void bxcan_model_hold(bxcan_model_t *self, uint32_t bits, bool transmitting) {
     bxcan_model_dominant(self);
     for (; bits > 0U && bxcan_model_is_on(self); bits--) {

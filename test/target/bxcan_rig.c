@@ -46,7 +46,7 @@ static void serve(rig_device_t *device) {
     is_serving = false;
 }
 
-/// RCC's register of one device: while its bit is set, the device is in reset.
+/// Returns the device of this reset register of RCC: while its bit is set, the device is in reset.
 static rig_device_t *reset_at(const brd_register_t *address) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         if (address == &rig[i].reset) {

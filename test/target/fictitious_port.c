@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Somebody follows docs/developer/porting.md: its files are compiled as they stand there, on a controller with two transmit slots that exists
-// nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, stand after the loop was held up while the switch stays on,
-// and go again when it was off and is on again; with 1 if they are not told it in time, and with 3 if they go on their own.
+// Compiles the files of docs/developer/porting.md unchanged, for an invented controller with two transmit slots. The
+// time is virtual. The program ends with 0 if the wheels receive the requested speeds, stand still after the loop was
+// held up while the switch stays on, and drive again when the switch was off and is on again. It ends with 1 if they do
+// not receive them in time, and with 3 if they drive again on their own.
 #include "my_port.h"
 
 #include "iwheel/codec.h"
@@ -11,7 +12,7 @@
 
 #define SLOTS     2
 #define QUEUE_MAX 64U
-/// Of telemetry while the loop is held up: 120 ms, which stops the wheels and does not latch.
+/// Rounds of telemetry while the loop is held up: 120 ms, which stops the wheels and does not latch.
 #define HELD_UP_ROUNDS 30U
 
 static struct {
@@ -27,7 +28,7 @@ static int16_t commanded_mm_s[IW_SIDES];
 static uint32_t feeds;
 
 static enum { FIRST_DRIVE, HELD_UP, SECOND_DRIVE } phase;
-static iw_time_us_t phase_us; // Since then.
+static iw_time_us_t phase_us; // Start of the phase.
 
 static void put(const iw_can_frame_t *frame) {
     if (my_can.count < QUEUE_MAX) {
@@ -90,13 +91,14 @@ int32_t my_wish_right(void) {
     return -80;
 }
 
-/// A switch: on when both wheels are known, still so for 5 s after the loop was held up, off for half a second, and on again.
+/// The switch: on when both wheels are known, on for another 5 s after the loop was held up, off for half a second, and
+/// on again.
 bool my_wish_to_arm(void) {
     const iw_time_us_t for_us = time_us - phase_us;
     return (phase == FIRST_DRIVE) ? for_us > 1000000U : (phase == HELD_UP || for_us > 500000U);
 }
 
-/// Everything in the slots is sent and acknowledged.
+/// Sends and acknowledges every frame in the slots.
 static void send_slots(void) {
     for (size_t i = 0; i < SLOTS; i++) {
         if (my_can.is_full[i]) {
@@ -110,7 +112,7 @@ static void send_slots(void) {
     }
 }
 
-/// Both wheels do as told.
+/// Both wheels follow their commands.
 static void send_telemetry(void) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_codec_wheel_t told = {.speed = {.speed_rpm = (int16_t)(commanded_mm_s[side] / 20)}};
@@ -130,7 +132,7 @@ static void enter(int next) {
     phase_us = time_us;
 }
 
-/// True if the loop is to be held up now.
+/// Returns true if the loop is to be held up now.
 static bool follow_phases(void) {
     const iw_time_us_t for_us = time_us - phase_us;
     if (phase == HELD_UP) {
@@ -158,7 +160,7 @@ static bool follow_phases(void) {
 void my_sleep_until(iw_time_us_t until_us) {
     send_slots();
     if (follow_phases()) {
-        for (uint32_t i = 0; i < HELD_UP_ROUNDS; i++) { // Meanwhile the wheels go on.
+        for (uint32_t i = 0; i < HELD_UP_ROUNDS; i++) { // Meanwhile the wheels continue to send.
             send_telemetry();
         }
         time_us = telemetry_us;

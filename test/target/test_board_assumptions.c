@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a board keeps of its wheels: which of it comes back, which is forgotten, and what a power cut leaves.
+// What a board stores of its wheels: which values are restored, which are dropped, and what a power cut leaves.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -49,7 +49,8 @@ static brd_settings_t settings_of(const char *key, const char *value) {
     return settings;
 }
 
-/// An operator's word, evidence of the bus, a tare on the left, the right wheel's own zero.
+/// A confirmation by the operator, an observation of the bus, a tare on the left, and the zero of the right wheel
+/// itself.
 static brd_assumptions_t something(void) {
     static const iw_assumption_entry_t said = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     static const iw_assumption_entry_t seen = {IW_CONTRADICTED, IW_SOURCE_BUS, 10012};
@@ -66,7 +67,7 @@ static brd_assumptions_t something(void) {
     return learned;
 }
 
-/// Another run, with these settings. The gateway that knows what was kept.
+/// Runs the gateway again with these settings and the stored values, and returns its snapshot.
 static iw_snapshot_t run_again(const brd_assumptions_t *learned, const brd_settings_t *settings,
                                brd_assumptions_zero_t zero[IW_SIDES]) {
     gateway_rig_begin(&rig, false);
@@ -74,7 +75,7 @@ static iw_snapshot_t run_again(const brd_assumptions_t *learned, const brd_setti
     return gateway_rig_look(&rig);
 }
 
-TEST(test_learnt_same_settings_comes_back_with_its_provenance) {
+TEST(test_learned_with_same_settings_is_restored_with_its_source) {
     const brd_assumptions_t learned = something();
     const brd_settings_t settings = settings_of(NULL, NULL);
     brd_assumptions_zero_t zero[IW_SIDES];
@@ -95,7 +96,7 @@ TEST(test_learnt_same_settings_comes_back_with_its_provenance) {
     TEST_ASSERT_FALSE_MESSAGE(brd_assumptions_differs(&again, &learned), "each start would write the same once more");
 }
 
-TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else) {
+TEST(test_learned_with_another_setting_drops_only_its_item) {
     static const struct {
         const char *key;
         const char *value;
@@ -124,7 +125,7 @@ TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else) {
     }
 }
 
-TEST(test_learnt_zero_that_no_wheel_has_is_not_restored) {
+TEST(test_learned_impossible_zero_is_not_restored) {
     brd_assumptions_t learned = something();
     const brd_settings_t settings = settings_of(NULL, NULL);
     brd_assumptions_zero_t zero[IW_SIDES];
@@ -136,7 +137,7 @@ TEST(test_learnt_zero_that_no_wheel_has_is_not_restored) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, zero[IW_LEFT].from);
 }
 
-TEST(test_learnt_small_changes_are_not_worth_a_record) {
+TEST(test_learned_small_changes_need_no_record) {
     const brd_assumptions_t kept = something();
     brd_assumptions_t now = kept;
     now.figure[IW_ASSUMPTION_FORCE_UNIT_RIGHT]++;
@@ -146,7 +147,7 @@ TEST(test_learnt_small_changes_are_not_worth_a_record) {
     now.zero[IW_RIGHT].offset_mN++;
     TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
     now = kept;
-    now.zero[IW_LEFT].offset_mN++; // Of a tare every millinewton is.
+    now.zero[IW_LEFT].offset_mN++; // Of a tare, every millinewton counts.
     TEST_ASSERT_TRUE(brd_assumptions_differs(&now, &kept));
 }
 
@@ -157,7 +158,7 @@ static brd_records_t power_on(void) {
     return kept;
 }
 
-TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was) {
+TEST(test_learned_cut_at_any_word_leaves_the_old_or_new_record) {
     const brd_settings_t settings = settings_of("wheels.track_mm", "540");
     brd_assumptions_t learned = something();
     brd_settings_t found;
@@ -184,7 +185,7 @@ TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_wa
     }
 }
 
-TEST(test_learnt_last_blank_slot_is_the_configuration_s) {
+TEST(test_learned_last_blank_slot_is_reserved_for_settings) {
     const brd_settings_t settings = settings_of(NULL, NULL);
     const brd_assumptions_t learned = something();
     brd_records_t kept = power_on();
@@ -194,7 +195,7 @@ TEST(test_learnt_last_blank_slot_is_the_configuration_s) {
     TEST_ASSERT_TRUE(brd_records_commit(&kept, &settings));
     TEST_ASSERT_EQUAL_UINT(0, erasures);
     const uint32_t power_ons = kept.power_ons;
-    brd_records_open(&kept, false, true); // Wheels may be turning: nothing takes long.
+    brd_records_open(&kept, false, true); // Wheels may be turning: no slow operation starts.
     TEST_ASSERT_EQUAL_UINT(0, erasures);
     brd_records_open(&kept, false, false);
     TEST_ASSERT_EQUAL_UINT(1, erasures);
@@ -207,7 +208,8 @@ TEST(test_learnt_last_blank_slot_is_the_configuration_s) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
-/// A record of version 0.2 has 26 values: its 18 numbers, type, role, five switches, track. The rest of its keys came later.
+/// A record of version 0.2 has 26 values: its 18 numbers, type, role, five switches, track. Other keys were added
+/// later.
 static void put_as_before(uint8_t *place, const brd_settings_t *settings) {
     iw_config_t config;
     iw_config_default(&config);
@@ -241,7 +243,7 @@ static void put_as_before(uint8_t *place, const brd_settings_t *settings) {
     memcpy(place, value, sizeof value);
 }
 
-/// As version 0.2 wrote it: settings, whether something is learnt, and that.
+/// Writes the layout of version 0.2: settings, a flag for learned values, and these values.
 static void write_as_before(brd_records_t *kept, const brd_settings_t *settings, const brd_assumptions_t *learned) {
     uint32_t words[BRD_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
     uint8_t *const rest = (uint8_t *)&words[2];
@@ -256,14 +258,15 @@ static void write_as_before(brd_records_t *kept, const brd_settings_t *settings,
     TEST_ASSERT_TRUE(brd_store_write(&kept->store, words, false));
 }
 
-TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair) {
+TEST(test_learned_record_of_version_0_2_is_read_with_defaults) {
     const brd_settings_t settings = settings_of("wheels.track_mm", "777");
     brd_assumptions_t learned = something();
     brd_settings_t found;
     brd_assumptions_t read;
     brd_records_t kept = power_on();
     write_as_before(&kept, &settings, &learned);
-    for (unsigned start = 0; start < 2U; start++) { // The second one reads what the first has written anew.
+    // The second start reads what the first start has written in the new layout.
+    for (unsigned start = 0; start < 2U; start++) {
         kept = power_on();
         TEST_ASSERT_EQUAL_UINT32(8U + start, kept.power_ons);
         TEST_ASSERT_TRUE(brd_records_settings(&kept, &found) && brd_records_assumptions(&kept, &read));
@@ -273,7 +276,7 @@ TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_p
     }
 }
 
-TEST(test_learnt_record_of_the_version_before_without_settings_has_none) {
+TEST(test_learned_record_of_version_0_2_without_settings_is_empty) {
     brd_settings_t found;
     brd_assumptions_t read;
     brd_records_t kept = power_on();
@@ -283,8 +286,8 @@ TEST(test_learnt_record_of_the_version_before_without_settings_has_none) {
     TEST_ASSERT_FALSE(brd_records_assumptions(&kept, &read));
 }
 
-/// Commands that were kept from before a power loss quote another number of starts.
-TEST(test_learnt_every_power_on_is_counted) {
+/// A command that was stored before a power loss quotes another number of starts.
+TEST(test_learned_every_power_on_is_counted) {
     for (uint32_t starts = 1; starts < 20U; starts++) {
         TEST_ASSERT_EQUAL_UINT32(starts, power_on().power_ons);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Initialisation, joining the bus, silence, bus-off: the handshakes of chapter 4 and section 7.6.
+// Initialisation, joining the bus, silent mode, bus-off: the handshakes of chapter 4 and section 7.6.
 #include "bxcan_rig.h"
 #include "unit.h"
 
@@ -23,7 +23,7 @@ static iw_bus_state_t state(void) {
     return brd_bxcan_bus_state(driver);
 }
 
-TEST(test_bus_is_down_until_11_recessive_bits) {
+TEST(test_bxcan_bus_is_down_until_11_recessive_bits) {
     rig_init(0, false);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
     bxcan_model_recessive(model, 10);
@@ -33,13 +33,13 @@ TEST(test_bus_is_down_until_11_recessive_bits) {
     TEST_ASSERT_TRUE(bxcan_model_is_on(model));
 }
 
-TEST(test_bit_timing_is_written_as_configured) {
+TEST(test_bxcan_bit_timing_is_written_as_configured) {
     rig_start(0);
     TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
     TEST_ASSERT_EQUAL_HEX32(0x00010000U, model->mcr);
 }
 
-TEST(test_bus_held_dominant_at_start_is_waited_for_without_waiting) {
+TEST(test_bxcan_bus_dominant_at_start_is_polled_without_blocking) {
     rig_init(0, false);
     for (int i = 0; i < 1000; i++) {
         bxcan_model_dominant(model);
@@ -49,7 +49,7 @@ TEST(test_bus_held_dominant_at_start_is_waited_for_without_waiting) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_controller_that_does_not_answer_is_down_and_recovers) {
+TEST(test_bxcan_controller_without_a_reply_is_down_and_recovers) {
     model->deaf = true;
     rig_init(0, false);
     for (int i = 0; i < 100; i++) {
@@ -63,7 +63,7 @@ TEST(test_controller_that_does_not_answer_is_down_and_recovers) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended) {
+TEST(test_bxcan_unexpected_reset_is_reported_and_repaired) {
     rig_start(0);
     bxcan_model_reset(model, 28);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
@@ -73,7 +73,7 @@ TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended) {
     TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
 }
 
-TEST(test_reset_of_the_controller_while_joining_is_mended) {
+TEST(test_bxcan_unexpected_reset_while_joining_is_repaired) {
     rig_init(0, false);
     (void)state();
     bxcan_model_reset(model, 28);
@@ -84,7 +84,7 @@ TEST(test_reset_of_the_controller_while_joining_is_mended) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_request_that_got_lost_is_repeated) {
+TEST(test_bxcan_lost_request_is_repeated) {
     model->deaf = true;
     rig_init(0, false);
     (void)state();
@@ -96,7 +96,7 @@ TEST(test_request_that_got_lost_is_repeated) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_initialisation_asked_for_by_somebody_else_is_left) {
+TEST(test_bxcan_unexpected_initialisation_mode_is_left) {
     rig_start(0);
     bxcan_model_write(model, 0x00, 0x00010001U);
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
@@ -105,7 +105,7 @@ TEST(test_initialisation_asked_for_by_somebody_else_is_left) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends) {
+TEST(test_bxcan_silent_device_only_receives) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     iw_can_frame_t heard;
     rig_init(0, true);
@@ -117,7 +117,7 @@ TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends) {
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
-TEST(test_device_that_is_not_silent_acknowledges) {
+TEST(test_bxcan_device_that_is_not_silent_acknowledges) {
     rig_start(0);
     TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
 }
@@ -134,7 +134,7 @@ static void fail_until_bus_off(void) {
     TEST_ASSERT_TRUE(model->bus_off);
 }
 
-TEST(test_bus_off_is_reported_and_left_after_128_times_11_bits) {
+TEST(test_bxcan_bus_off_is_left_after_128_times_11_bits) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -149,7 +149,7 @@ TEST(test_bus_off_is_reported_and_left_after_128_times_11_bits) {
     TEST_ASSERT_EQUAL(1, driver->bus_offs);
 }
 
-TEST(test_bus_off_is_not_left_by_the_controller_alone) {
+TEST(test_bxcan_bus_off_is_not_left_by_the_controller_alone) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -159,7 +159,7 @@ TEST(test_bus_off_is_not_left_by_the_controller_alone) {
     TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
 }
 
-TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet) {
+TEST(test_bxcan_send_fails_in_bus_off_before_its_report) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -167,7 +167,7 @@ TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet) {
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, &frame, 1));
 }
 
-TEST(test_nothing_from_before_bus_off_is_sent_after_it) {
+TEST(test_bxcan_frame_from_before_bus_off_is_not_sent_after_it) {
     const iw_can_frame_t left = rig_frame(266, 1);
     const iw_can_frame_t right = rig_frame(298, 1);
     model_frame_t frame;
@@ -188,7 +188,7 @@ TEST(test_nothing_from_before_bus_off_is_sent_after_it) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
-TEST(test_recovery_waits_until_what_waits_is_taken_back) {
+TEST(test_bxcan_recovery_waits_for_the_abort_of_waiting_frames) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
@@ -206,7 +206,7 @@ TEST(test_recovery_waits_until_what_waits_is_taken_back) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery) {
+TEST(test_bxcan_purge_pending_in_bus_off_ends_in_the_recovery) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
@@ -223,12 +223,12 @@ TEST(test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery) {
     TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
 }
 
-TEST(test_error_passive_is_told_apart) {
+TEST(test_bxcan_error_passive_is_reported) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
     (void)brd_bxcan_send(driver, &frame, 1);
-    for (int i = 0; i < 100; i++) { // Nobody acknowledges: passive, but never bus-off.
+    for (int i = 0; i < 100; i++) { // Without an acknowledgement the device becomes error passive, but never bus-off.
         const int mailbox = bxcan_model_offer(model, &on_bus);
         TEST_ASSERT_NOT_EQUAL(MODEL_NONE, mailbox);
         bxcan_model_begin(model, mailbox);
@@ -239,7 +239,7 @@ TEST(test_error_passive_is_told_apart) {
     TEST_ASSERT_EQUAL(3, RIG_ESR_LEC(rig_read_esr(0)));
 }
 
-TEST(test_receive_errors_are_told) {
+TEST(test_bxcan_receive_errors_are_reported) {
     rig_start(0);
     for (int i = 0; i < 130; i++) {
         bxcan_model_hear_error(model);
@@ -249,7 +249,7 @@ TEST(test_receive_errors_are_told) {
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
 }
 
-TEST(test_error_interrupt_wakes_and_ends) {
+TEST(test_bxcan_error_interrupt_wakes_and_ends) {
     rig_start(0);
     for (int i = 0; i < 128; i++) {
         bxcan_model_hear_error(model);
@@ -260,7 +260,7 @@ TEST(test_error_interrupt_wakes_and_ends) {
     TEST_ASSERT_EQUAL(1, rig[0].interrupts);
 }
 
-TEST(test_two_devices_share_filters_and_nothing_else) {
+TEST(test_bxcan_two_devices_share_only_their_filters) {
     const iw_can_frame_t frame = rig_frame(266, 7);
     model_frame_t on_bus;
     iw_can_frame_t heard;
@@ -284,7 +284,7 @@ static bool in_use_reads_back(uint32_t id) {
            echo.id == id && echo.kind == IW_CAN_ECHO;
 }
 
-TEST(test_trouble_of_one_device_is_not_the_other_ones) {
+TEST(test_bxcan_bus_off_of_one_device_does_not_affect_the_other) {
     brd_bxcan_t *const other = &rig[1].driver;
     const iw_can_frame_t frame = rig_frame(298, 7);
     model_frame_t on_bus;
@@ -312,7 +312,7 @@ TEST(test_trouble_of_one_device_is_not_the_other_ones) {
     TEST_ASSERT_TRUE(in_use_reads_back(298));
 }
 
-TEST(test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers) {
+TEST(test_bxcan_bus_dominant_within_our_frame_is_bus_off) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
     rig_start(0);
@@ -330,7 +330,7 @@ TEST(test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers) {
     TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
 }
 
-TEST(test_bus_held_dominant_while_listening_is_passive_only) {
+TEST(test_bxcan_bus_dominant_while_listening_is_passive_only) {
     rig_start(0);
     bxcan_model_hold(model, 1000000, false);
     TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());

@@ -31,14 +31,14 @@ static bool is_ours(uint32_t id) {
     return false;
 }
 
-/// 1 if the frame comes through, with what was taken in `*out_frame`.
+/// Returns 1 if the frame passes the filters, with the received frame in `*out_frame`.
 static int pass(const model_frame_t *frame, iw_can_frame_t *out_frame) {
     (void)bxcan_model_hear(model, frame);
-    (void)brd_register_read(&rig[0].window.MSR); // Lets the interrupt strike.
+    (void)brd_register_read(&rig[0].window.MSR); // Triggers the interrupt.
     return brd_bxcan_receive(driver, out_frame);
 }
 
-TEST(test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote) {
+TEST(test_filters_exactly_11_of_all_2048_standard_ids_pass) {
     for (uint32_t id = 0; id < 2048U; id++) {
         for (uint8_t remote = 0; remote <= 1; remote++) {
             const model_frame_t frame = {.id = id, .remote = remote, .dlc = 4};
@@ -52,7 +52,7 @@ TEST(test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote) {
     }
 }
 
-TEST(test_of_29_bit_ids_only_those_with_the_same_number_pass) {
+TEST(test_filters_extended_ids_pass_only_with_the_same_number) {
     for (uint32_t bit = 0; bit < 29U; bit++) {
         for (uint32_t id = 0; id < 2048U; id++) {
             const model_frame_t frame = {.id = id ^ (1U << bit), .extended = 1, .dlc = 4};
@@ -65,7 +65,7 @@ TEST(test_of_29_bit_ids_only_those_with_the_same_number_pass) {
     }
 }
 
-TEST(test_29_bit_id_that_begins_like_ours_does_not_pass) {
+TEST(test_filters_extended_id_with_the_same_prefix_does_not_pass) {
     for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
         const model_frame_t frame = {.id = ours[i] << 18, .extended = 1, .dlc = 4};
         iw_can_frame_t taken;
@@ -73,7 +73,7 @@ TEST(test_29_bit_id_that_begins_like_ours_does_not_pass) {
     }
 }
 
-TEST(test_frame_is_taken_byte_for_byte) {
+TEST(test_received_frame_has_the_same_bytes) {
     const model_frame_t frame = {.id = 290, .dlc = 8, .data = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08}};
     iw_can_frame_t taken;
     memset(&taken, 0xA5, sizeof taken);
@@ -84,14 +84,14 @@ TEST(test_frame_is_taken_byte_for_byte) {
     TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, taken.data, 8);
 }
 
-TEST(test_dlc_above_8_means_8_bytes) {
+TEST(test_received_dlc_above_8_means_8_bytes) {
     const model_frame_t frame = {.id = 256, .dlc = 15};
     iw_can_frame_t taken;
     TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
     TEST_ASSERT_EQUAL(8, taken.dlc);
 }
 
-TEST(test_frames_come_in_the_order_of_the_bus_with_echoes_between) {
+TEST(test_received_frames_and_echoes_are_in_the_order_of_the_bus) {
     const iw_can_frame_t left = rig_frame(266, 9);
     const uint32_t expected[] = {256, 266, 512, 288};
     model_frame_t on_bus;
@@ -108,14 +108,14 @@ TEST(test_frames_come_in_the_order_of_the_bus_with_echoes_between) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &taken));
 }
 
-TEST(test_foreign_setpoint_is_received_and_no_echo) {
+TEST(test_received_foreign_setpoint_is_no_echo) {
     iw_can_frame_t taken;
     (void)rig_hear(0, 266, 5);
     TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
 }
 
-TEST(test_slow_release_shows_no_frame_twice) {
+TEST(test_received_frame_with_a_slow_release_is_not_doubled) {
     iw_can_frame_t taken;
     model->release_slow = 4;
     for (uint8_t i = 0; i < 3; i++) {
@@ -139,7 +139,7 @@ static void assert_loss_is_told(void) {
     TEST_ASSERT_EQUAL(0, taken.dlc);
 }
 
-/// Interrupts are held off for five frames.
+/// Interrupts are disabled for five frames.
 static void overrun(void) {
     const model_frame_t frame = {.id = 256, .dlc = 4};
     for (int i = 0; i < 5; i++) {
@@ -155,7 +155,7 @@ TEST(test_overrun_of_the_controller_is_counted_once) {
     TEST_ASSERT_EQUAL(1, driver->overruns);
 }
 
-TEST(test_overrun_is_told_once_and_before_what_came_with_it) {
+TEST(test_overrun_is_reported_once_and_before_its_frames) {
     iw_can_frame_t taken;
     for (int round = 0; round < 2; round++) {
         overrun();
@@ -168,7 +168,7 @@ TEST(test_overrun_is_told_once_and_before_what_came_with_it) {
     }
 }
 
-TEST(test_full_ring_loses_the_newest_and_counts) {
+TEST(test_full_ring_drops_and_counts_the_newest) {
     iw_can_frame_t taken;
     for (uint32_t i = 0; i < BRD_FRAME_RING_LENGTH + 5U; i++) {
         const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
@@ -186,7 +186,7 @@ TEST(test_full_ring_loses_the_newest_and_counts) {
     TEST_ASSERT_EQUAL(1, brd_bxcan_receive(driver, &taken));
 }
 
-TEST(test_ring_goes_on_for_ever) {
+TEST(test_ring_continues_after_the_overflow_of_its_indices) {
     iw_can_frame_t taken;
     atomic_store(&driver->ring.head, UINT32_MAX - 20U);
     atomic_store(&driver->ring.tail, UINT32_MAX - 20U);
@@ -198,7 +198,7 @@ TEST(test_ring_goes_on_for_ever) {
     TEST_ASSERT_EQUAL(0, driver->lost);
 }
 
-TEST(test_filters_do_not_depend_on_what_was_set_before) {
+TEST(test_filters_do_not_depend_on_earlier_values) {
     rig_reset();
     model->fm1r = 0x0FFFFFFFU;
     model->fs1r = 0x0FFFFFFFU;
@@ -214,7 +214,7 @@ TEST(test_filters_do_not_depend_on_what_was_set_before) {
     TEST_ASSERT_EQUAL_HEX32(0x0FFFFFFCU, model->fs1r);
 }
 
-TEST(test_filters_leave_the_banks_of_others_alone) {
+TEST(test_filters_do_not_change_other_banks) {
     rig_reset();
     model->fa1r = 1U << 20;
     model->bank[20][0] = 0x12345678U;
@@ -231,7 +231,7 @@ TEST(test_filters_fit_a_controller_with_14_banks) {
     TEST_ASSERT_EQUAL_HEX32(0, model->fmr & 1U);
 }
 
-TEST(test_receive_error_counter_goes_down_again) {
+TEST(test_receive_error_counter_decreases_again) {
     for (int i = 0; i < 10; i++) {
         bxcan_model_hear_error(model);
     }

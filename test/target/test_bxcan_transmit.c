@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Mailboxes, echoes, replacing and taking back: section 7.1, and the port's contract in iwheel/hal.h.
+// Mailboxes, echoes, replacement and abort: section 7.1, and the contract of the port in iwheel/hal.h.
 #include "bxcan_rig.h"
 #include "unit.h"
 
@@ -48,7 +48,7 @@ static void assert_no_echo(void) {
     TEST_ASSERT_EQUAL(0, brd_bxcan_receive(driver, &echo));
 }
 
-TEST(test_frame_arrives_byte_for_byte) {
+TEST(test_sent_frame_has_the_same_bytes) {
     const uint8_t bytes[8] = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08};
     iw_can_frame_t frame = {.id = 0x7FF, .dlc = 8};
     model_frame_t on_bus;
@@ -64,7 +64,7 @@ TEST(test_frame_arrives_byte_for_byte) {
     TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, on_bus.data, 8);
 }
 
-TEST(test_every_dlc_is_sent) {
+TEST(test_sent_frame_may_have_any_dlc) {
     for (uint8_t dlc = 0; dlc <= 8; dlc++) {
         const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
         model_frame_t on_bus;
@@ -74,7 +74,7 @@ TEST(test_every_dlc_is_sent) {
     }
 }
 
-TEST(test_what_is_no_plain_data_frame_is_refused) {
+TEST(test_send_of_other_than_a_standard_data_frame_is_refused) {
     const iw_can_frame_t wrong[] = {
         {.id = 266U | IW_CAN_EXTENDED, .dlc = 5},
         {.id = 266U | IW_CAN_REMOTE, .dlc = 5},
@@ -88,7 +88,7 @@ TEST(test_what_is_no_plain_data_frame_is_refused) {
     assert_nothing_waits();
 }
 
-TEST(test_echo_comes_only_with_the_acknowledgement) {
+TEST(test_echo_is_created_only_by_the_acknowledgement) {
     model_frame_t frame;
     TEST_ASSERT_EQUAL(1, send(266, 1));
     assert_no_echo();
@@ -103,7 +103,7 @@ TEST(test_echo_comes_only_with_the_acknowledgement) {
     assert_no_echo();
 }
 
-TEST(test_left_leaves_before_right_whatever_the_order) {
+TEST(test_left_frame_is_sent_before_the_right_in_any_order) {
     (void)send(298, 2);
     (void)send(266, 1);
     assert_on_bus(266, 1);
@@ -112,8 +112,8 @@ TEST(test_left_leaves_before_right_whatever_the_order) {
     assert_echo(298, 2);
 }
 
-/// Bytes and id of every mailbox are there before the first one is requested: of both frames, the left one's mailbox is still not
-/// pending when the right one's data is written.
+/// Bytes and id of every mailbox are written before the first one is requested: the mailbox of the left frame is not
+/// pending yet when the data of the right frame is written.
 static uint32_t written[64];
 static uint32_t writes;
 
@@ -144,7 +144,7 @@ TEST(test_pair_fills_both_mailboxes_before_it_requests_one) {
     assert_no_echo();
 }
 
-TEST(test_pair_takes_the_places_of_the_waiting_one) {
+TEST(test_pair_replaces_the_waiting_pair) {
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
     TEST_ASSERT_EQUAL(0, send_pair(5, 6));
@@ -158,7 +158,7 @@ TEST(test_pair_takes_the_places_of_the_waiting_one) {
     assert_no_echo();
 }
 
-TEST(test_pair_with_a_wrong_frame_is_refused_whole) {
+TEST(test_pair_with_a_wrong_frame_is_refused_completely) {
     const iw_can_frame_t left_wrong[] = {rig_frame(0x800, 1), rig_frame(298, 2)};
     const iw_can_frame_t right_wrong[] = {rig_frame(266, 1), rig_frame(0x800, 2)};
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_send(driver, left_wrong, 2));
@@ -167,7 +167,7 @@ TEST(test_pair_with_a_wrong_frame_is_refused_whole) {
     assert_no_echo();
 }
 
-TEST(test_pair_whose_right_frame_finds_no_place_leaves_the_left_one) {
+TEST(test_pair_without_a_place_for_right_accepts_left_only) {
     const iw_can_frame_t right = rig_frame(298, 2);
     (void)send(298, 1);
     (void)brd_bxcan_send(driver, &right, 1);
@@ -178,7 +178,7 @@ TEST(test_pair_whose_right_frame_finds_no_place_leaves_the_left_one) {
     assert_echo(266, 3);
 }
 
-/// Whatever waits gets through when the interrupt has just been masked: the abort comes too late.
+/// All waiting frames are sent when the interrupt has just been masked: the abort is too late.
 static bool send_all_at_masking(uint32_t offset) {
     model_frame_t frame;
     for (int i = bxcan_model_offer(model, &frame); offset == 0x14U && i >= 0; i = bxcan_model_offer(model, &frame)) {
@@ -188,8 +188,9 @@ static bool send_all_at_masking(uint32_t offset) {
     return true;
 }
 
-/// Both old frames get through while the new ones take their places: the first one's mailbox is free again for the second one.
-TEST(test_pair_finds_places_though_both_old_frames_leave_meanwhile) {
+/// Both old frames are sent while the new ones replace them: the mailbox of the first one is free again for the second
+/// one.
+TEST(test_pair_is_accepted_while_both_old_frames_are_sent) {
     TEST_ASSERT_EQUAL(2, send_pair(1, 2));
     rig[0].on_read = send_all_at_masking;
     TEST_ASSERT_EQUAL(2, send_pair(3, 4));
@@ -205,7 +206,7 @@ TEST(test_pair_finds_places_though_both_old_frames_leave_meanwhile) {
     assert_no_echo();
 }
 
-TEST(test_call_places_no_more_frames_than_wheels) {
+TEST(test_send_call_accepts_no_more_frames_than_wheels) {
     const iw_can_frame_t three[] = {rig_frame(266, 1), rig_frame(298, 2), rig_frame(300, 3)};
     TEST_ASSERT_EQUAL(2, brd_bxcan_send(driver, three, 3));
     assert_on_bus(266, 1);
@@ -213,15 +214,15 @@ TEST(test_call_places_no_more_frames_than_wheels) {
     assert_nothing_waits();
 }
 
-TEST(test_newer_frame_takes_the_place_of_the_waiting_one) {
+TEST(test_newer_frame_replaces_the_waiting_one) {
     (void)send(266, 1);
     (void)send(298, 1);
     TEST_ASSERT_EQUAL(1, send(266, 2));
     assert_on_bus(266, 2);
     assert_on_bus(298, 1);
     assert_nothing_waits();
-    assert_echo(266, 1); // One for each that was handed over, with its own bytes ...
-    assert_echo(266, 2); // ... once the newer is acknowledged.
+    assert_echo(266, 1); // One echo for each accepted frame, with its own bytes,
+    assert_echo(266, 2); // after the newer frame was acknowledged.
     assert_echo(298, 1);
     assert_no_echo();
 }
@@ -268,7 +269,7 @@ static void begin_first(void) {
     bxcan_model_begin(model, bxcan_model_offer(model, &frame));
 }
 
-TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo) {
+TEST(test_old_frame_sent_during_its_replacement_has_its_own_echo) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = end_frame_on_bus;
@@ -280,7 +281,7 @@ TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo) {
     assert_no_echo();
 }
 
-TEST(test_old_frame_that_fails_while_being_replaced_never_comes) {
+TEST(test_old_frame_failed_during_its_replacement_is_not_sent) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = lose_frame_on_bus;
@@ -300,12 +301,12 @@ static void join_again(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, brd_bxcan_bus_state(driver));
 }
 
-TEST(test_frame_that_never_ends_is_waited_for_with_a_bound) {
+TEST(test_frame_that_never_ends_has_a_bounded_wait) {
     (void)send(266, 1);
     begin_first();
     TEST_ASSERT_EQUAL(0, send(266, 2));
     (void)lose_frame_on_bus(0x08);
-    (void)rig_read_esr(0); // The interrupt strikes.
+    (void)rig_read_esr(0); // Triggers the interrupt.
     assert_nothing_waits();
     assert_no_echo();
     TEST_ASSERT_EQUAL(1, send(266, 3));
@@ -314,7 +315,7 @@ TEST(test_frame_that_never_ends_is_waited_for_with_a_bound) {
     assert_no_echo();
 }
 
-TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus) {
+TEST(test_purge_that_does_not_end_resets_the_controller) {
     (void)send(266, 1);
     (void)send(298, 1);
     begin_first();
@@ -331,8 +332,9 @@ TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_
     assert_no_echo();
 }
 
-/// Sent and confirmed, but the core has not asked for it yet when the other frame has to be purged by force.
-TEST(test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core) {
+/// The frame was sent and acknowledged, but the core has not read its echo yet when the other frame must be purged by
+/// force.
+TEST(test_purge_with_a_reset_drops_earlier_echoes) {
     iw_can_frame_t echo;
     (void)send(266, 1);
     assert_on_bus(266, 1);
@@ -354,7 +356,7 @@ TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it) {
     TEST_ASSERT_EQUAL(1, driver->resets);
 }
 
-TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing) {
+TEST(test_purge_on_a_dominant_bus_leaves_no_frame) {
     (void)send(266, 1);
     (void)send(298, 1);
     begin_first();
@@ -368,7 +370,8 @@ TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing) {
     assert_no_echo();
 }
 
-/// ALST and TERR of an attempt stay readable after the abort of the mailbox: they are no echo, and no obstacle to the next frame.
+/// ALST and TERR of an attempt stay readable after the abort of the mailbox. They are no echo, and they do not block
+/// the next frame.
 TEST(test_failed_attempts_before_an_abort_are_no_echo) {
     const model_end_t ends[] = {MODEL_LOST_ARBITRATION, MODEL_BIT_ERROR, MODEL_NO_ACKNOWLEDGEMENT};
     for (size_t i = 0; i < 3; i++) {
@@ -387,7 +390,7 @@ TEST(test_failed_attempts_before_an_abort_are_no_echo) {
     }
 }
 
-TEST(test_slow_abort_is_awaited) {
+TEST(test_slow_abort_is_waited_for) {
     model->abort_reads = 20;
     (void)send(266, 1);
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -404,7 +407,7 @@ TEST(test_fourth_frame_waits_for_a_free_mailbox) {
     TEST_ASSERT_EQUAL(1, send(301, 1));
 }
 
-TEST(test_purge_takes_everything_back) {
+TEST(test_purge_aborts_all_frames) {
     (void)send(266, 1);
     (void)send(298, 1);
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
@@ -416,14 +419,14 @@ TEST(test_purge_takes_everything_back) {
     assert_no_echo();
 }
 
-TEST(test_echo_from_before_a_purge_never_comes) {
+TEST(test_echo_from_before_a_purge_is_dropped) {
     (void)send(266, 1);
     assert_on_bus(266, 1);
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
     assert_no_echo();
 }
 
-TEST(test_purge_keeps_what_was_received) {
+TEST(test_purge_retains_received_frames) {
     iw_can_frame_t frame;
     (void)rig_hear(0, 256, 4);
     (void)brd_bxcan_purge(driver);
@@ -431,7 +434,7 @@ TEST(test_purge_keeps_what_was_received) {
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, frame.kind);
 }
 
-TEST(test_frame_that_completes_during_a_purge_has_no_echo_afterwards) {
+TEST(test_frame_completed_during_a_purge_has_no_echo) {
     (void)send(266, 1);
     begin_first();
     rig[0].on_read = end_frame_on_bus;
@@ -453,7 +456,7 @@ static int mailbox_of(uint32_t id) {
     return found;
 }
 
-/// The right frame gets through when the interrupt has just been masked and nothing was aborted yet.
+/// The right frame is sent when the interrupt has just been masked and no frame was aborted yet.
 static bool send_right_at_masking(uint32_t offset) {
     if (offset != 0x14U) {
         return true;
@@ -479,7 +482,7 @@ TEST(test_purge_of_three_full_mailboxes_empties_them_all) {
     fill_mailboxes();
 }
 
-TEST(test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting) {
+TEST(test_purge_while_a_frame_completes_leaves_no_echo_or_frame) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
@@ -488,7 +491,7 @@ TEST(test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting)
     TEST_ASSERT_EQUAL(0, driver->resets);
 }
 
-TEST(test_completion_while_another_mailbox_is_withdrawn_is_not_lost) {
+TEST(test_completion_during_another_abort_has_its_echo) {
     fill_mailboxes();
     rig[0].on_read = send_right_at_masking;
     TEST_ASSERT_EQUAL(1, send(266, 2));
@@ -507,16 +510,16 @@ TEST(test_purge_of_an_idle_device_succeeds) {
     TEST_ASSERT_EQUAL(1, brd_bxcan_purge(driver));
 }
 
-TEST(test_receive_of_a_stopped_device_is_broken) {
+TEST(test_send_and_receive_of_a_stopped_device_fail) {
     iw_can_frame_t frame;
     rig_init(0, false);
     TEST_ASSERT_LESS_THAN(0, brd_bxcan_receive(driver, &frame));
     TEST_ASSERT_LESS_THAN(0, send(266, 1));
 }
 
-/// Random hands-over, transmissions, failures, purges: an echo with the bytes of each frame handed over, none without acknowledgement, and
-/// never an older frame after a newer one.
-TEST(test_random_traffic_keeps_the_account) {
+/// Random sends, transmissions, failures and purges: one echo with the bytes of each accepted frame, no echo without an
+/// acknowledgement, and never an older frame after a newer one.
+TEST(test_random_traffic_has_one_echo_for_each_frame) {
     uint32_t chance = 12345;
     uint8_t mark = 0;
     uint8_t newest_sent[2] = {0, 0};

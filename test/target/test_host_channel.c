@@ -2,7 +2,7 @@
 // Opening and ending of the channels of the serial line, the age limit of commands, and writes to flash.
 #include "host_rig.inc"
 
-/// Lets time pass with a relay that says only `noise`, every 50 ms.
+/// Lets time pass with a relay that sends only `noise`, every 50 ms.
 static void run_with_noise(unsigned span_ms, const char *noise) {
     for (unsigned ms = 0; ms < span_ms; ms += 50U) {
         put(noise, strlen(noise));
@@ -33,14 +33,14 @@ TEST(test_channel_of_a_relay_with_wrong_checksums_ends) {
     assert_channel_ends_with("0 {\"cmd\":\"alive\"}*00000000\n");
 }
 
-TEST(test_channel_of_a_relay_that_is_alive_stays) {
+TEST(test_channel_of_a_relay_that_sends_alive_stays_open) {
     char line[IWN_LINE_BOARD_MAX];
     line[framed(0, "{\"cmd\":\"alive\"}", line)] = '\0';
     run_with_noise(2U * IWN_LINE_SILENT_MS, line);
     TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].served.id);
 }
 
-/// The gateway starts with another lease; its relay connects.
+/// Starts the gateway with another lease and connects its relay.
 static void start_with_lease(uint16_t lease_ms) {
     iw_config_t config = rig.config;
     config.lease_ms = lease_ms;
@@ -52,7 +52,7 @@ static void start_with_lease(uint16_t lease_ms) {
     run_ms(20);
 }
 
-/// A command with a stamp of that age.
+/// Sends a command with a stamp of this age.
 static void drive_with_age(uint32_t age_ms) {
     char line[IWN_LINE_BOARD_MAX];
     const uint64_t stamp_us = t_us;
@@ -87,7 +87,7 @@ TEST(test_flash_is_not_written_while_an_arm_waits) {
     run_until_listening();
     say(0, "{\"cmd\":\"alive\"}");
     gateway_judge_renew(&rig.judge);
-    say(1, "{\"cmd\":\"arm\"}"); // In the same batch: no step of the gateway lies between them.
+    say(1, "{\"cmd\":\"arm\"}"); // Both lines are in one batch: the gateway does not step between them.
     say(1, "{\"cmd\":\"config\",\"commit\":true,\"id\":5}");
     all_length = 0;
     run_ms(20);
@@ -95,7 +95,7 @@ TEST(test_flash_is_not_written_while_an_arm_waits) {
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
 }
 
-TEST(test_take_of_two_lines_carries_out_one_a_time) {
+TEST(test_channel_with_two_lines_executes_one_per_call) {
     say(1, "{\"cmd\":\"hello\",\"id\":1}");
     say(1, "{\"cmd\":\"hello\",\"id\":2}");
     answer[0] = '\0';
@@ -116,7 +116,7 @@ TEST(test_channel_that_only_watches_may_not_arm) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_channel_closed_leaves_the_others) {
+TEST(test_channel_closed_does_not_affect_other_channels) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
     say(0, "{\"cmd\":\"close\",\"channel\":2}");
     run_ms(20);
@@ -125,7 +125,7 @@ TEST(test_channel_closed_leaves_the_others) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-/// `count` requests for a snapshot on as many channels, from `first` on, in one batch: nothing is told between them.
+/// Requests `count` snapshots on as many channels, from `first` on, in one batch: no event is sent between them.
 static void ask_for_status(unsigned first, unsigned count) {
     char json[64];
     for (unsigned channel = first; channel < first + count; channel++) {
@@ -140,7 +140,7 @@ static void assert_told(const char *part) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, part), part);
 }
 
-TEST(test_answers_that_wait_leave_a_place_for_an_arm) {
+TEST(test_pending_replies_leave_a_place_for_an_arm) {
     char part[64];
     run_until_listening();
     say(0, "{\"cmd\":\"alive\"}");
@@ -158,7 +158,7 @@ TEST(test_answers_that_wait_leave_a_place_for_an_arm) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_answer_that_waits_for_a_closed_channel_frees_its_place) {
+TEST(test_pending_reply_of_a_closed_channel_frees_its_place) {
     all_length = 0;
     ask_for_status(2, 3);
     say(0, "{\"cmd\":\"close\",\"channel\":3}");
@@ -170,7 +170,7 @@ TEST(test_answer_that_waits_for_a_closed_channel_frees_its_place) {
     TEST_ASSERT_NULL(strstr(all, "\"id\":103"));
 }
 
-TEST(test_pending_place_is_of_one_client_and_one_request) {
+TEST(test_pending_place_belongs_to_one_client_and_request) {
     static brd_pending_t pool;
     const iwn_id_t one = {.kind = IWN_ID_NUMBER, .number = 1};
     const iwn_id_t two = {.kind = IWN_ID_NUMBER, .number = 2};
@@ -185,7 +185,7 @@ TEST(test_pending_place_is_of_one_client_and_one_request) {
     TEST_ASSERT_EQUAL_INT64(2, brd_pending_take(&pool, 5, IWN_CMD_STATUS)->number);
 }
 
-TEST(test_pending_pool_that_is_full_refuses_all_but_who_waits_already) {
+TEST(test_pending_pool_full_accepts_only_clients_that_wait_in_it) {
     static brd_pending_t pool;
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 1};
     memset(&pool, 0, sizeof pool);
@@ -195,7 +195,7 @@ TEST(test_pending_pool_that_is_full_refuses_all_but_who_waits_already) {
     }
     TEST_ASSERT_FALSE(brd_pending_has_room(&pool, 99, IWN_CMD_STATUS));
     TEST_ASSERT_TRUE(brd_pending_has_room(&pool, 1, IWN_CMD_STATUS));
-    brd_pending_put(&pool, 99, IWN_CMD_STATUS, &id); // Nothing is pushed out.
+    brd_pending_put(&pool, 99, IWN_CMD_STATUS, &id); // No entry is replaced.
     TEST_ASSERT_EQUAL_INT(IWN_ID_NONE, brd_pending_take(&pool, 99, IWN_CMD_STATUS)->kind);
     for (iw_client_t client = 1; client <= BRD_PENDING_ARMS; client++) {
         TEST_ASSERT_TRUE(brd_pending_has_room(&pool, client, IWN_CMD_ARM));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What the image's host code tells of: events, stops, zeros, what it keeps, and whom it obeys.
+// Events of the host code of the image: events, stops, zeros, stored values, and the commands of the relay.
 #include "host_rig.inc"
 
-/// The relay is there all the time.
+/// Lets time pass with a connected relay.
 static void pass(uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
         say(0, "{\"cmd\":\"alive\"}");
@@ -35,7 +35,7 @@ static void disarm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once) {
+TEST(test_host_reports_estop_and_each_cause_by_name_once) {
     disarm();
     watch_everything();
     estop_high = true;
@@ -62,7 +62,7 @@ TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once) {
     TEST_ASSERT_EQUAL_UINT(6, count_of("\"event\":\"fault\""));
 }
 
-TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others) {
+TEST(test_host_reports_a_stop_with_its_cause_and_client) {
     char line[IWN_LINE_BOARD_MAX];
     watch_everything();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
@@ -81,7 +81,7 @@ TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_oth
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "(gone)"), all);
 }
 
-TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change) {
+TEST(test_host_zero_of_each_wheel_is_reported_once_per_change) {
     disarm();
     watch_everything();
     iw_snapshot_t seen = gateway_rig_look(&rig);
@@ -113,7 +113,7 @@ TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change) {
     TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
 }
 
-TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force) {
+TEST(test_host_confirm_is_compared_with_the_value_in_use) {
     say(0, "{\"cmd\":\"alive\"}");
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
     say(0, "{\"cmd\":\"alive\"}");
@@ -122,7 +122,7 @@ TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force) {
     assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
 }
 
-TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often) {
+TEST(test_host_line_is_stamped_every_25_ms_while_armed) {
     forget();
     for (unsigned i = 0; i < 10U; i++) {
         say(0, "{\"cmd\":\"alive\"}");
@@ -132,29 +132,29 @@ TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often) {
     TEST_ASSERT_UINT_WITHIN(2, 10, count_of("\"event\":\"link\""));
 }
 
-TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start) {
+TEST(test_host_stores_learned_values_once_and_restores_them) {
     iw_assumption_state_t state;
     disarm();
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
     pass(2500);
     const uint32_t writes = flash_writes;
     TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.records);
     pass(5000);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
     start();
     state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, state);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_STORED, host.records);
     has_flash = false;
     start();
     state = iwn_server_look(&host.server)->assumed[IW_ASSUMPTION_TRACK].state;
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, state);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_NEW, host.records);
     flash_fails = true;
     assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
     pass(5000);
-    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.memory);
+    TEST_ASSERT_EQUAL_INT(BRD_RECORDS_FAILED, host.records);
 }
 
 TEST(test_host_turn_is_refused_when_the_track_is_contradicted) {
@@ -164,7 +164,7 @@ TEST(test_host_turn_is_refused_when_the_track_is_contradicted) {
     assert_answer("{\"cmd\":\"arm\",\"id\":3}", "\"ok\":true");
     disarm();
     assert_answer("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":10,\"id\":4}", "\"error\":\"denied\"");
-    assert_answer("{\"cmd\":\"arm\",\"id\":5}", "\"error\":\"stale_command\""); // It wants to turn.
+    assert_answer("{\"cmd\":\"arm\",\"id\":5}", "\"error\":\"stale_command\""); // The client requests motion.
 }
 
 TEST(test_host_command_older_than_its_channel_is_stale) {
@@ -182,16 +182,16 @@ TEST(test_host_command_older_than_its_channel_is_stale) {
     TEST_ASSERT_EQUAL_UINT32(1, refused);
 }
 
-TEST(test_host_state_after_a_stall_comes_in_no_burst) {
+TEST(test_host_state_after_a_stall_has_no_burst) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     pass(300);
     forget();
-    gateway_rig_run(&rig, 300000); // The image's loop stands still.
+    gateway_rig_run(&rig, 300000); // The loop of the image stalls.
     states = 0;
     say(0, "{\"cmd\":\"alive\"}");
     run_ms(50);
-    TEST_ASSERT_UINT32_WITHIN(1, 1, states); // One at once, and one if 50 ms hold a point of the grid.
+    TEST_ASSERT_UINT32_WITHIN(1, 1, states); // One immediately, and one more if the 50 ms contain a point of the grid.
     TEST_ASSERT_EQUAL_UINT(0, count_of("\"event\":\"lost\""));
     states = 0;
     pass(1000);
@@ -226,7 +226,7 @@ TEST(test_host_setting_out_of_its_range_is_refused) {
     TEST_ASSERT_FALSE(is_accepted(&config));
 }
 
-TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error) {
+TEST(test_host_executes_relay_commands_and_counts_errors) {
     static const char *const good[] = {"{\"cmd\":\"alive\"}",
                                        "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}",
                                        "{\"cmd\":\"close\",\"channel\":2}",
@@ -244,7 +244,7 @@ TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error)
         run_ms(5);
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, host.errors, good[i]);
     }
-    say(1, "{\"cmd\":\"hello\"}"); // With the relay begun anew nobody is there.
+    say(1, "{\"cmd\":\"hello\"}"); // After a restart of the relay no client is connected.
     run_ms(5);
     TEST_ASSERT_EQUAL_UINT32(1, host.errors);
     for (uint32_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -261,7 +261,7 @@ TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error)
     TEST_ASSERT_EQUAL_UINT32(2U + sizeof bad / sizeof bad[0] - 1U, host.errors);
 }
 
-TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was) {
+TEST(test_host_client_closed_or_offline_for_500_ms_is_removed) {
     watch_everything();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"watch\",\"topics\":[\"stop\"]}");
@@ -281,7 +281,7 @@ TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_
     TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[1].served.id);
 }
 
-TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero) {
+TEST(test_host_status_has_the_estop_and_the_zero_of_each_wheel) {
     host.zero[IW_LEFT] = (brd_assumptions_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
     host.zero[IW_RIGHT] = (brd_assumptions_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
     const iwn_surroundings_t around = iwn_target_around(&host.server, iwn_server_look(&host.server));
@@ -290,13 +290,13 @@ TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero) {
     TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].deviation_mN);
 }
 
-TEST(test_host_restarts_only_if_it_was_asked_to) {
+TEST(test_host_restarts_only_on_request) {
     TEST_ASSERT_FALSE(brd_host_wants_restart(&host));
     host.restart_us = 1;
     TEST_ASSERT_TRUE(brd_host_wants_restart(&host));
 }
 
-TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it) {
+TEST(test_host_line_is_stamped_every_second_while_disarmed) {
     disarm();
     pass(1000);
     forget();
@@ -306,7 +306,7 @@ TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it) {
     TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, brd_host_tell(&host, &seen, false));
 }
 
-TEST(test_host_hello_and_force_are_whole) {
+TEST(test_host_hello_and_force_are_complete) {
     forget();
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(2, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
@@ -317,7 +317,7 @@ TEST(test_host_hello_and_force_are_whole) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(all, "\"event\":\"force\""), "\"left\":{"), all);
 }
 
-TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds) {
+TEST(test_host_checks_learned_values_every_2_s_of_silence) {
     disarm();
     const iw_time_us_t silent_us = host.learn_us;
     TEST_ASSERT_TRUE(silent_us > rig.now_us - 2000000U && silent_us <= rig.now_us + 2000000U);
@@ -325,7 +325,7 @@ TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_eve
         pass(100);
     }
     TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
-    host.learn_us = 0; // As after motion.
+    host.learn_us = 0; // The same value as after motion.
     pass(100);
     TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
 }

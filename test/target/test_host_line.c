@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image's own host code against a line that damages, cuts, doubles, delays and invents: a million lines, judged by what the
-// wheels are told.
+// The host code of the image with a line that damages, cuts, doubles, delays and invents: a million lines, judged by
+// the commands that the wheels receive.
 #include "host_rig.inc"
 
 static uint32_t random_below(uint32_t limit) {
@@ -10,48 +10,49 @@ static uint32_t random_below(uint32_t limit) {
 
 static void drive_slowly(void) {
     char line[IWN_LINE_BOARD_MAX];
-    gateway_judge_asked(&rig.judge, true); // The judge sees no requests: it is told.
+    gateway_judge_asked(&rig.judge, true); // The judge receives no requests: the test reports them to it.
     gateway_judge_drive(&rig.judge, true);
     put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
     has_used = true;
 }
 
-/// With a byte that no line has: else the next one, its beginning missing, could be made whole by what is alike in both.
+/// Ends with a byte that no line contains. Otherwise the common part of two lines could repair the next line when its
+/// beginning is missing.
 static size_t end_short(char *line, size_t at) {
     line[at] = '?';
     return at + 1U;
 }
 
-/// One of the ways in which a line comes that was not sent like that.
+/// Damages the line in one of several ways.
 static size_t damage(char *line, size_t length) {
     const uint32_t at =
-        1U + random_below((uint32_t)length - 2U); // Before its first byte a newline would leave it whole.
+        1U + random_below((uint32_t)length - 2U); // A newline before the first byte would not change the line.
     const uint32_t count = 1U + random_below(12);
     switch (random_below(6)) {
     case 0:
         line[at] = (char)(line[at] ^ 1 << random_below(8));
         return length;
-    case 1: // Cut out.
+    case 1: // Bytes are cut out.
         memmove(&line[at], &line[at + count], (at + count < length) ? length - at - count : 0U);
         return (at + count < length) ? length - count : end_short(line, at);
-    case 2: // Bytes from nowhere.
+    case 2: // Random bytes are inserted.
         memmove(&line[at + count], &line[at], length - at);
         for (uint32_t i = 0; i < count; i++) {
             line[at + i] = (char)random_below(256);
         }
         return length + count;
-    case 3: // Its end is missing, and the next line follows.
+    case 3: // The end is missing, and the next line follows.
         return end_short(line, at);
-    case 4: // Its beginning is missing.
+    case 4: // The beginning is missing.
         memmove(line, &line[at], length - at);
         return length - at;
-    default: // A digit becomes another.
+    default: // One digit is changed.
         line[at] = (char)((line[at] >= '0' && line[at] <= '9') ? '0' + (line[at] - '0' + 1) % 10 : line[at] ^ 0x20);
         return length;
     }
 }
 
-/// A hostile line: damaged, or whole and old, doubled, of another start, or without a quote.
+/// Sends a hostile line: damaged, or complete and old, doubled, of another start, or without a quote.
 static void put_hostile(void) {
     static char kept[64][IWN_LINE_BOARD_MAX];
     static size_t stored_length[64];
@@ -60,16 +61,16 @@ static void put_hostile(void) {
     const uint32_t slot = random_below(64);
     size_t length = drive_line(FAST_MM_S, BOOT, seq + 1U + random_below(50), t_us, good);
     switch (random_below(8)) {
-    case 0: // Held up for longer than the lease.
+    case 0: // Delayed for longer than the lease.
         length = drive_line(FAST_MM_S, BOOT, seq + 1U, t_us - 205000U - random_below(1000000), line);
         break;
-    case 1: // Doubled: its number has been used.
+    case 1: // Doubled: the number was used before.
         length = drive_line(FAST_MM_S, has_used ? BOOT : ~BOOT, (seq > 50U) ? seq - random_below(50) : seq, t_us, line);
         break;
-    case 2: // Meant for another start.
+    case 2: // For another start of the board.
         length = drive_line(FAST_MM_S, BOOT ^ 1ULL << random_below(64), seq + 1U, t_us, line);
         break;
-    case 3: // One of those, later.
+    case 3: // One of the stored lines, later.
         length = stored_length[slot];
         memcpy(line, kept[slot], length);
         break;
@@ -77,17 +78,17 @@ static void put_hostile(void) {
         memcpy(line, good, length);
         length = damage(line, length);
         if (length > 0U && iwn_line_read(line, length - 1U, false, &(iwn_line_t){0}) == IWN_LINE_GOOD) {
-            length = 0; // It was damaged into itself, by two digits that were the same.
+            length = 0; // Two equal digits were exchanged: the line is not damaged.
         }
         break;
     }
     stored_length[slot] = (length <= IWN_LINE_BOARD_MAX) ? length : 0U;
     memcpy(kept[slot], line, stored_length[slot]);
     put(line, length);
-    put("\n", random_below(2)); // Some run into the next line.
+    put("\n", random_below(2)); // Some lines continue into the next line.
 }
 
-TEST(test_host_line_million_hostile_lines_none_is_obeyed) {
+TEST(test_host_line_of_a_million_hostile_lines_none_is_executed) {
     const char *const config = getenv("IWHEEL_HOSTILE_LINES");
     const uint32_t wanted = (config != NULL) ? (uint32_t)strtoul(config, NULL, 10) : 1000000U;
     uint32_t lines = 0;
@@ -104,7 +105,7 @@ TEST(test_host_line_million_hostile_lines_none_is_obeyed) {
         if (turn % 64U == 63U) {
             TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.commanded_mm_s[IW_LEFT], "hostile lines kept the lease");
             run_ms(2500);
-            say(0, "{\"cmd\":\"link\"}"); // So long without a relay: its channels are gone.
+            say(0, "{\"cmd\":\"link\"}"); // After this time without a relay its channels are closed.
             say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
             run_ms(20);
             arm();
@@ -116,7 +117,7 @@ TEST(test_host_line_million_hostile_lines_none_is_obeyed) {
     TEST_ASSERT_GREATER_THAN_UINT32(wanted / 60U / 4U, accepted);
 }
 
-TEST(test_host_line_errors_are_told_at_most_five_times_a_second) {
+TEST(test_host_line_errors_are_reported_at_most_5_times_per_s) {
     for (uint32_t turn = 0; turn < 200U; turn++) {
         put("rubbish*00000000\n", 17);
         say(0, "{\"cmd\":\"alive\"}");
@@ -126,8 +127,8 @@ TEST(test_host_line_errors_are_told_at_most_five_times_a_second) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT32(4, errors);
 }
 
-/// The lease runs from the stamp that a command quotes, not from when it came.
-TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp) {
+/// The lease runs from the stamp that a command quotes, not from its receipt.
+TEST(test_host_line_lease_of_delayed_commands_runs_from_the_stamp) {
     char line[IWN_LINE_BOARD_MAX];
     const uint64_t stamp_us = t_us;
     run_ms(150);
@@ -141,7 +142,7 @@ TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it) {
+TEST(test_host_replies_have_the_id_and_the_result) {
     gateway_judge_renew(&rig.judge);
     say(0, "{\"cmd\":\"alive\"}");
     assert_answer("{\"cmd\":\"hello\",\"id\":1}", "\"name\":\"iwheel-gateway\"");
@@ -155,7 +156,7 @@ TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(heard, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), heard);
 }
 
-TEST(test_host_answer_to_arm_comes_when_it_is_armed) {
+TEST(test_host_reply_to_arm_is_sent_when_armed) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
     say(1, "{\"cmd\":\"stop\"}");
     for (unsigned i = 0; i < 10U; i++) {
@@ -171,7 +172,7 @@ TEST(test_host_answer_to_arm_comes_when_it_is_armed) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"state\":\"armed\""), answer);
 }
 
-/// Keeps the link while time passes.
+/// Keeps the link alive while time passes.
 static void wait_ms(uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
         say(0, "{\"cmd\":\"alive\"}");
@@ -187,7 +188,7 @@ static void assert_aged(const char *cmd, int64_t age_ms, const char *part) {
     assert_answer(json, part);
 }
 
-TEST(test_one_person_board_refuses_what_is_too_old) {
+TEST(test_one_person_board_refuses_late_requests) {
     static const int64_t late_ms[] = {1100, 10000, 60000, -200};
     assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
     wait_ms(2500);
@@ -218,14 +219,14 @@ TEST(test_one_person_board_reset_of_another_stop_is_refused) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-/// Row 7: refused for its quote or its key, a command still shows that somebody wants motion.
-TEST(test_one_person_board_refused_drive_is_a_deflected_stick) {
+/// Row 7: a command that is refused for its quote or its key still shows that a client requests motion.
+TEST(test_one_person_board_refused_drive_makes_arm_stale) {
     static const char *const refused_for[] = {"\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777",
                                               "\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777,\"key\":\"00\"",
                                               "\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0"};
     for (size_t i = 0; i < sizeof refused_for / sizeof refused_for[0]; i++) {
         char json[128];
-        (void)snprintf(json, sizeof json, "{\"id\":5,%s}", refused_for[i]); // It quotes nothing.
+        (void)snprintf(json, sizeof json, "{\"id\":5,%s}", refused_for[i]); // The command has no quote.
         assert_answer(json, "\"ok\":false");
         assert_answer("{\"cmd\":\"stop\",\"id\":6}", "\"ok\":true");
         say(0, "{\"cmd\":\"alive\"}");
@@ -253,7 +254,7 @@ TEST(test_host_twist_turns_the_right_wheel_faster) {
     TEST_ASSERT_GREATER_THAN_INT(rig.bus.commanded_mm_s[IW_LEFT] + 20, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall) {
+TEST(test_host_state_is_sent_at_its_rate) {
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     states = 0;
     for (unsigned i = 0; i < 10U; i++) {

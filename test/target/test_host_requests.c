@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the board answers to a request by itself, and what it refuses.
+// Requests that the board itself answers, and requests that it refuses.
 #include "host_rig.inc"
 
 static void disarm(void) {
@@ -11,7 +11,7 @@ static void disarm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_host_arm_of_another_names_who_holds_the_lease) {
+TEST(test_host_arm_of_another_client_names_the_holder) {
     char holder[64];
     char line[IWN_LINE_BOARD_MAX];
     put(line, drive_line(0, BOOT, ++seq, t_us, line));
@@ -23,14 +23,14 @@ TEST(test_host_arm_of_another_names_who_holds_the_lease) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, holder), answer);
 }
 
-TEST(test_host_that_starts_anew_arms_nobody_and_resets) {
+TEST(test_host_that_restarts_refuses_arm_and_accepts_reset) {
     host.restart_us = 1;
     assert_answer("{\"cmd\":\"reset\",\"id\":1}", "\"id\":1");
     TEST_ASSERT_NULL_MESSAGE(strstr(answer, "was committed"), answer);
     assert_answer("{\"cmd\":\"arm\",\"id\":2}", "a configuration was committed");
 }
 
-TEST(test_host_second_status_before_the_answer_to_the_first_is_busy) {
+TEST(test_host_second_status_before_the_first_reply_is_busy) {
     all_length = 0;
     say(1, "{\"cmd\":\"status\",\"id\":1}");
     say(1, "{\"cmd\":\"status\",\"id\":2}");
@@ -39,8 +39,8 @@ TEST(test_host_second_status_before_the_answer_to_the_first_is_busy) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":2,\"ok\":false,\"error\":\"busy\""), all);
 }
 
-/// The serial line has no room for the events of all at once.
-TEST(test_host_periodic_events_of_each_client_keep_their_own_times) {
+/// The serial line has no capacity for the events of all clients at the same time.
+TEST(test_host_periodic_events_of_clients_have_different_times) {
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
     run_ms(30);
@@ -49,7 +49,7 @@ TEST(test_host_periodic_events_of_each_client_keep_their_own_times) {
     TEST_ASSERT_TRUE(host.client[0].served.next_us % 100000U != host.client[1].served.next_us % 100000U);
 }
 
-TEST(test_host_tare_is_kept_of_the_wheel_it_is_of) {
+TEST(test_host_tare_is_stored_for_its_wheel_only) {
     const iw_force_quality_t window = {.deviation_mN = 31};
     rig.gateway.force[IW_LEFT].offset_mN = 11;
     rig.gateway.force[IW_RIGHT].offset_mN = 22;
@@ -62,14 +62,14 @@ TEST(test_host_tare_is_kept_of_the_wheel_it_is_of) {
     TEST_ASSERT_EQUAL_UINT16(0, host.zero[IW_LEFT].deviation_mN);
 }
 
-TEST(test_host_why_and_the_answer_to_confirm_are_whole) {
+TEST(test_host_why_and_the_reply_to_confirm_are_complete) {
     assert_answer("{\"cmd\":\"why\",\"id\":1}", "\"directory\":null,\"recording\":null,\"recording_error\":null,"
                                                 "\"frames_before\":[],\"frames_after\":[]}");
     assert_answer("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\"}",
                   "\"found\":null,\"how\":null,\"since_wall_us\":null,\"reason\":null,\"disabled\":null}");
 }
 
-TEST(test_host_config_that_is_read_stays_staged_and_a_flash_that_fails_is_told) {
+TEST(test_host_config_read_stays_staged_and_flash_errors_show) {
     disarm();
     assert_answer("{\"cmd\":\"config\",\"key\":\"wheels.track_mm\",\"value\":541,\"id\":1}", "\"staged\":true");
     assert_answer("{\"cmd\":\"config\",\"id\":2}", "\"staged\":true");
@@ -81,7 +81,7 @@ TEST(test_host_config_that_is_read_stays_staged_and_a_flash_that_fails_is_told) 
     assert_answer("{\"cmd\":\"config\",\"commit\":false,\"id\":4}", "\"staged\":false");
 }
 
-TEST(test_host_answers_of_clients_that_have_gone_take_no_place) {
+TEST(test_host_replies_of_closed_clients_use_no_place) {
     for (unsigned i = 0; i < 2U * IWN_LINE_CHANNELS; i++) {
         say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
         say(2, "{\"cmd\":\"status\",\"id\":50}");
@@ -93,7 +93,7 @@ TEST(test_host_answers_of_clients_that_have_gone_take_no_place) {
     assert_answer("{\"cmd\":\"status\",\"id\":51}", "\"id\":51,\"ok\":true");
 }
 
-TEST(test_host_request_is_late_after_a_second_and_not_before) {
+TEST(test_host_request_is_late_after_exactly_a_second) {
     char json[96];
     disarm();
     (void)snprintf(json, sizeof json, "{\"cmd\":\"reset\",\"id\":1,\"t_us\":%llu}",
@@ -105,8 +105,8 @@ TEST(test_host_request_is_late_after_a_second_and_not_before) {
     assert_answer(json, "\"error\":\"stale_command\"");
 }
 
-/// Its close was lost: what the client of before has said is nothing of the new one's.
-TEST(test_host_channel_opened_anew_is_greeted_as_who_it_is_and_has_no_older_command) {
+/// The close was lost: commands of the previous client do not count for the new one.
+TEST(test_host_channel_opened_again_refuses_earlier_commands) {
     char json[256];
     char part[64];
     say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
@@ -126,7 +126,7 @@ TEST(test_host_channel_opened_anew_is_greeted_as_who_it_is_and_has_no_older_comm
     TEST_ASSERT_EQUAL_UINT32(1, refused);
 }
 
-TEST(test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_event_is_due) {
+TEST(test_host_reports_the_button_and_returns_the_next_event_time) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     run_ms(20);
@@ -137,7 +137,7 @@ TEST(test_host_tells_of_the_button_at_once_and_comes_again_when_the_next_event_i
     TEST_ASSERT_TRUE(next_us > rig.now_us && next_us < host.linked_us + 1000000U);
 }
 
-TEST(test_host_change_of_the_ledger_is_told_and_every_item_is_kept) {
+TEST(test_host_change_of_assumptions_is_reported_and_stored) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":1}");
     run_ms(20);
@@ -158,7 +158,7 @@ TEST(test_host_change_of_the_ledger_is_told_and_every_item_is_kept) {
     }
 }
 
-TEST(test_host_without_a_track_refuses_arm_and_tells_null) {
+TEST(test_host_without_a_track_refuses_arm_and_has_null) {
     disarm();
     rig.gateway.config.track_mm = 0;
     host.settings = host.staged = brd_settings_from(&rig.gateway.config);
@@ -169,7 +169,7 @@ TEST(test_host_without_a_track_refuses_arm_and_tells_null) {
     assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"track\",\"value\":\"540\"}", "\"error\":\"track_not_set\"");
 }
 
-TEST(test_host_setting_that_is_refused_says_what_it_may_be) {
+TEST(test_host_refused_setting_names_its_range) {
     assert_answer("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.track_mm\",\"value\":\"0\"}",
                   "\"error\":\"bad_value\"");
     const char *const to = strstr(answer, " to ");

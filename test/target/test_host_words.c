@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What the image's host code says: each answer with all that the protocol promises, each change as an event of its topic.
+// Output of the host code of the image: each reply has all members of the protocol, each change is an event of its
+// topic.
 #include "host_rig.inc"
 
 #include "iwheel/codec.h"
 
-/// The relay is there all the time.
+/// Lets time pass with a connected relay.
 static void pass(uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
         say(0, "{\"cmd\":\"alive\"}");
@@ -55,43 +56,43 @@ TEST(test_host_staged_keys_stay_when_they_are_read) {
     ask("{\"cmd\":\"config\",\"id\":3,\"commit\":false}", "\"staged\":false");
 }
 
-TEST(test_host_role_of_the_current_is_read_as_a_word) {
+TEST(test_host_role_of_the_current_is_read_as_a_string) {
     ask("{\"cmd\":\"config\",\"id\":1}", "{\"key\":\"wheels.current_role\",\"value\":\"limit\"}");
 }
 
-TEST(test_host_refused_key_says_its_range_and_refused_commit_what_to_set_first) {
+TEST(test_host_refused_key_and_commit_name_the_fix) {
     ask("{\"cmd\":\"config\",\"id\":1,\"key\":\"wheels.radius_mm\",\"value\":\"1\"}", " must be 60 to 400");
     ask("{\"cmd\":\"config\",\"id\":2,\"key\":\"limits.rest_rpm\",\"value\":\"9\"}", "\"staged\":true");
     ask("{\"cmd\":\"config\",\"id\":3,\"commit\":true}", "set it to 2 first");
 }
 
-TEST(test_host_lease_that_ends_is_told_once) {
+TEST(test_host_lease_that_ends_is_reported_once) {
     watch("\"lease\"");
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
     forget();
     char line[IWN_LINE_BOARD_MAX];
-    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line)); // Refused, and nobody's lease.
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line)); // The command is refused, and no client has the lease.
     pass(300);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"ok\":false"), answer);
     TEST_ASSERT_NULL_MESSAGE(strstr(all, "\"event\":\"lease\""), all);
 }
 
-TEST(test_host_state_that_changes_is_told_at_once) {
+TEST(test_host_state_change_is_reported_immediately) {
     watch("\"state\"");
-    pass(1100); // What comes at its rate has come.
+    pass(1100); // Periodic events have been sent by then.
     forget();
     arm();
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"state\""), all);
 }
 
-TEST(test_host_item_that_changes_is_told) {
+TEST(test_host_item_change_is_reported) {
     watch("\"state\"");
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"dlc\",\"value\":\"no\"}", "\"state\":\"contradicted\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"ledger\""), all);
 }
 
-TEST(test_host_link_line_comes_at_its_second_and_not_later) {
+TEST(test_host_link_line_is_sent_exactly_after_a_second) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     pass(2500);
     iw_snapshot_t seen = gateway_rig_look(&rig);
@@ -104,7 +105,7 @@ TEST(test_host_link_line_comes_at_its_second_and_not_later) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"link\""), all);
 }
 
-/// Force frames of one wheel, which stands.
+/// Sends force frames of one wheel, which is at standstill.
 static void press(iw_side_t side, uint32_t span_ms) {
     for (uint32_t ms = 0; ms < span_ms; ms += 50U) {
         const iw_can_frame_t frame = {
@@ -115,7 +116,7 @@ static void press(iw_side_t side, uint32_t span_ms) {
     }
 }
 
-TEST(test_host_tare_of_one_wheel_is_that_wheels_zero) {
+TEST(test_host_tare_of_one_wheel_sets_its_zero_only) {
     ask("{\"cmd\":\"stop\",\"id\":1}", "\"ok\":true");
     press(IW_LEFT, 4000);
     ask("{\"cmd\":\"tare\",\"id\":2,\"side\":\"left\"}", "\"left\":{");
@@ -127,7 +128,7 @@ TEST(test_host_tare_of_one_wheel_is_that_wheels_zero) {
     TEST_ASSERT_EQUAL_UINT32(0, around.zero[IW_RIGHT].samples);
 }
 
-TEST(test_host_first_item_is_kept_like_the_others) {
+TEST(test_host_first_item_is_stored) {
     ask("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"setpoint_type\"}", "\"state\":\"confirmed\"");
     const iw_snapshot_t seen = gateway_rig_look(&rig);
     brd_assumptions_t learned;
@@ -135,7 +136,7 @@ TEST(test_host_first_item_is_kept_like_the_others) {
     TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, learned.item[IW_ASSUMPTION_SETPOINT_TYPE] & 0x0FU);
 }
 
-TEST(test_host_counts_its_channels_and_nothing_behind_them) {
+TEST(test_host_counts_only_its_channels) {
     memset(&host.pending, 0xFF, sizeof host.pending);
     memset(&host.receiver, 0xFF, sizeof host.receiver);
     memset(host.in, 0xFF, sizeof host.in);
@@ -143,7 +144,7 @@ TEST(test_host_counts_its_channels_and_nothing_behind_them) {
     TEST_ASSERT_EQUAL_UINT32(1, iwn_target_around(&host.server, &seen).clients);
 }
 
-TEST(test_host_line_has_room_for_what_stands_around_its_json) {
+TEST(test_host_line_has_space_for_prefix_and_suffix) {
     const iwn_out_t json = iwn_server_begin_event(&host.server, "link");
     TEST_ASSERT_EQUAL_PTR(&host.scratch.small[IWN_LINE_PREFIX], json.data);
     TEST_ASSERT_EQUAL_UINT32(BRD_HOST_SMALL_BYTES - IWN_LINE_PREFIX - IWN_LINE_SUFFIX, json.size);

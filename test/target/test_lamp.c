@@ -19,7 +19,7 @@ static uint16_t pattern_in(iw_state_t state) {
     return brd_lamp_pattern(&seen, false);
 }
 
-TEST(test_each_state_has_its_own_pattern) {
+TEST(test_lamp_each_state_has_its_own_pattern) {
     const uint16_t patterns[] = {pattern_in(IW_STATE_LISTENING),
                                  pattern_in(IW_STATE_ARMED),
                                  pattern_in(IW_STATE_STOPPING),
@@ -35,14 +35,14 @@ TEST(test_each_state_has_its_own_pattern) {
     }
 }
 
-TEST(test_pressed_contact_shows_before_any_state) {
+TEST(test_lamp_pressed_contact_has_priority_over_any_state) {
     for (int state = IW_STATE_LISTENING; state <= IW_STATE_LATCHED; state++) {
         (void)pattern_in((iw_state_t)state);
         TEST_ASSERT_EQUAL_HEX16(BRD_LAMP_ESTOP, brd_lamp_pattern(&seen, true));
     }
 }
 
-TEST(test_listening_tells_whether_the_bus_is_there) {
+TEST(test_lamp_listening_shows_whether_the_bus_works) {
     for (int bus = IW_BUS_DOWN; bus <= IW_BUS_ACTIVE; bus++) {
         seen.bus = (iw_bus_state_t)bus;
         TEST_ASSERT_EQUAL_HEX16((bus < IW_BUS_PASSIVE) ? BRD_LAMP_NO_BUS : BRD_LAMP_LISTENING,
@@ -50,7 +50,7 @@ TEST(test_listening_tells_whether_the_bus_is_there) {
     }
 }
 
-TEST(test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second) {
+TEST(test_lamp_pattern_starts_at_its_lowest_bit_every_second) {
     for (uint32_t slot = 0; slot < 16; slot++) {
         for (uint32_t second = 0; second < 3; second++) {
             const iw_time_us_t at_us = second * 1000000U + slot * BRD_LAMP_SLOT_US;

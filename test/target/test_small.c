@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// small.c against the library of this machine, under other names.
+// Compares small.c, under other names, with the library of this machine.
 #include "unit.h"
 
 #include <stdlib.h>
@@ -35,7 +35,7 @@ static int sign(int value) {
     return (value > 0) - (value < 0);
 }
 
-TEST(test_small_memory_is_that_of_the_library) {
+TEST(test_small_memory_functions_equal_the_library) {
     for (unsigned i = 0; i < 20000U; i++) {
         uint8_t mine[SIZE];
         uint8_t theirs[SIZE];
@@ -56,7 +56,7 @@ TEST(test_small_memory_is_that_of_the_library) {
     }
 }
 
-TEST(test_small_texts_are_those_of_the_library) {
+TEST(test_small_string_functions_equal_the_library) {
     for (unsigned i = 0; i < 20000U; i++) {
         char texts[2][SIZE] = {{0}};
         for (size_t at = 0; at < SIZE - 1U; at++) {
@@ -74,7 +74,7 @@ TEST(test_small_texts_are_those_of_the_library) {
     }
 }
 
-TEST(test_small_division_is_that_of_this_machine) {
+TEST(test_small_division_equals_the_machine) {
     static const uint64_t corners[] = {
         0,         1,     2,          3,          10,          999,         1000,
         65535,     65536, 1000000000, UINT32_MAX, 1ULL << 32U, 1ULL << 63U, UINT64_MAX - 1U,

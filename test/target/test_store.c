@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The records in flash, on a flash that is cut off from power after any number of writes and erasures.
+// The records in flash, on a flash that loses power after any number of writes and erasures.
 #include "unit.h"
 
 #include "flash.h"
@@ -8,11 +8,11 @@
 #include <string.h>
 
 static uint32_t flash[BRD_FLASH_PAGES][BRD_FLASH_PAGE_WORDS];
-static unsigned operations; ///< Since the start.
-static unsigned cut_after;  ///< So many are carried out, and of the next one a part.
+static unsigned operations; ///< Operations since the start.
+static unsigned cut_after;  ///< Number of complete operations; the next one is executed partly.
 static unsigned erasures;
-static bool is_dead;     ///< Nothing is carried out any more.
-static uint32_t torn_by; ///< Which bits of the operation that was cut got through.
+static bool is_dead;     ///< No operation is executed any more.
+static uint32_t torn_by; ///< Bits of the cut operation that were written.
 
 const volatile uint32_t *brd_flash_page(unsigned page) {
     return flash[page];
@@ -64,7 +64,7 @@ static void power_up(void) {
     is_dead = false;
 }
 
-/// The number of the record that is there; 0: none.
+/// Returns the number of the stored record; 0: none.
 static uint32_t newest(brd_store_t *store) {
     uint32_t found[BRD_STORE_WORDS];
     uint32_t wanted[BRD_STORE_WORDS];
@@ -72,7 +72,7 @@ static uint32_t newest(brd_store_t *store) {
     if (!brd_store_read(store, found)) {
         return 0;
     }
-    fill(wanted, found[0] * 244002641U); // The inverse of the factor: which number it was made of.
+    fill(wanted, found[0] * 244002641U); // The inverse of the factor returns the number of the record.
     TEST_ASSERT_EQUAL_HEX32_ARRAY_MESSAGE(wanted, found, BRD_STORE_WORDS, "a record of parts of two");
     return found[0] * 244002641U;
 }
@@ -89,7 +89,7 @@ TEST(test_store_blank_flash_has_no_record) {
     TEST_ASSERT_EQUAL_UINT(4, brd_store_blank(&store));
 }
 
-TEST(test_store_each_record_is_the_newest) {
+TEST(test_store_newest_record_is_the_last_one_written) {
     brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 50U; number++) {
@@ -100,7 +100,7 @@ TEST(test_store_each_record_is_the_newest) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT(25, erasures);
 }
 
-TEST(test_store_without_erasing_full_page_refuses_and_keeps) {
+TEST(test_store_without_erasing_full_page_refuses_a_record) {
     brd_store_t store;
     (void)newest(&store);
     for (uint32_t number = 1; number <= 4U; number++) {
@@ -112,8 +112,9 @@ TEST(test_store_without_erasing_full_page_refuses_and_keeps) {
     TEST_ASSERT_EQUAL_UINT32(4, newest(&store));
 }
 
-/// One record after another with a cut after every operation of each, and whatever bits of the last one got through.
-TEST(test_store_cut_at_any_instant_leaves_old_or_new) {
+/// Writes one record after another, with a cut after every operation of each, and any bits of the last operation
+/// written.
+TEST(test_store_cut_at_any_instant_leaves_the_old_or_new_record) {
     static const uint32_t torn[] = {0, 0x0000FFFF, 0xFFFF0000, 0x55555555, UINT32_MAX};
     for (unsigned way = 0; way < sizeof torn / sizeof torn[0]; way++) {
         brd_store_t store;
@@ -136,7 +137,7 @@ TEST(test_store_cut_at_any_instant_leaves_old_or_new) {
     }
 }
 
-TEST(test_store_flipped_bit_falls_back_to_the_record_before) {
+TEST(test_store_flipped_bit_falls_back_to_the_previous_record) {
     brd_store_t store;
     (void)newest(&store);
     TEST_ASSERT_TRUE(write(&store, 1, true));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Compiled for one APB1 clock after the other: the constants of bit_rate.h must do what they say, and what the core's solver does.
+// Compiled for one APB1 clock after the other: the constants of bit_rate.h must be valid and equal the result of the
+// core's solver.
 #include "bit_rate.h"
 
 #include <stdio.h>
@@ -9,7 +10,7 @@ static bool is_exact(const iw_bit_timing_t *timing) {
     return achieved.bitrate_hz == IW_BUS_BITRATE_HZ && achieved.sample_point_permille == IW_BUS_SAMPLE_POINT_PERMILLE;
 }
 
-/// BTR read as the reference manual describes it: every field one less than its meaning.
+/// Decodes BTR as in the reference manual: every field is one less than its value.
 static iw_bit_timing_t decode(uint32_t btr) {
     return (iw_bit_timing_t){(uint16_t)((btr & 0x3FFU) + 1U), (uint16_t)(((btr >> 16) & 0xFU) + 1U),
                              (uint16_t)(((btr >> 20) & 0x7U) + 1U)};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The ledger's items in words: the value in force, what somebody found beside it, what a contradiction costs.
+// Texts of the assumptions: the configured value, the comparison with a found value, and the cost of a contradiction.
 #include "inspect/assumption.h"
 
 #include "iwheel_northbound/words.h"
@@ -36,7 +36,7 @@ static void assert_found(inspect_found_t expected, iw_assumption_item_t item, co
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected, inspect_assumption_compare(&configured, item, found), found);
 }
 
-TEST(test_assumption_values_are_those_of_the_configuration) {
+TEST(test_assumption_value_equals_the_configuration) {
     assert_value(IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_value(IW_ASSUMPTION_CURRENT_ROLE, "setpoint");
     assert_value(IW_ASSUMPTION_FORCE_UNIT_LEFT, "cN");
@@ -54,13 +54,13 @@ TEST(test_assumption_values_are_those_of_the_configuration) {
     assert_value(IW_ASSUMPTION_GEAR_RATIO, "1, rpm of the wheel");
 }
 
-TEST(test_assumption_longest_values_fit) {
+TEST(test_assumption_longest_value_fits) {
     config.gear_turns = 1000;
     config.gear_per = 999;
     assert_value(IW_ASSUMPTION_GEAR_RATIO, "1000/999, rpm of the rotor");
 }
 
-TEST(test_assumption_every_item_is_found_by_its_name_and_nothing_else_is) {
+TEST(test_assumption_item_is_found_by_its_exact_name_only) {
     for (unsigned n = 0; n < IW_ASSUMPTION_ITEMS; n++) {
         iw_assumption_item_t item = IW_ASSUMPTION_ITEMS;
         TEST_ASSERT_TRUE(iwn_assumption_item_of(iwn_assumption_item_name((iw_assumption_item_t)n), &item));
@@ -73,20 +73,20 @@ TEST(test_assumption_every_item_is_found_by_its_name_and_nothing_else_is) {
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, item);
 }
 
-TEST(test_assumption_without_a_value_the_configured_one_is_meant) {
+TEST(test_assumption_compare_without_value_is_same) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         assert_found(INSPECT_FOUND_SAME, (iw_assumption_item_t)item, "");
     }
 }
 
-TEST(test_assumption_what_is_not_configured_cannot_be_confirmed) {
+TEST(test_assumption_compare_with_unset_configuration_is_unset) {
     iw_config_default(&config);
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "");
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_found(INSPECT_FOUND_UNSET, IW_ASSUMPTION_CURRENT_ROLE, "limit");
 }
 
-TEST(test_assumption_numbers_are_compared_as_numbers) {
+TEST(test_assumption_numbers_compare_by_value) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "7");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_SETPOINT_TYPE, "007");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_SETPOINT_TYPE, "0");
@@ -97,7 +97,7 @@ TEST(test_assumption_numbers_are_compared_as_numbers) {
     }
 }
 
-TEST(test_assumption_a_radius_within_two_percent_is_the_same) {
+TEST(test_assumption_radius_within_two_percent_is_same) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "192");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "195");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_WHEEL_RADIUS, "189");
@@ -108,7 +108,7 @@ TEST(test_assumption_a_radius_within_two_percent_is_the_same) {
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_WHEEL_RADIUS, "19");
 }
 
-TEST(test_assumption_a_track_within_two_percent_is_the_same) {
+TEST(test_assumption_track_within_two_percent_is_same) {
     configured.track_mm = 600;
     assert_value(IW_ASSUMPTION_TRACK, "600");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_TRACK, "600");
@@ -121,7 +121,7 @@ TEST(test_assumption_a_track_within_two_percent_is_the_same) {
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_TRACK, "199");
 }
 
-TEST(test_assumption_gear_ratios_are_compared_as_ratios) {
+TEST(test_assumption_gear_ratios_compare_as_ratios) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "10/3");
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_GEAR_RATIO, "20/6");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_GEAR_RATIO, "10");
@@ -133,7 +133,7 @@ TEST(test_assumption_gear_ratios_are_compared_as_ratios) {
     }
 }
 
-TEST(test_assumption_words_are_compared_as_words) {
+TEST(test_assumption_strings_compare_exactly) {
     assert_found(INSPECT_FOUND_SAME, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "dN");
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "cN");
     assert_found(INSPECT_FOUND_IMPOSSIBLE, IW_ASSUMPTION_FORCE_UNIT_RIGHT, "DN");
@@ -145,7 +145,7 @@ TEST(test_assumption_words_are_compared_as_words) {
     assert_found(INSPECT_FOUND_DIFFERENT, IW_ASSUMPTION_OFFSET_INCLUDED, "no");
 }
 
-TEST(test_assumption_evidence_tells_the_figure) {
+TEST(test_assumption_source_text_contains_the_figure) {
     const inspect_word_t word = {"", ""};
     iw_assumption_entry_t entry = {IW_CONTRADICTED, IW_SOURCE_BUS, -1010};
     inspect_assumption_source(IW_ASSUMPTION_FORCE_UNIT_LEFT, &entry, &word, text);
@@ -170,19 +170,19 @@ static void assert_word(iw_assumption_state_t state, const char *found, const ch
     TEST_ASSERT_EQUAL_STRING(expected, text);
 }
 
-TEST(test_assumption_evidence_tells_what_the_operator_found) {
+TEST(test_assumption_source_text_contains_the_operators_value) {
     assert_word(IW_CONTRADICTED, "181", "", "the operator found 181");
     assert_word(IW_CONTRADICTED, "", "", "the operator found something else");
     assert_word(IW_CONFIRMED, "192", "", "the operator says so");
 }
 
-TEST(test_assumption_evidence_tells_how_the_operator_found_it) {
+TEST(test_assumption_source_text_contains_the_operators_method) {
     assert_word(IW_CONFIRMED, "192", "bringup: 5.00 m pushed", "found by bringup: 5.00 m pushed");
     assert_word(IW_CONTRADICTED, "181", "a tape", "the operator found 181 by a tape");
     assert_word(IW_CONTRADICTED, "", "a tape", "the operator found something else by a tape");
 }
 
-TEST(test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm) {
+TEST(test_assumption_cost_names_arm_if_item_guards_motion) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         const char *cost = inspect_assumption_cost((iw_assumption_item_t)item);
         const bool refuses = strncmp(cost, "arm is refused; ", 16) == 0;

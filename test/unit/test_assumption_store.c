@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The assumption ledger: its diagram, walked through exhaustively, beside a model that keeps to the diagram.
+// Assumption store: every sequence of operations is compared with a model of the state diagram.
 #include <string.h>
 
 #include "iwheel/private/assumption_store.h"
@@ -21,7 +21,7 @@ static void assert_entry(iw_assumption_item_t item, iw_assumption_state_t state,
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
 }
 
-TEST(test_init_assumes_everything_and_tells_what_the_document_says) {
+TEST(test_assumption_init_sets_assumed_and_the_document_source) {
     static const iw_source_t origin[IW_ASSUMPTION_ITEMS] = {
         [IW_ASSUMPTION_FORCE_UNIT_LEFT] = IW_SOURCE_DOCUMENT,
         [IW_ASSUMPTION_FORCE_UNIT_RIGHT] = IW_SOURCE_DOCUMENT,
@@ -31,18 +31,18 @@ TEST(test_init_assumes_everything_and_tells_what_the_document_says) {
     for (int item = 0; item < IW_ASSUMPTION_DLC; item++) {
         assert_entry((iw_assumption_item_t)item, IW_ASSUMED, origin[item], 0);
     }
-    // The table shows the lengths and nothing states them: either reading of "documented" will do.
+    // The table of the document shows the lengths, but no sentence states them: both sources are correct.
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->state);
     TEST_ASSERT_EQUAL_INT32(0, iw_assumption_entry(&assumptions, IW_ASSUMPTION_DLC)->figure);
     TEST_ASSERT_EQUAL_UINT32(0, assumptions.changes);
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_ITEMS, assumptions.doubt);
 }
 
-TEST(test_there_are_fourteen_items) {
+TEST(test_assumption_items_are_fourteen) {
     TEST_ASSERT_EQUAL_INT(14, IW_ASSUMPTION_ITEMS);
 }
 
-TEST(test_assume_tells_where_an_assumption_comes_from) {
+TEST(test_assume_sets_the_source) {
     iw_assumption_assume(&assumptions, IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION, 0);
     TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
@@ -52,7 +52,7 @@ TEST(test_assume_tells_where_an_assumption_comes_from) {
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_NONE, 0);
 }
 
-TEST(test_confirm_from_bus_lifts_no_contradiction) {
+TEST(test_confirm_by_bus_does_not_lift_a_contradiction) {
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 1010);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_SOURCE_BUS, 9980);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONTRADICTED, IW_SOURCE_BUS, 1010);
@@ -66,34 +66,34 @@ TEST(test_confirm_by_operator_lifts_a_contradiction) {
     TEST_ASSERT_EQUAL_UINT32(2, assumptions.changes);
 }
 
-TEST(test_confirm_from_bus_does_not_replace_the_operators_word) {
+TEST(test_confirm_by_bus_does_not_replace_the_operator) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_OPERATOR, 0);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_WHEEL_RADIUS, IW_SOURCE_BUS, 77);
     assert_entry(IW_ASSUMPTION_WHEEL_RADIUS, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_UINT32(1, assumptions.changes);
 }
 
-TEST(test_confirm_by_operator_replaces_evidence_of_the_bus) {
+TEST(test_confirm_by_operator_replaces_the_bus) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_BUS, 120);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_BUS, 120);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_SOURCE_OPERATOR, 0);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_CONFIRMED, IW_SOURCE_OPERATOR, 0);
 }
 
-TEST(test_contradict_ends_every_confirmation_even_the_operators) {
+TEST(test_contradict_by_bus_replaces_confirmation_by_operator) {
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_SOURCE_BUS, -120);
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONTRADICTED, IW_SOURCE_BUS, -120);
 }
 
-TEST(test_contradict_keeps_the_extremes_of_its_figure) {
+TEST(test_assumption_figure_stores_int32_extremes) {
     iw_assumption_contradict(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_BUS, INT32_MIN);
     assert_entry(IW_ASSUMPTION_DLC, IW_CONTRADICTED, IW_SOURCE_BUS, INT32_MIN);
     iw_assumption_confirm(&assumptions, IW_ASSUMPTION_DLC, IW_SOURCE_OPERATOR, INT32_MAX);
     assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_OPERATOR, INT32_MAX);
 }
 
-TEST(test_items_do_not_touch_each_other) {
+TEST(test_contradict_changes_no_other_item) {
     for (int touched = 0; touched < IW_ASSUMPTION_ITEMS; touched++) {
         setUp();
         const iw_assumption_store_t before = assumptions;
@@ -108,7 +108,7 @@ TEST(test_items_do_not_touch_each_other) {
     }
 }
 
-/// The operations of the walk: assume from two sources, confirm and contradict by bus and operator.
+/// Operations of the walk: assume with two sources, confirm and contradict by the bus and by the operator.
 typedef enum {
     ASSUME_DOCUMENT,
     ASSUME_CONFIGURATION,
@@ -119,7 +119,7 @@ typedef enum {
     OPERATIONS
 } operation_t;
 
-/// What the diagram and the two sentences under `confirm` make of it.
+/// Returns the entry that the state diagram and the header of `confirm` require after the operation.
 static iw_assumption_entry_t model(iw_assumption_entry_t entry, operation_t operation, int32_t figure) {
     const bool assumed = entry.state == IW_ASSUMED;
     const bool open_to_bus = assumed || (entry.state == IW_CONFIRMED && entry.source != IW_SOURCE_OPERATOR);
@@ -172,7 +172,7 @@ static void walk(uint32_t path, unsigned length) {
     }
 }
 
-TEST(test_every_sequence_of_six_operations_keeps_to_the_diagram) {
+TEST(test_assumption_every_six_operations_follow_the_diagram) {
     for (uint32_t path = 0; path < 46656; path++) {
         walk(path, 6);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is kept from one run to the next: the text, everything that is wrong with a text.
+// File of the assumption store: writing, reading, and refusal of invalid texts.
 #include "assumptions/assumptions_file.h"
 
 #include "iwheel_northbound/words.h"
@@ -18,7 +18,7 @@ static char text[GW_ASSUMPTIONS_FILE_SIZE];
 static char reason[GW_ASSUMPTIONS_REASON_SIZE];
 static size_t length;
 
-/// What the bus has shown of each item, at the edge of what it can show; state ASSUMED: only the operator can know.
+/// Values of each item at the limit of what the bus can show. State ASSUMED: only the operator can confirm the item.
 static const struct {
     iw_assumption_state_t state;
     int32_t figure;
@@ -101,13 +101,13 @@ static void assert_same(void) {
     }
 }
 
-TEST(test_memory_what_is_written_is_read_back_even_at_its_extremes) {
+TEST(test_assumptions_file_limit_values_are_read_back) {
     TEST_ASSERT_GREATER_THAN_UINT(0, length);
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
     assert_same();
 }
 
-TEST(test_memory_with_every_item_at_its_longest_fits) {
+TEST(test_assumptions_file_all_items_at_longest_fit) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         fill_item(item);
     }
@@ -117,21 +117,21 @@ TEST(test_memory_with_every_item_at_its_longest_fits) {
     assert_same();
 }
 
-TEST(test_memory_of_nothing_is_a_memory) {
+TEST(test_assumptions_file_empty_store_is_read_back) {
     memset(&known, 0, sizeof known);
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
     assert_same();
 }
 
-TEST(test_memory_too_small_a_buffer_gives_nothing) {
+TEST(test_assumptions_file_small_buffer_writes_zero_bytes) {
     char guarded[200];
     memset(guarded, 0x5A, sizeof guarded);
     TEST_ASSERT_EQUAL_UINT(0, gw_assumptions_file_write(&known, BUS, guarded, 100));
     TEST_ASSERT_EQUAL_HEX8(0x5A, guarded[100]);
 }
 
-TEST(test_memory_every_single_flipped_bit_is_damage) {
+TEST(test_assumptions_file_any_flipped_bit_is_refused) {
     for (size_t bit = 0; bit < length * 8U; bit++) {
         text[bit / 8U] = (char)(text[bit / 8U] ^ (1 << (bit % 8U)));
         TEST_ASSERT_FALSE(gw_assumptions_file_read(text, length, BUS, &got, reason));
@@ -140,7 +140,7 @@ TEST(test_memory_every_single_flipped_bit_is_damage) {
     TEST_ASSERT_TRUE(gw_assumptions_file_read(text, length, BUS, &got, reason));
 }
 
-TEST(test_memory_every_shorter_or_longer_text_is_damage) {
+TEST(test_assumptions_file_shorter_or_longer_text_is_refused) {
     const size_t whole = length;
     for (length = 0; length < whole; length++) {
         refused("damaged");
@@ -150,7 +150,7 @@ TEST(test_memory_every_shorter_or_longer_text_is_damage) {
     refused("damaged");
 }
 
-/// Replaces the body of the text and signs it, as somebody would who knows how.
+/// Replaces the body of the text and appends a correct checksum.
 static void forge(const char *body) {
     uint32_t sum = UINT32_MAX;
     for (const char *c = body; *c != '\0'; c++) {
@@ -165,7 +165,7 @@ static void forge(const char *body) {
 #define LONG "123456789012345678901234567890123456789012345678901234567890"
 #define HEAD "{\"format\":\"iwheel-ledger\",\"version\":1,\"bus\":\"unix:/tmp/\\\"a\\\" b/bus\","
 
-TEST(test_memory_of_another_bus_version_or_program_is_refused) {
+TEST(test_assumptions_file_other_bus_version_or_format_is_refused) {
     TEST_ASSERT_FALSE(gw_assumptions_file_read(text, length, "can0", &got, reason));
     TEST_ASSERT_NOT_NULL(strstr(reason, "another bus"));
     forge("{\"format\":\"iwheel-ledger\",\"version\":2,\"bus\":\"can0\",\"items\":{},\"offsets\":{}}\n");
@@ -180,7 +180,7 @@ TEST(test_memory_of_another_bus_version_or_program_is_refused) {
     refused("damaged");
 }
 
-TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole) {
+TEST(test_assumptions_file_one_invalid_member_refuses_the_file) {
     static const char *const bodies[] = {
         HEAD "\"offsets\":{}}\n",
         HEAD "\"items\":[],\"offsets\":{}}\n",
@@ -229,8 +229,8 @@ TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole) {
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
 }
 
-/// As versions without the track and without a way of finding wrote it.
-TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open) {
+/// The text is as versions wrote it that had no track and no `how`.
+TEST(test_assumptions_file_of_an_old_version_is_accepted) {
     forge(HEAD "\"items\":{\"wheel_radius\":{\"state\":\"confirmed\",\"evidence\":\"operator\",\"figure\":0,"
                "\"value\":\"192\",\"found\":\"192\",\"since_wall_us\":1}},\"offsets\":{}}\n");
     TEST_ASSERT_TRUE_MESSAGE(gw_assumptions_file_read(text, length, BUS, &got, reason), reason);
@@ -240,7 +240,7 @@ TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open) {
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, got.item[IW_ASSUMPTION_TRACK].entry.state);
 }
 
-TEST(test_memory_tells_how_only_if_it_was_told) {
+TEST(test_assumptions_file_how_is_written_only_if_set) {
     memset(&known, 0, sizeof known);
     gw_stored_item_t *entry = &known.item[IW_ASSUMPTION_TRACK];
     entry->entry = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
@@ -253,7 +253,7 @@ TEST(test_memory_tells_how_only_if_it_was_told) {
     assert_same();
 }
 
-/// As the gateway would write it, and reads it again: true if it is believed.
+/// Writes the store and reads it again. Returns true if the text is accepted.
 static bool believed(void) {
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
     TEST_ASSERT_GREATER_THAN_UINT(0, length);
@@ -264,12 +264,12 @@ static bool believed(void) {
     return taken;
 }
 
-TEST(test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not) {
+TEST(test_assumptions_file_bus_figure_beyond_limits_is_refused) {
     static const struct {
         iw_assumption_item_t item;
         iw_assumption_state_t state;
         const char *value;
-        int32_t low; ///< The least and the most that is believed.
+        int32_t low; ///< Least accepted figure; `high` is the largest one.
         int32_t high;
     } rows[] = {
         {IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_CONFIRMED, "cN", 8500, 11500},
@@ -303,7 +303,7 @@ TEST(test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_be
     }
 }
 
-TEST(test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus) {
+TEST(test_assumptions_file_bus_source_of_operator_item_is_refused) {
     static const iw_assumption_item_t items[] = {IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMPTION_MOUNT_SIGN_LEFT,
                                                  IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_ASSUMPTION_WHEEL_RADIUS};
     for (size_t i = 0; i < sizeof items / sizeof items[0]; i++) {
@@ -318,7 +318,7 @@ TEST(test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus) 
     }
 }
 
-TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed) {
+TEST(test_assumptions_file_invalid_value_is_refused) {
     static const struct {
         iw_assumption_item_t item;
         const char *value;
@@ -343,7 +343,7 @@ TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed) {
     }
 }
 
-TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed) {
+TEST(test_assumptions_file_impossible_offset_is_refused) {
     static const struct {
         bool good;
         gw_stored_offset_t offset;
@@ -376,7 +376,7 @@ TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed) {
     }
 }
 
-TEST(test_memory_file_name_is_one_plain_word) {
+TEST(test_assumptions_file_name_has_no_separators) {
     char name[64];
     gw_assumptions_file_name("can0", name, sizeof name);
     TEST_ASSERT_EQUAL_STRING("ledger-can0", name);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every program does before anything else.
+// First actions of every program: signals, standard streams and arguments.
 #include "begin/begin.h"
 
 #include "unit.h"
@@ -17,7 +17,7 @@
 static int kept[3];
 
 void setUp(void) {
-    (void)fflush(stdout); // One test opens it anew.
+    (void)fflush(stdout); // One test opens stdout again.
     for (int fd = 0; fd < COUNT(kept); fd++) {
         kept[fd] = fcntl(fd, F_DUPFD_CLOEXEC, COUNT(kept));
     }
@@ -39,7 +39,7 @@ static int begin(char *argument) {
     return begin_program("program", (argument != NULL) ? 3 : 2, arguments);
 }
 
-TEST(test_begin_log_without_a_reader_ends_nothing) {
+TEST(test_begin_write_to_closed_log_returns_error) {
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
@@ -72,7 +72,7 @@ TEST(test_begin_closed_streams_are_opened) {
     }
 }
 
-TEST(test_begin_open_streams_are_left_alone) {
+TEST(test_begin_open_streams_are_unchanged) {
     struct stat before;
     struct stat after;
     (void)fstat(STDOUT_FILENO, &before);
@@ -81,7 +81,7 @@ TEST(test_begin_open_streams_are_left_alone) {
     TEST_ASSERT_TRUE(before.st_ino == after.st_ino && before.st_dev == after.st_dev);
 }
 
-TEST(test_begin_argument_that_means_nothing_is_refused) {
+TEST(test_begin_empty_or_bare_argument_is_refused) {
     char empty[] = "";
     char bare[] = "--";
     char *const refused[] = {empty, bare};
@@ -90,7 +90,7 @@ TEST(test_begin_argument_that_means_nothing_is_refused) {
     }
 }
 
-TEST(test_begin_argument_that_may_mean_something_is_accepted) {
+TEST(test_begin_other_argument_is_accepted) {
     char dash[] = "-";
     char longer[] = "--x";
     char three[] = "---";
@@ -101,7 +101,7 @@ TEST(test_begin_argument_that_may_mean_something_is_accepted) {
     }
 }
 
-TEST(test_begin_option_in_place_of_a_value_is_no_value) {
+TEST(test_begin_option_is_not_a_value) {
     TEST_ASSERT_TRUE(begin_is_value("program", NULL));
     TEST_ASSERT_TRUE(begin_is_value("program", "-"));
     TEST_ASSERT_TRUE(begin_is_value("program", "a-b"));

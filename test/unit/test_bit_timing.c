@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bit timing: the solver against a search through every setting, and the clocks that are known to do or not to do.
+// Bit timing: the solver against a search through every setting, and clocks with known results.
 #include <string.h>
 
 #include "iwheel/bit_timing.h"
@@ -15,7 +15,7 @@ void setUp(void) {
     limits = IW_BIT_TIMING_BXCAN;
 }
 
-/// How far a setting's sample point is from the wanted one, as the fraction numerator / quanta.
+/// Distance of the sample point of a setting from the wanted one, as the fraction numerator / quanta.
 typedef struct {
     uint64_t numerator;
     uint64_t quanta;
@@ -29,14 +29,14 @@ static distance_t distance_of(uint32_t tseg1, uint32_t tseg2, uint32_t wanted_pe
     return distance;
 }
 
-/// Nearer, or as near with more quanta.
+/// Returns true if `a` is nearer, or equally near with more quanta.
 static bool is_better(distance_t a, distance_t b) {
     const uint64_t left = a.numerator * b.quanta;
     const uint64_t right = b.numerator * a.quanta;
     return left < right || (left == right && a.quanta > b.quanta);
 }
 
-/// The best that any setting can do, found by trying each; false if none gives the rate.
+/// Finds the best setting by a search through all. Returns false if no setting has the bit rate.
 static bool best_of_all(uint32_t clock_hz, const iw_bit_timing_achieved_t *wanted, distance_t *out_best) {
     bool found = false;
     for (uint64_t prescaler = 1; prescaler <= limits.prescaler_max; prescaler++) {
@@ -79,13 +79,13 @@ static void compare_with_search(uint32_t clock_hz, const iw_bit_timing_achieved_
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(best.quanta, distance.quanta, "not the most quanta");
 }
 
-TEST(test_solve_every_clock_from_8_to_80_MHz_finds_what_a_search_finds) {
+TEST(test_solve_clocks_from_8_to_80_MHz_equals_search) {
     for (uint32_t clock_hz = 8 * MHZ; clock_hz <= 80 * MHZ; clock_hz += MHZ / 2) {
         compare_with_search(clock_hz, &bus);
     }
 }
 
-TEST(test_solve_other_rates_and_sample_points_finds_what_a_search_finds) {
+TEST(test_solve_other_rates_and_sample_points_equals_search) {
     static const uint32_t rates[] = {125000, 500000, 800000};
     static const uint16_t points[] = {1, 500, 750, 800, 875, 1000};
     for (size_t i = 0; i < 18; i++) {
@@ -96,7 +96,7 @@ TEST(test_solve_other_rates_and_sample_points_finds_what_a_search_finds) {
     }
 }
 
-/// Sample points are told in permille, so one that is no more than a permille further than the nearest is as near.
+/// Sample points are in permille: a setting up to one permille further than the nearest counts as equally near.
 static void assert_nearest_to_the_permille(uint32_t clock_hz, const iw_bit_timing_achieved_t *wanted) {
     distance_t best = {0, 0};
     iw_bit_timing_t timing = {0, 0, 0};
@@ -117,7 +117,7 @@ TEST(test_solve_every_sample_point_finds_the_nearest) {
     }
 }
 
-TEST(test_solve_eight_quanta_takes_the_nearer_eighth) {
+TEST(test_solve_eight_quanta_selects_the_nearest_eighth) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const iw_bit_timing_achieved_t wanted = {1000000, permille};
         limits.prescaler_max = 1;
@@ -125,7 +125,7 @@ TEST(test_solve_eight_quanta_takes_the_nearer_eighth) {
     }
 }
 
-TEST(test_solve_narrow_limits_are_kept) {
+TEST(test_solve_narrow_limits_are_observed) {
     limits = (iw_bit_timing_limits_t){4, 3, 5, 2, 3};
     for (uint32_t clock_hz = 4 * MHZ; clock_hz <= 40 * MHZ; clock_hz += MHZ) {
         compare_with_search(clock_hz, &bus);
@@ -166,7 +166,7 @@ TEST(test_solve_usual_stm32_clocks_cannot_reach_the_sample_point) {
     }
 }
 
-TEST(test_solve_f103_with_32_MHz_takes_sixteen_quanta) {
+TEST(test_solve_f103_with_32_MHz_selects_sixteen_quanta) {
     iw_bit_timing_t timing;
     TEST_ASSERT_EQUAL_INT(IW_OK, iw_bit_timing_solve(&limits, 32 * MHZ, &bus, &timing));
     TEST_ASSERT_EQUAL_UINT16(2, timing.prescaler);
@@ -174,7 +174,7 @@ TEST(test_solve_f103_with_32_MHz_takes_sixteen_quanta) {
     TEST_ASSERT_EQUAL_UINT16(6, timing.tseg2);
 }
 
-TEST(test_solve_of_two_sample_points_as_near_takes_the_later) {
+TEST(test_solve_equally_near_sample_points_selects_the_later) {
     static const iw_bit_timing_achieved_t wanted = {1000000, 650};
     iw_bit_timing_t timing;
     limits.prescaler_max = 1;
@@ -190,7 +190,7 @@ TEST(test_solve_never_leaves_the_first_segment_empty) {
     TEST_ASSERT_EQUAL_UINT16(1, timing.tseg1);
 }
 
-TEST(test_solve_zero_argument_is_refused_and_leaves_output_alone) {
+TEST(test_solve_zero_argument_is_refused_output_unchanged) {
     static const iw_bit_timing_achieved_t no_rate = {0, 625};
     static const iw_bit_timing_achieved_t no_point = {1000000, 0};
     iw_bit_timing_t timing = {11, 22, 33};
@@ -226,11 +226,11 @@ TEST(test_achieved_rounds_to_the_nearest) {
         {12 * MHZ, {1, 7, 4}, {1000000, 667}},               // 666.7
         {8 * MHZ, {1, 1, 1}, {2666667, 667}},                // 2 666 666.7
         {10 * MHZ, {3, 1, 1}, {1111111, 667}},               // 1 111 111.1
-        {UINT32_MAX, {1, 0, 0}, {UINT32_MAX, 1000}},         // One quantum.
+        {UINT32_MAX, {1, 0, 0}, {UINT32_MAX, 1000}},         // One quantum
         {UINT32_MAX, {1, 1, 0}, {UINT32_MAX / 2 + 1, 1000}}, // 2 147 483 647.5
         {UINT32_MAX, {65535, 65535, 0}, {1, 1000}},          // 1.00002
         {UINT32_MAX, {65535, 0, 65535}, {1, 0}},             // 0.015 permille
-        {UINT32_MAX, {65535, 65535, 1}, {1, 1000}},          // As long as a bit can be.
+        {UINT32_MAX, {65535, 65535, 1}, {1, 1000}},          // Longest possible bit
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(cases[i].clock_hz, &cases[i].timing);

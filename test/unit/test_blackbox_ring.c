@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// More than a ring of one second ever has.
+/// More entries than a ring of one second holds.
 #define MANY 20000U
 
 static blackbox_ring_t *ring;
@@ -31,7 +31,7 @@ static void put(uint64_t from, uint64_t to) {
     }
 }
 
-/// Exactly the entries `first` and so on come back.
+/// Checks that the entries from `first` on are returned, and no others.
 static void expect(uint64_t from, uint64_t to, uint64_t first, size_t count) {
     size_t got;
     TEST_ASSERT_EQUAL_UINT64(first, blackbox_ring_copy(ring, from, to, out, &got));
@@ -42,12 +42,12 @@ static void expect(uint64_t from, uint64_t to, uint64_t first, size_t count) {
     }
 }
 
-TEST(test_empty_ring_has_nothing) {
+TEST(test_ring_empty_returns_no_entries) {
     expect(0, UINT64_MAX, 0, 0);
     TEST_ASSERT_EQUAL_UINT64(0, blackbox_ring_written(ring));
 }
 
-TEST(test_entries_come_back_in_order) {
+TEST(test_ring_entries_are_returned_in_order) {
     put(0, 10);
     expect(0, 10, 0, 10);
     expect(3, 7, 3, 4);
@@ -55,7 +55,7 @@ TEST(test_entries_come_back_in_order) {
     expect(10, UINT64_MAX, 10, 0);
 }
 
-TEST(test_overwritten_entries_are_missing_and_nothing_else) {
+TEST(test_ring_after_overwrite_only_oldest_entries_are_missing) {
     size_t count;
     put(0, MANY);
     const uint64_t first = blackbox_ring_copy(ring, 0, UINT64_MAX, out, &count);
@@ -80,8 +80,8 @@ TEST(test_ring_is_whole_until_the_first_block_is_overwritten) {
     TEST_ASSERT_LESS_OR_EQUAL_size_t(blackbox_ring_most(ring), n);
 }
 
-/// What two wheels and a client at 50 Hz bring in a second, step by step as it comes in a quiet gateway.
-TEST(test_a_second_of_driving_fits_one_and_a_half_times) {
+/// Entries of two wheels and a client at 50 Hz during a second without faults, one step at a time.
+TEST(test_ring_of_one_second_holds_1500_ms_of_driving) {
     const blackbox_entry_t speed = {.kind = BLACKBOX_FRAME, .number = 256, .a = 4};
     const blackbox_entry_t echo = {.kind = BLACKBOX_FRAME, .number = 266, .a = 5, .b = IW_CAN_ECHO};
     const blackbox_entry_t drive = {.kind = BLACKBOX_DRIVE, .number = 1, .as = {.drive = {{300, 300}, {0, 0}, 1}}};
@@ -113,7 +113,7 @@ static void expect_back(const blackbox_entry_t *entries, size_t count) {
     }
 }
 
-TEST(test_every_kind_of_entry_comes_back_as_it_was) {
+TEST(test_ring_every_kind_of_entry_is_returned_unchanged) {
     blackbox_entry_t entries[3U * BLACKBOX_KINDS];
     for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
         blackbox_entry_t *three = &entries[3U * kind];
@@ -128,7 +128,7 @@ TEST(test_every_kind_of_entry_comes_back_as_it_was) {
     expect_back(entries, sizeof entries / sizeof entries[0]);
 }
 
-TEST(test_frame_keeps_as_many_bytes_as_it_has) {
+TEST(test_ring_frame_stores_dlc_bytes_only) {
     const blackbox_entry_t entry = {.kind = BLACKBOX_FRAME, .a = 3, .as = {.data = {1, 2, 3, 4, 5, 6, 7, 8}}};
     const uint8_t kept[IW_CAN_DATA_MAX] = {1, 2, 3};
     size_t count;
@@ -137,7 +137,7 @@ TEST(test_frame_keeps_as_many_bytes_as_it_has) {
     TEST_ASSERT_EQUAL_MEMORY(kept, out[0].as.data, sizeof kept);
 }
 
-TEST(test_times_far_apart_and_backwards_come_back) {
+TEST(test_ring_distant_and_decreasing_times_are_returned) {
     const blackbox_entry_t entries[] = {
         {.at_us = 5, .kind = BLACKBOX_STEP},
         {.at_us = 5U + 0xFFFFFFU, .kind = BLACKBOX_STEP},
@@ -149,14 +149,14 @@ TEST(test_times_far_apart_and_backwards_come_back) {
     expect_back(entries, sizeof entries / sizeof entries[0]);
 }
 
-TEST(test_size_follows_the_seconds_and_has_a_least) {
+TEST(test_ring_size_is_proportional_with_a_minimum) {
     TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)30U * BLACKBOX_BLOCKS_PER_S * BLACKBOX_BLOCK,
                              blackbox_ring_size(30));
     TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)BLACKBOX_BLOCKS_MIN * BLACKBOX_BLOCK, blackbox_ring_size(0));
-    TEST_ASSERT_LESS_THAN_size_t(640000U, blackbox_ring_size(30)); // What the page of recordings promises.
+    TEST_ASSERT_LESS_THAN_size_t(640000U, blackbox_ring_size(30)); // Limit that the page of recordings states.
 }
 
-TEST(test_every_kind_has_a_name_of_its_own) {
+TEST(test_ring_kind_names_are_unique) {
     for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
         TEST_ASSERT_EQUAL(kind, blackbox_kind_of(blackbox_kind_name((blackbox_kind_t)kind)));
     }

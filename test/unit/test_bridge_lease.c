@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One person, one drive connection, one key.
+// Lease of a bridge: one person, one connection that drives, one key.
 #include "common/lease.h"
 
 #include "../support/fake_gateway.h"
@@ -17,7 +17,7 @@ static bridge_lease_t lease;
 static int epoll_fd;
 static uint64_t now_us;
 static int answered;
-static int refused; // Answered with NULL.
+static int refused; // Answers with NULL.
 static char last[400];
 static char line[2000];
 static char armed_key[BRIDGE_SECRET_SIZE];
@@ -55,7 +55,7 @@ void tearDown(void) {
     fake_gateway_close(&gateway);
 }
 
-/// Arms as the next connection; the gateway's reply has `fields`.
+/// Arms on the next connection; the reply of the gateway contains `fields`.
 static void arm(const char *name, bool ok, const char *fields) {
     const int connection = gateway.count;
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
@@ -73,7 +73,7 @@ TEST(test_lease_viewer_has_no_connection) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
-TEST(test_one_person_key_of_the_gateway_is_in_each_drive) {
+TEST(test_one_person_gateway_key_is_sent_in_each_drive) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
@@ -83,7 +83,7 @@ TEST(test_one_person_key_of_the_gateway_is_in_each_drive) {
     TEST_ASSERT_NOT_NULL(strstr(line, "\"right_mm_s\":100,\"key\":\"00112233445566778899aabbccddeeff\"}"));
 }
 
-TEST(test_one_person_without_gateways_key_gets_a_drawn_one) {
+TEST(test_one_person_without_gateway_key_gets_a_random_key) {
     arm("a", true, ",\"state\":\"armed\"");
     TEST_ASSERT_EQUAL(32, strlen(armed_key));
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
@@ -103,7 +103,7 @@ TEST(test_one_person_other_key_never_drives) {
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 0, line, sizeof line));
 }
 
-TEST(test_one_person_second_is_another_client_and_refused) {
+TEST(test_one_person_second_is_refused_and_first_drives_on) {
     arm("a", true, GIVEN);
     arm("b", false, ",\"error\":\"busy\",\"message\":\"a drives\"");
     TEST_ASSERT_NOT_NULL(strstr(last, "busy"));
@@ -122,7 +122,7 @@ TEST(test_one_person_third_is_busy_while_second_asks) {
     TEST_ASSERT_EQUAL(2, gateway.count);
 }
 
-TEST(test_one_person_takeover_ends_the_former_holder) {
+TEST(test_one_person_takeover_ends_the_previous_holder) {
     arm("a", true, GIVEN);
     arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
     TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
@@ -142,7 +142,7 @@ TEST(test_lease_end_voids_the_key_before_the_connection) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-TEST(test_lease_ending_place_makes_room_for_the_next) {
+TEST(test_lease_ending_connection_frees_its_place_for_arm) {
     arm("a", true, GIVEN);
     bridge_lease_end(&lease, now_us);
     arm("b", true, GIVEN);
@@ -152,13 +152,13 @@ TEST(test_lease_ending_place_makes_room_for_the_next) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0) || fake_gateway_is_closed(&gateway, 1));
 }
 
-TEST(test_lease_end_refuses_who_asks) {
+TEST(test_lease_end_refuses_the_pending_arm) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_EQUAL(1, refused);
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line)); // The arm; behind it the connection ends.
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line)); // The arm request; then the connection ends.
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
@@ -172,7 +172,7 @@ TEST(test_lease_forgotten_asker_gets_no_lease) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
 }
 
-TEST(test_lease_not_holder_ends_it) {
+TEST(test_lease_reply_not_holder_ends_the_lease) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
                       bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
@@ -198,7 +198,7 @@ TEST(test_lease_lost_connection_answers_drives_once) {
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
 }
 
-TEST(test_lease_arm_without_reply_ends) {
+TEST(test_lease_arm_without_reply_is_refused_after_timeout) {
     TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     now_us += BRIDGE_ARM_US;
@@ -209,7 +209,7 @@ TEST(test_lease_arm_without_reply_ends) {
                       bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
 }
 
-TEST(test_movers_deflected_stick_is_named_for_its_time) {
+TEST(test_movers_deflected_stick_is_named_for_its_duration) {
     bridge_movers_t movers = {0};
     TEST_ASSERT_NULL(bridge_movers_who(&movers, NULL, 200, now_us));
     bridge_movers_note(&movers, "b", now_us);

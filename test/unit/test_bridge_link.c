@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A bridge's connections to the gateway: questions wait in the bridge, stops do not.
+// Connections of a bridge to the gateway: questions wait in the bridge, stops do not wait.
 #include "common/bridge_link.h"
 
 #include "../support/fake_gateway.h"
@@ -17,10 +17,10 @@ static int here;
 static int gone;
 static int events;
 static int answered;
-static int refused; // Answered with NULL.
+static int refused; // Answers with NULL.
 static char line[2000];
 
-// The order in which the bridge connects: its stops first.
+// Order in which the bridge connects: first the connection for stops.
 enum { STOPS, WATCHES };
 
 static void take_here(void *context, uint64_t at_us) {
@@ -112,7 +112,7 @@ TEST(test_questions_beyond_four_wait_in_order) {
     TEST_ASSERT_EQUAL(10, answered);
 }
 
-TEST(test_question_without_place_is_not_accepted) {
+TEST(test_question_beyond_the_queue_is_not_accepted) {
     connect_both();
     for (unsigned i = 0; i < BRIDGE_ASKED_MAX; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
@@ -145,7 +145,7 @@ TEST(test_stop_never_waits_for_questions) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));
     }
     TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
-    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line)); // Without another step.
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, STOPS, line, sizeof line)); // No further step is needed.
     TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"stop\""));
     fake_gateway_reply(&gateway, STOPS, line, true, "");
     step();
@@ -164,7 +164,7 @@ TEST(test_stop_never_queues_behind_stops) {
     TEST_ASSERT_NOT_NULL(strstr(line, "\"cmd\":\"estop\""));
     fake_gateway_reply(&gateway, STOPS, line, true, "");
     step();
-    TEST_ASSERT_EQUAL(2, answered); // A stop that was on its way carries no one who asked later.
+    TEST_ASSERT_EQUAL(2, answered); // A stop that was already sent does not answer later requests.
     TEST_ASSERT_EQUAL(1, read_all(STOPS));
     fake_gateway_reply(&gateway, STOPS, line, true, "");
     step();
@@ -181,15 +181,15 @@ TEST(test_stop_without_reply_is_reported_and_reconnects) {
     now_us += 1U;
     step();
     TEST_ASSERT_EQUAL(1, refused);
-    TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state); // The connection that watches is not concerned.
+    TEST_ASSERT_EQUAL(BRIDGE_LINK_HERE, link_.state); // The connection for watching stays.
     now_us += 3000U * MS;
     step();
     step();
     TEST_ASSERT_EQUAL(BRIDGE_HERE, link_.stop.line.state);
-    TEST_ASSERT_EQUAL(0, read_all(2)); // It is not sent late.
+    TEST_ASSERT_EQUAL(0, read_all(2)); // The stop is not sent late.
 }
 
-TEST(test_stop_while_the_line_is_lost_connects_at_once) {
+TEST(test_stop_on_lost_connection_connects_immediately) {
     connect_both();
     fake_gateway_hang_up(&gateway, STOPS);
     step();
@@ -210,7 +210,7 @@ TEST(test_stop_without_gateway_is_not_accepted) {
     TEST_ASSERT_EQUAL(0, answered + refused);
 }
 
-TEST(test_gateway_that_does_not_greet_delays_nothing) {
+TEST(test_link_gateway_without_greeting_times_out) {
     gateway.greets = false;
     step();
     step();
@@ -225,7 +225,7 @@ TEST(test_gateway_that_does_not_greet_delays_nothing) {
     TEST_ASSERT_GREATER_THAN_UINT64(now_us, bridge_link_next_us(&link_, now_us));
 }
 
-TEST(test_stop_that_was_given_up_is_not_sent_late) {
+TEST(test_stop_after_timeout_is_not_sent_late) {
     gateway.greets = false;
     step();
     step();
@@ -240,7 +240,7 @@ TEST(test_stop_that_was_given_up_is_not_sent_late) {
     TEST_ASSERT_EQUAL(0, read_all(STOPS));
 }
 
-TEST(test_full_gateway_is_not_called_without_pause) {
+TEST(test_link_full_gateway_is_retried_with_pauses) {
     gateway.greets = false;
     for (int i = 0; i < 20; i++) {
         const int before = gateway.count;
@@ -257,7 +257,7 @@ TEST(test_full_gateway_is_not_called_without_pause) {
     TEST_ASSERT_EQUAL(0, here);
 }
 
-TEST(test_lost_gateway_answers_all_questions_once) {
+TEST(test_link_lost_gateway_answers_each_question_once) {
     connect_both();
     for (int i = 0; i < 9; i++) {
         TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"status\"}", take_answer, NULL, now_us));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What other machines can reach, read from the kernel: real sockets, opened and bound by the test.
+// Sockets that other machines can reach, as the kernel lists them. The test opens and binds real sockets.
 #include "common/reach.h"
 
 #include "unit.h"
@@ -26,7 +26,8 @@ void tearDown(void) {
     }
 }
 
-/// A socket of this kind at this address with a port that the kernel chooses; -1: the machine has no such address.
+/// Opens a socket of this kind at this address with a port that the kernel selects. Returns -1 if the machine has no
+/// such address.
 static int open_at(int kind, const char *host) {
     union {
         struct sockaddr any;
@@ -59,21 +60,21 @@ static unsigned count(void) {
     return bridge_reach_count(NULL, 0, text);
 }
 
-// ---- which sockets count --------------------------------------------------------------------------------------------
+// ---- sockets that count ---------------------------------------------------------------------------------------------
 
 TEST(test_reach_process_without_sockets_has_none) {
     TEST_ASSERT_EQUAL_UINT(0, count());
     TEST_ASSERT_EQUAL_STRING("", text);
 }
 
-TEST(test_reach_udp_of_every_address_counts_and_is_named) {
+TEST(test_reach_udp_at_any_address_counts_and_is_named) {
     TEST_ASSERT_TRUE(open_at(SOCK_DGRAM, "0.0.0.0") >= 0);
     TEST_ASSERT_EQUAL_UINT(1, count());
     TEST_ASSERT_EQUAL_STRING_LEN("UDP 0.0.0.0 port ", text, 17);
     TEST_ASSERT_FALSE(bridge_reach_is_local("test", NULL, 0));
 }
 
-TEST(test_reach_tcp_counts_from_listen_on) {
+TEST(test_reach_tcp_counts_after_listen) {
     const int fd = open_at(SOCK_STREAM, "0.0.0.0");
     TEST_ASSERT_EQUAL_UINT(0, count());
     TEST_ASSERT_EQUAL_INT(0, listen(fd, 1));
@@ -100,7 +101,7 @@ TEST(test_reach_ipv6_counts_by_its_address) {
     TEST_ASSERT_EQUAL_UINT(2, count());
 }
 
-TEST(test_reach_udp_with_a_peer_or_without_a_port_does_not_count) {
+TEST(test_reach_udp_connected_or_unbound_does_not_count) {
     const struct sockaddr_in peer = {.sin_family = AF_INET, .sin_port = 9, .sin_addr = {htonl(INADDR_LOOPBACK)}};
     fds[fd_count++] = socket(AF_INET, SOCK_DGRAM, 0);
     TEST_ASSERT_EQUAL_UINT(0, count());
@@ -108,7 +109,7 @@ TEST(test_reach_udp_with_a_peer_or_without_a_port_does_not_count) {
     TEST_ASSERT_EQUAL_UINT(0, count());
 }
 
-TEST(test_reach_excepted_socket_does_not_count_and_others_do) {
+TEST(test_reach_only_the_excepted_socket_does_not_count) {
     const int pair[2] = {-1, listen_at("0.0.0.0")};
     TEST_ASSERT_EQUAL_UINT(0, bridge_reach_count(pair, 2, text));
     TEST_ASSERT_TRUE(bridge_reach_is_local("test", pair, 2));
@@ -135,7 +136,7 @@ TEST(test_reach_sockets_bound_to_lo_still_receive_locally) {
     TEST_ASSERT_EQUAL_INT(1, recv(fd, &byte, 1, MSG_DONTWAIT));
 }
 
-TEST(test_reach_socket_that_is_not_emptied_is_not_trusted) {
+TEST(test_reach_bind_lo_with_unread_datagram_fails) {
     struct sockaddr_in address;
     socklen_t size = sizeof address;
     const int fd = open_at(SOCK_DGRAM, "0.0.0.0");
@@ -143,5 +144,5 @@ TEST(test_reach_socket_that_is_not_emptied_is_not_trusted) {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     TEST_ASSERT_EQUAL_INT(1,
                           sendto(open_at(SOCK_DGRAM, "127.0.0.1"), "a", 1, 0, (const struct sockaddr *)&address, size));
-    TEST_ASSERT_FALSE(bridge_reach_bind_lo()); // It may have come from anywhere.
+    TEST_ASSERT_FALSE(bridge_reach_bind_lo()); // The unread datagram may have come from any machine.
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The handling of signals that all bridges share, and a log without a reader.
+// Signal handling that all bridges share, and a log without a reader.
 #include "common/bridge_service.h"
 
 #include "unity.h"
@@ -14,7 +14,7 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-static void test_service_log_without_a_reader_ends_nothing(void) {
+static void test_service_write_to_closed_log_returns_error(void) {
     static const char words[] = "iwheel: a line\n";
     const int kept = dup(STDERR_FILENO);
     int ends[2];
@@ -28,9 +28,9 @@ static void test_service_log_without_a_reader_ends_nothing(void) {
     TEST_ASSERT_EQUAL_INT(-1, count);
 }
 
-static void test_service_signal_ends_the_wait_and_the_next_one(void) {
+static void test_service_signal_ends_the_current_and_next_wait(void) {
     TEST_ASSERT_TRUE(bridge_service_wait(NULL, 0, 0));
-    (void)raise(SIGTERM); // Blocked until the wait.
+    (void)raise(SIGTERM); // The signal is blocked until the wait.
     TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, 10000));
     TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, -1));
 }
@@ -39,7 +39,7 @@ int main(void) {
     (void)signal(SIGPIPE, SIG_DFL);
     bridge_service_take_signals();
     UNITY_BEGIN();
-    RUN_TEST(test_service_log_without_a_reader_ends_nothing);
-    RUN_TEST(test_service_signal_ends_the_wait_and_the_next_one);
+    RUN_TEST(test_service_write_to_closed_log_returns_error);
+    RUN_TEST(test_service_signal_ends_the_current_and_next_wait);
     return UNITY_END();
 }

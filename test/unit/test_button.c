@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Was the button of the e-stop ever seen to work? What counts as tried, what voids it, what is stored.
+// E-stop button: which presses prove that it works, what makes the proof void, and what is stored.
 #include "assumptions/assumptions_file.h"
 #include "assumptions/button.h"
 
@@ -39,7 +39,7 @@ void setUp(void) {
     now_us = MS(5000);
 }
 
-/// That answer for so long, looked at every 10 ms.
+/// Holds an answer for a time; the button is polled every 10 ms.
 static gw_button_news_t hold(int answer, unsigned for_ms) {
     gw_button_news_t news = GW_BUTTON_NO_NEWS;
     for (unsigned ms = 0; ms < for_ms; ms += 10U) {
@@ -51,7 +51,7 @@ static gw_button_news_t hold(int answer, unsigned for_ms) {
     return news;
 }
 
-TEST(test_button_pressed_and_released_is_tried_on_this_wiring) {
+TEST(test_button_press_and_release_proves_this_wiring) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
@@ -64,7 +64,7 @@ TEST(test_button_pressed_and_released_is_tried_on_this_wiring) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
 }
 
-TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise) {
+TEST(test_button_press_counts_from_50_ms_on) {
     (void)hold(0, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 40));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
@@ -72,8 +72,8 @@ TEST(test_button_press_of_exactly_50_ms_counts_and_a_shorter_one_is_noise) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
 }
 
-/// A release is told late, by the debounce time: that is no part of the press.
-TEST(test_button_press_is_not_longer_by_its_debounce_time) {
+/// A release is reported late by the debounce time. This time is not part of the press.
+TEST(test_button_debounce_time_is_not_part_of_the_press) {
     button.debounce_us = MS(100);
     (void)hold(0, 10);
     (void)hold(1, 140);
@@ -82,19 +82,19 @@ TEST(test_button_press_is_not_longer_by_its_debounce_time) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold(0, 10));
 }
 
-TEST(test_button_pressed_at_the_start_shows_nothing) {
+TEST(test_button_pressed_at_start_proves_nothing) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(1, 1000));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 1000));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
 }
 
-TEST(test_button_unreadable_or_gone_breaks_the_press) {
+TEST(test_button_unreadable_or_absent_ends_the_press) {
     (void)hold(0, 10);
     (void)hold(1, 1000);
     (void)hold(-1, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
     (void)hold(1, 1000);
-    readable = false; // Gone and back within a look, which is told.
+    readable = false; // Absent and present again between two polls, which is reported.
     (void)hold(-1, 10);
     readable = true;
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
@@ -107,7 +107,7 @@ static void press(void) {
     (void)hold(0, 10);
 }
 
-TEST(test_button_that_is_simulated_or_absent_is_never_tried) {
+TEST(test_button_simulated_or_absent_proves_nothing) {
     ops.simulated = true;
     press();
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
@@ -121,13 +121,13 @@ TEST(test_button_that_is_simulated_or_absent_is_never_tried) {
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
 }
 
-TEST(test_button_of_any_other_wiring_is_void) {
+TEST(test_button_proof_is_void_after_any_change_of_wiring) {
     for (unsigned change = 0; change < 4U; change++) {
         setUp();
         press();
         TEST_ASSERT_TRUE(tried.wall_us > 0);
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold(0, 100));
-        (void)hold(-1, 10); // As whoever has called it otherwise.
+        (void)hold(-1, 10); // The wiring changes while the contact is unreadable.
         button.contact[0].line = (change == 0U) ? "gpiochip0:4" : button.contact[0].line;
         button.contact[0].active_high = (change == 1U) ? false : button.contact[0].active_high;
         (void)snprintf(seen.chip, sizeof seen.chip, "%s", (change == 2U) ? "gpio-sim" : "pinctrl-bcm2711");
@@ -138,7 +138,7 @@ TEST(test_button_of_any_other_wiring_is_void) {
     }
 }
 
-TEST(test_button_whose_line_cannot_be_read_is_not_void) {
+TEST(test_button_proof_is_not_void_while_line_is_unreadable) {
     press();
     const int64_t before = tried.wall_us;
     readable = false;
@@ -150,7 +150,7 @@ TEST(test_button_whose_line_cannot_be_read_is_not_void) {
 static void set_up_two(void) {
     setUp();
     hal.two_contacts = true;
-    button.contact[1].line = "50%%2"; // Whatever it is called.
+    button.contact[1].line = "50%%2"; // Any name of a line
 }
 
 static gw_button_news_t hold_both(int first, int second, unsigned for_ms) {
@@ -158,16 +158,16 @@ static gw_button_news_t hold_both(int first, int second, unsigned for_ms) {
     return hold(first, for_ms);
 }
 
-TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both) {
+TEST(test_button_two_contacts_proved_by_a_press_of_both) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 1000));
-    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the first.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the first contact
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 1, 1000));
-    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the second.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Only the second contact
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 100));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 1, 40));
-    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Both, but for a moment only.
+    TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100)); // Both contacts, but for less than 50 ms
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 1, 100));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 1, 100));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
@@ -176,8 +176,8 @@ TEST(test_button_of_two_contacts_is_tried_by_a_press_of_both) {
     TEST_ASSERT_TRUE(tried.contact[1].active_high);
 }
 
-/// The time of both counts, not that of whichever is released last.
-TEST(test_button_of_two_contacts_is_not_tried_by_a_moment_of_both) {
+/// The time during which both contacts are pressed counts, not the time until the last release.
+TEST(test_button_two_contacts_short_overlap_proves_nothing) {
     for (int first = 0; first < 2; first++) {
         set_up_two();
         (void)hold_both(0, 0, 10);
@@ -186,17 +186,17 @@ TEST(test_button_of_two_contacts_is_not_tried_by_a_moment_of_both) {
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
         (void)hold_both(1, 1, 40);
         (void)hold_both(first, 1 - first, 100);
-        (void)hold_both(1, 1, 40); // Again, and no longer.
+        (void)hold_both(1, 1, 40); // Again 40 ms
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
         (void)hold_both(1, 1, 50);
         (void)hold_both(first, 1 - first, 10);
-        (void)hold_both(1, 1, 10); // It has been long enough once.
+        (void)hold_both(1, 1, 10); // One overlap was long enough.
         TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
     }
 }
 
-/// Pressed at the start, both shows nothing, whatever one of them does.
-TEST(test_button_of_two_contacts_pressed_at_the_start_shows_nothing) {
+/// A press of both contacts that begins before the start proves nothing, even if one contact changes.
+TEST(test_button_two_contacts_pressed_at_start_proves_nothing) {
     set_up_two();
     (void)hold_both(1, 1, 1000);
     (void)hold_both(0, 1, 100);
@@ -204,7 +204,7 @@ TEST(test_button_of_two_contacts_pressed_at_the_start_shows_nothing) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
 }
 
-TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing) {
+TEST(test_button_two_contacts_one_unreadable_proves_nothing) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     (void)hold_both(1, 1, 100);
@@ -215,7 +215,7 @@ TEST(test_button_of_two_contacts_of_which_one_is_unreadable_shows_nothing) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
 }
 
-TEST(test_button_with_another_second_contact_is_void) {
+TEST(test_button_proof_is_void_with_another_second_contact) {
     for (unsigned change = 0; change < 4U; change++) {
         set_up_two();
         (void)hold_both(0, 0, 10);
@@ -230,10 +230,10 @@ TEST(test_button_with_another_second_contact_is_void) {
     }
 }
 
-TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_way_round) {
+TEST(test_button_proof_is_void_if_number_of_contacts_changes) {
     press();
     TEST_ASSERT_TRUE(tried.wall_us > 0);
-    button = (gw_button_t){.contact = {{"ESTOP", true}, {"ESTOP2", true}}}; // Started anew.
+    button = (gw_button_t){.contact = {{"ESTOP", true}, {"ESTOP2", true}}}; // The gateway starts again.
     hal.two_contacts = true;
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
     (void)hold_both(1, 1, 100);
@@ -243,19 +243,19 @@ TEST(test_button_that_was_tried_with_one_contact_is_not_with_two_nor_the_other_w
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_VOID, hold_both(0, 0, 10));
 }
 
-/// One contact is stuck: at the next start both read released, and only what is kept can warn.
-TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again) {
+/// If one contact is stuck, both read released at the next start: only the stored state can cause a warning.
+TEST(test_button_proof_is_void_after_contacts_disagree) {
     set_up_two();
     (void)hold_both(0, 0, 10);
     (void)hold_both(1, 1, 100);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(1, 0, 100));
-    hal.estop_last = IW_ESTOP_DISAGREES; // By time alone.
+    hal.estop_last = IW_ESTOP_DISAGREES; // The limit of time has passed.
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_BROKEN, hold_both(1, 0, 100));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
     (void)hold_both(1, 1, 100);
-    (void)hold_both(1, 0, 300); // It shows the fault again.
+    (void)hold_both(1, 0, 300); // The fault occurs again.
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_NO_NEWS, hold_both(0, 0, 100));
     TEST_ASSERT_EQUAL_INT64(0, tried.wall_us);
     (void)hold_both(1, 1, 100);
@@ -263,7 +263,7 @@ TEST(test_button_whose_contacts_disagree_is_void_until_both_were_tried_again) {
     TEST_ASSERT_EQUAL_INT(GW_BUTTON_TRIED, hold_both(0, 0, 10));
 }
 
-TEST(test_button_stored_without_a_second_contact_is_that_of_one) {
+TEST(test_button_stored_without_second_contact_has_one) {
     press();
     tried.contact[1].line[0] = '\0';
     button = (gw_button_t){.contact = {{"ESTOP", true}, {"none", false}}};
@@ -271,7 +271,7 @@ TEST(test_button_stored_without_a_second_contact_is_that_of_one) {
     TEST_ASSERT_TRUE(tried.wall_us > 0);
 }
 
-TEST(test_button_that_says_the_same_is_not_asked_for_its_names) {
+TEST(test_button_names_are_read_only_after_a_change) {
     (void)hold(0, 10);
     names_read = 0;
     (void)hold(0, 1000);
@@ -287,7 +287,7 @@ static bool stored_is_read(const gw_stored_t *known, gw_stored_t *out_known) {
     return length > 0U && gw_assumptions_file_read(text, length, "can0", out_known, reason);
 }
 
-TEST(test_button_is_stored_and_read_back) {
+TEST(test_button_proof_is_stored_and_read_back) {
     static gw_stored_t known;
     static gw_stored_t got;
     memset(&known, 0, sizeof known);
@@ -310,8 +310,8 @@ TEST(test_button_is_stored_and_read_back) {
     TEST_ASSERT_FALSE(stored_is_read(&known, &got));
 }
 
-/// Each member is needed, of its own kind.
-TEST(test_button_stored_wrongly_is_refused) {
+/// Each member is required and has its own type.
+TEST(test_button_stored_with_wrong_members_is_refused) {
     static const char *const members[] = {
         "{\"line\":\"a\",\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",
         "{\"active_high\":true,\"chip\":\"b\",\"chip_line\":\"c\",\"wall_us\":7}",

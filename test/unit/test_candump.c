@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/// Parses from memory without a terminator behind it, so that a sanitizer sees a read beyond the length.
+/// Parses from memory without a terminator, so that a sanitizer detects a read beyond the length.
 static candump_result_t parse(const char *line, candump_t *out, const char **out_why) {
     char exact[512];
     const size_t length = strlen(line);
@@ -33,7 +33,7 @@ static void check_bad(const char *line, const char *part_of_why) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &frame, sizeof frame);
 }
 
-TEST(test_line_of_a_standard_frame_gives_its_parts) {
+TEST(test_candump_standard_frame_is_parsed) {
     const candump_t frame = good("(1760000000.123456) can0 10A#0101F40064");
     const uint8_t data[] = {1, 1, 0xF4, 0, 0x64};
     TEST_ASSERT_EQUAL_INT64(1760000000123456, frame.time_us);
@@ -45,7 +45,7 @@ TEST(test_line_of_a_standard_frame_gives_its_parts) {
     TEST_ASSERT_FALSE(frame.extended || frame.remote || frame.error || frame.fd);
 }
 
-TEST(test_mark_tells_who_sent_it) {
+TEST(test_candump_mark_selects_received_or_sent) {
     TEST_ASSERT_EQUAL(CANDUMP_RECEIVED, good("(1.0) can0 100#00 R").mark);
     TEST_ASSERT_EQUAL(CANDUMP_SENT, good("(1.0) can0 100#00  T").mark);
     TEST_ASSERT_EQUAL(CANDUMP_SENT, good("(1.0) can0 100# t").mark);
@@ -53,12 +53,12 @@ TEST(test_mark_tells_who_sent_it) {
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, candump_to_core(&(candump_t){.mark = CANDUMP_UNMARKED}).kind);
 }
 
-TEST(test_line_end_of_any_kind_is_no_part_of_the_frame) {
+TEST(test_candump_line_end_is_not_part_of_the_frame) {
     TEST_ASSERT_EQUAL(1, good("(1.000001) can0 100#AB\r\n").length);
     TEST_ASSERT_EQUAL(1, good("  (1.000001)\tcan0\t100#ab  \t\n").length);
 }
 
-TEST(test_time_takes_one_to_nine_decimals_or_none) {
+TEST(test_candump_time_has_zero_to_nine_decimals) {
     TEST_ASSERT_EQUAL_INT64(1500000, good("(1.5) c 100#").time_us);
     TEST_ASSERT_EQUAL_INT64(1000001, good("(1.000001999) c 100#").time_us);
     TEST_ASSERT_EQUAL_INT64(7000000, good("(7) c 100#").time_us);
@@ -72,7 +72,7 @@ TEST(test_time_takes_one_to_nine_decimals_or_none) {
     check_bad("(1.5 c 100#", "time");
 }
 
-TEST(test_extended_remote_error_and_fd_frames_are_told_apart) {
+TEST(test_candump_frame_formats_are_distinguished) {
     candump_t frame = good("(1.0) can0 0000010A#00");
     TEST_ASSERT_TRUE(frame.extended);
     TEST_ASSERT_EQUAL_HEX32(266U | IW_CAN_EXTENDED, candump_to_core(&frame).id);
@@ -94,7 +94,7 @@ TEST(test_extended_remote_error_and_fd_frames_are_told_apart) {
     TEST_ASSERT_EQUAL(2, good("(1.0) can0 100#11.22").length);
 }
 
-TEST(test_blank_lines_and_comments_are_empty) {
+TEST(test_candump_blank_lines_and_comments_are_empty) {
     candump_t frame;
     const char *why;
     const char *const lines[] = {"", "\n", " \t\r\n", "# a comment", "; another", "  # (1.0) can0 100#00"};
@@ -103,7 +103,7 @@ TEST(test_blank_lines_and_comments_are_empty) {
     }
 }
 
-TEST(test_bad_line_tells_cause_and_cure) {
+TEST(test_candump_bad_line_is_refused_with_the_reason) {
     check_bad("can0  10A   [5]  01 01 F4 00 64", "candump -L");
     check_bad("(1.0)  can0  10A   [5]  01 01 F4 00 64", "screen form");
     check_bad("(1.0)", "cut");
@@ -129,7 +129,7 @@ TEST(test_bad_line_tells_cause_and_cure) {
     check_bad("(1.0) ca\x01n 10A#00", "interface");
 }
 
-TEST(test_fd_frame_holds_64_bytes_and_not_more) {
+TEST(test_candump_fd_frame_has_at_most_64_bytes) {
     char line[256] = "(1.0) can0 10A##0";
     for (int i = 0; i < 64; i++) {
         (void)strcat(line, "5A");
@@ -145,7 +145,7 @@ static void check_round_trip(const char *line) {
     TEST_ASSERT_EQUAL_STRING(line, written);
 }
 
-TEST(test_writing_what_was_read_gives_the_same_line) {
+TEST(test_candump_parsed_frame_is_written_as_the_same_line) {
     check_round_trip("(1760000000.000001) can0 10A#0101F40064\n");
     check_round_trip("(0.000000) vcan1 7FF# R\n");
     check_round_trip("(999999999999.999999) can0 1FFFFFFF#1122334455667788 T\n");
@@ -156,7 +156,7 @@ TEST(test_writing_what_was_read_gives_the_same_line) {
     check_round_trip("(1.000000) can0 123##0\n");
 }
 
-TEST(test_longest_line_fits) {
+TEST(test_candump_longest_line_fits) {
     char line[CANDUMP_LINE_SIZE];
     candump_t frame = {.time_us = 999999999999999999, .id = CANDUMP_ID_MASK, .extended = true, .fd = true};
     frame.mark = CANDUMP_SENT;
@@ -166,7 +166,7 @@ TEST(test_longest_line_fits) {
     TEST_ASSERT_EQUAL(64, good(line).length);
 }
 
-TEST(test_written_interface_has_letters_and_digits_only) {
+TEST(test_candump_interface_is_written_as_letters_and_digits) {
     char line[CANDUMP_LINE_SIZE];
     const iw_can_frame_t core = {.id = 266, .dlc = 1, .kind = IW_CAN_ECHO, .data = {7}};
     candump_t frame = candump_from_core(&core, 1, "unix:/run/iwheel/a-bus_1.sock.that.is.longer.than.any");
@@ -177,7 +177,7 @@ TEST(test_written_interface_has_letters_and_digits_only) {
     TEST_ASSERT_EQUAL_STRING("(0.000001) can 10A#07 T\n", line);
 }
 
-TEST(test_core_frame_comes_back_the_same) {
+TEST(test_candump_core_frame_is_unchanged_by_write_and_parse) {
     static const uint32_t ids[] = {0, 0x7FF, 266, 0x1FFFFFFF | IW_CAN_EXTENDED, 266 | IW_CAN_REMOTE, 266 | IW_CAN_FD};
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         for (uint8_t dlc = 0; dlc <= IW_CAN_DATA_MAX; dlc++) {
@@ -198,8 +198,8 @@ TEST(test_core_frame_comes_back_the_same) {
     }
 }
 
-/// Every prefix and every single wrong byte of lines of every kind: an answer, and never a read outside.
-TEST(test_damaged_lines_are_judged_without_reading_outside) {
+/// Every prefix and every single wrong byte of lines of all formats has a result, without a read beyond the length.
+TEST(test_candump_damaged_lines_never_read_beyond_the_length) {
     static const char *const lines[] = {"(1.5) can0 10A#0101F40064 T", "(1.5) can0 10A##1001122 R",
                                         "(1.5) can0 0000010A#R5", "(1.5) can0 100#1122334455667788_F"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {

@@ -53,7 +53,7 @@ static void expect_end(void) {
     TEST_ASSERT_EQUAL(CANDUMP_READ_END, candump_reader_next(&reader, &frame));
 }
 
-TEST(test_reader_byte_order_mark_is_passed_over) {
+TEST(test_reader_byte_order_mark_is_skipped) {
     give("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
     end_input();
     expect_frame(0x100, 1);
@@ -61,7 +61,7 @@ TEST(test_reader_byte_order_mark_is_passed_over) {
     expect_end();
 }
 
-TEST(test_reader_foreign_form_is_named_once) {
+TEST(test_reader_foreign_format_is_reported_once) {
     candump_t frame;
     give("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
     end_input();
@@ -70,7 +70,7 @@ TEST(test_reader_foreign_form_is_named_once) {
     expect_end();
 }
 
-TEST(test_reader_form_is_not_guessed_from_a_frame) {
+TEST(test_reader_frame_line_is_never_a_foreign_format) {
     static const char *const lines[] = {"(1.0) can0 100#00\n",
                                         "# a, b [1]\n(1.0) can0 100#00\n",
                                         "; a, b [1]\n(1.0) can0 100#00\n",
@@ -85,7 +85,7 @@ TEST(test_reader_form_is_not_guessed_from_a_frame) {
     }
 }
 
-TEST(test_lines_come_in_order_with_their_numbers) {
+TEST(test_reader_lines_are_returned_with_their_numbers) {
     give("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
     end_input();
     expect_frame(0x100, 1);
@@ -95,12 +95,12 @@ TEST(test_lines_come_in_order_with_their_numbers) {
     expect_end();
 }
 
-TEST(test_empty_input_ends) {
+TEST(test_reader_empty_input_ends) {
     end_input();
     expect_end();
 }
 
-TEST(test_line_is_handed_out_while_the_writer_goes_on) {
+TEST(test_reader_line_is_returned_before_the_input_ends) {
     give("(1.0) can0 100#00\n(1.1) can");
     expect_frame(0x100, 1);
     give("0 101#00\n");
@@ -109,7 +109,7 @@ TEST(test_line_is_handed_out_while_the_writer_goes_on) {
     expect_end();
 }
 
-TEST(test_last_line_without_end_is_left_out_and_told) {
+TEST(test_reader_last_line_without_newline_is_bad) {
     give("(1.0) can0 100#0011\n(1.1) can0 100#00");
     end_input();
     expect_frame(0x100, 1);
@@ -117,14 +117,14 @@ TEST(test_last_line_without_end_is_left_out_and_told) {
     expect_end();
 }
 
-TEST(test_blank_rest_is_no_line) {
+TEST(test_reader_blank_rest_is_ignored) {
     give("(1.0) can0 100#0011\n \t");
     end_input();
     expect_frame(0x100, 1);
     expect_end();
 }
 
-TEST(test_endless_line_is_told_once_and_the_next_is_read) {
+TEST(test_reader_overlong_line_is_bad_and_the_next_is_read) {
     char long_line[5000];
     memset(long_line, '(', sizeof long_line);
     long_line[sizeof long_line - 1U] = '\n';
@@ -140,7 +140,7 @@ TEST(test_endless_line_is_told_once_and_the_next_is_read) {
     expect_end();
 }
 
-TEST(test_zero_bytes_are_told_as_bad_and_lose_nothing_else) {
+TEST(test_reader_zero_bytes_are_bad_and_the_next_line_is_read) {
     static const char text[] = "(1.0) can0 100#00\n\0\0\0\n(1.1) can0 101#00\n";
     give_bytes(text, sizeof text - 1U);
     end_input();
@@ -150,13 +150,13 @@ TEST(test_zero_bytes_are_told_as_bad_and_lose_nothing_else) {
     expect_end();
 }
 
-TEST(test_what_cannot_be_read_is_no_end_of_file) {
+TEST(test_reader_invalid_descriptor_is_failed_and_not_end) {
     candump_t frame;
     candump_reader_init(&reader, -1);
     TEST_ASSERT_EQUAL(CANDUMP_READ_FAILED, candump_reader_next(&reader, &frame));
 }
 
-TEST(test_more_than_the_buffer_holds_comes_whole) {
+TEST(test_reader_input_larger_than_the_buffer_is_complete) {
     uint64_t line = 0;
     for (unsigned round = 0; round < 30U; round++) {
         for (unsigned i = 0; i < 200U; i++) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libiwheel-client reading JSON: the same objects as jansson takes, and what stands in them.
+// libiwheel-client reads JSON: it accepts the same objects as jansson, and returns the fields of a message.
 #include "iwheel_client/client.h"
 #include "json.h"
 
@@ -51,13 +51,13 @@ static void compare(const char *text, size_t length) {
     }
 }
 
-TEST(test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson) {
+TEST(test_json_every_prefix_of_a_snapshot_agrees_with_jansson) {
     for (size_t length = 0; length < sizeof(STATUS); length++) {
         compare(STATUS, length);
     }
 }
 
-TEST(test_json_every_change_of_a_byte_is_judged_as_by_jansson) {
+TEST(test_json_every_changed_byte_agrees_with_jansson) {
     static const char bytes[] = "\"\\{}[],:0-.eE+ x\x01\x7f\xc3\xa4\xed\xf5\nnu/";
     char text[sizeof(STATUS)];
     unsigned taken = 0;
@@ -69,10 +69,10 @@ TEST(test_json_every_change_of_a_byte_is_judged_as_by_jansson) {
             taken += iwc_json_is_object(text, sizeof(STATUS) - 1U) ? 1U : 0U;
         }
     }
-    TEST_ASSERT_GREATER_THAN(1000, taken); // Both sides saw good ones too.
+    TEST_ASSERT_GREATER_THAN(1000, taken); // Both parsers also accept valid texts.
 }
 
-TEST(test_json_hard_cases_are_judged_as_by_jansson) {
+TEST(test_json_hard_cases_agree_with_jansson) {
     static const char *const texts[] = {"{}",
                                         " {} ",
                                         "{ }",
@@ -127,7 +127,7 @@ TEST(test_json_hard_cases_are_judged_as_by_jansson) {
     }
 }
 
-TEST(test_json_a_nul_stands_nowhere) {
+TEST(test_json_nul_byte_is_refused_at_every_position) {
     char text[sizeof(STATUS)];
     for (size_t at = 0; at < sizeof(STATUS); at++) {
         memcpy(text, STATUS, sizeof(STATUS));
@@ -148,17 +148,17 @@ TEST(test_json_depth_is_bounded) {
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
 
-TEST(test_json_many_keys_cost_no_more_than_their_length) {
+TEST(test_json_duplicate_of_the_first_of_many_keys_is_refused) {
     static char text[IWC_LINE_MAX];
     size_t used = (size_t)snprintf(text, sizeof text, "{\"a\":1");
     for (unsigned i = 0; used < sizeof text - 30U; i++) {
         used += (size_t)snprintf(text + used, sizeof text - used, ",\"%x\":0", i + 0x10U);
     }
     used += (size_t)snprintf(text + used, sizeof text - used, ",\"a\":2}");
-    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are remembered to the end.
+    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are stored until the end.
 }
 
-TEST(test_field_integers_are_whole_and_fit) {
+TEST(test_field_integers_must_be_whole_and_fit_64_bits) {
     const iwc_message_t message =
         message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"d\":1.0,\"e\":null,\"f\":true,\"g\":\"1\","
                    "\"h\":1e2,\"i\":{\"a\":5},\"k\":-0}");
@@ -175,7 +175,7 @@ TEST(test_field_integers_are_whole_and_fit) {
     }
 }
 
-TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters) {
+TEST(test_field_text_is_escaped_and_cut_between_characters) {
     const iwc_message_t message = message_of(STATUS);
     const iwc_message_t umlauts = message_of("{\"a\":\"\xc3\xa4\xc3\xa4\\u001b\"}");
     char text[20];
@@ -192,7 +192,7 @@ TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters) {
     TEST_ASSERT_FALSE(iwc_is(&message, "t_us", "99000000"));
 }
 
-TEST(test_field_json_is_what_stands_there) {
+TEST(test_field_json_is_the_text_of_the_member) {
     size_t length = 0;
     const iwc_message_t message = message_of(STATUS);
     const char *bus = iwc_json(&message, "bus", &length);
@@ -202,7 +202,7 @@ TEST(test_field_json_is_what_stands_there) {
     TEST_ASSERT_EQUAL_size_t(0, length);
 }
 
-TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero) {
+TEST(test_state_of_a_snapshot_null_is_unknown) {
     const iwc_message_t message = message_of(STATUS);
     iwc_state_t state;
     TEST_ASSERT_TRUE(iwc_state(gateway, &message, &state));
@@ -210,7 +210,7 @@ TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero) {
     TEST_ASSERT_EQUAL(IWC_ARMED, state.machine);
     TEST_ASSERT_EQUAL_STRING("", state.cause);
     TEST_ASSERT_EQUAL_INT64(7, state.holder.value);
-    TEST_ASSERT_FALSE(state.ours); // Not connected: nobody's number.
+    TEST_ASSERT_FALSE(state.ours); // Without a connection no lease is ours.
     TEST_ASSERT_EQUAL_INT64(120, state.remaining_ms.value);
     TEST_ASSERT_TRUE(state.estop_released && state.bus_active && state.left.heard && state.right.heard);
     TEST_ASSERT_TRUE(state.left.at_rest.known);
@@ -225,11 +225,11 @@ TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero) {
     TEST_ASSERT_EQUAL_INT64(29, state.left.force_age_ms.value);
     TEST_ASSERT_TRUE(state.left.force_net_mN.known);
     TEST_ASSERT_EQUAL_INT64(-120, state.left.force_net_mN.value);
-    TEST_ASSERT_FALSE(state.right.force_net_mN.known); // Saturated: the figure beside it means nothing.
+    TEST_ASSERT_FALSE(state.right.force_net_mN.known); // The force is saturated: its value is not valid.
     TEST_ASSERT_EQUAL_INT64(0, state.right.force_net_mN.value);
 }
 
-TEST(test_state_of_what_is_no_snapshot_is_untouched) {
+TEST(test_state_of_another_message_is_unchanged) {
     static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}",
                                         "{\"event\":\"bus\",\"state\":\"down\"}"};
     iwc_state_t state = {.t_us = 42};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The search for the only gateway.
+// iwc_find: search for the only gateway.
 #include "iwheel_client/client.h"
 
 #include "unit.h"
@@ -55,7 +55,7 @@ TEST(test_find_only_sockets_with_the_suffix_count) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof out));
 }
 
-TEST(test_find_the_only_one_is_taken) {
+TEST(test_find_only_gateway_is_returned) {
     char path[128];
     add_file("gateway.lock");
     add_socket("can0.sock");
@@ -64,7 +64,7 @@ TEST(test_find_the_only_one_is_taken) {
     TEST_ASSERT_EQUAL_STRING(path, out);
 }
 
-TEST(test_find_several_are_listed) {
+TEST(test_find_several_gateways_are_listed) {
     add_socket("can0.sock");
     add_socket("can1.sock");
     TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
@@ -86,7 +86,7 @@ static const char *path_of(const char *name) {
     return path;
 }
 
-/// Both sockets of a gateway; the one to drive by is for its owner only.
+/// Adds both sockets of a gateway. Only the owner may use the socket for driving.
 static void add_pair(void) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(path_of("watch"), 0755));
     TEST_ASSERT_EQUAL_INT(0, chmod(directory, 0755));
@@ -96,13 +96,13 @@ static void add_pair(void) {
     TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0666));
 }
 
-TEST(test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first) {
+TEST(test_find_two_sockets_of_one_gateway_returns_drive_socket) {
     add_pair();
     TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
 }
 
-TEST(test_find_who_may_not_drive_gets_the_socket_to_watch_by) {
+TEST(test_find_without_right_to_drive_returns_watch_socket) {
     if (geteuid() != 0) {
         TEST_IGNORE_MESSAGE("needs root to become somebody else");
     }
@@ -114,7 +114,7 @@ TEST(test_find_who_may_not_drive_gets_the_socket_to_watch_by) {
     TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
 }
 
-TEST(test_find_who_may_use_neither_is_led_to_the_one_to_drive_by) {
+TEST(test_find_without_any_right_returns_drive_socket) {
     if (geteuid() != 0) {
         TEST_IGNORE_MESSAGE("needs root to become somebody else");
     }
@@ -127,7 +127,7 @@ TEST(test_find_who_may_use_neither_is_led_to_the_one_to_drive_by) {
     TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
 }
 
-TEST(test_find_a_socket_to_watch_by_alone_counts_as_a_gateway) {
+TEST(test_find_watch_socket_alone_counts_as_a_gateway) {
     add_pair();
     TEST_ASSERT_EQUAL_INT(0, unlink(path_of("can0.sock")));
     TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// iwc_recording against a gateway that a test plays itself: pieces are taken only if they are what was asked for, and whole.
+// iwc_recording against a gateway that the test plays: a piece is accepted only if it is the requested one and
+// complete.
 #include "iwheel_client/client.h"
 
 #include "unit.h"
@@ -36,7 +37,7 @@ void tearDown(void) {
     (void)close(server);
 }
 
-/// The reply is there before the first question of a fresh connection: its id is 2.
+/// Sends the reply before the first question of a new connection, which has the id 2.
 static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
     char line[512];
     (void)snprintf(line, sizeof line, "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",%s}\n", fields);
@@ -45,10 +46,10 @@ static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
     return iwc_recording(gateway, NAME, SOON, out, &piece);
 }
 
-/// "123456789" and its parts, as zlib.crc32 has them.
+/// "123456789" and its parts, with the checksums of zlib.crc32.
 #define WHOLE "\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780262"
 
-TEST(test_last_piece_is_taken_with_both_checksums) {
+TEST(test_recording_last_piece_has_both_checksums) {
     char heard[256] = "";
     TEST_ASSERT_EQUAL(IWC_OK, ask(0, 0, "\"offset\":0,\"size\":9," WHOLE ",\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL_STRING_LEN("123456789", out, 9);
@@ -59,22 +60,22 @@ TEST(test_last_piece_is_taken_with_both_checksums) {
     TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"recording\",\"name\":\"" NAME "\",\"offset\":0}\n", heard);
 }
 
-TEST(test_second_piece_carries_the_checksum_on) {
+TEST(test_recording_second_piece_continues_the_checksum) {
     TEST_ASSERT_EQUAL(
         IWC_OK,
         ask(4, 0x9BE3E0A3U,
-            "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":3421780262")); // Of 1234.
+            "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":3421780262")); // Of 1234
     TEST_ASSERT_EQUAL(5, piece.length);
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
 }
 
-TEST(test_end_of_the_file_is_an_empty_piece) {
+TEST(test_recording_end_of_file_is_an_empty_piece) {
     TEST_ASSERT_EQUAL(
         IWC_OK, ask(9, 0xCBF43926U, "\"offset\":9,\"size\":9,\"data\":\"\",\"crc32\":0,\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL(0, piece.length);
 }
 
-TEST(test_piece_that_is_not_right_ends_the_connection) {
+TEST(test_recording_wrong_piece_ends_the_connection) {
     static const char *const bad[] = {
         "\"offset\":0,\"size\":9,\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780263,\"file_crc32\":null",
         "\"offset\":3,\"size\":9," WHOLE ",\"file_crc32\":null",
@@ -95,7 +96,7 @@ TEST(test_piece_that_is_not_right_ends_the_connection) {
     }
 }
 
-TEST(test_piece_longer_than_room_is_not_written) {
+TEST(test_recording_overlong_piece_is_not_written) {
     static char line[50000];
     int n = snprintf(line, sizeof line,
                      "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",\"offset\":0,\"size\":99999,\"data\":\"");
@@ -108,7 +109,7 @@ TEST(test_piece_longer_than_room_is_not_written) {
     TEST_ASSERT_EQUAL('X', guarded[IWC_PIECE_MAX]);
 }
 
-TEST(test_name_that_could_not_stand_in_a_request_is_not_sent) {
+TEST(test_recording_invalid_name_is_not_sent) {
     char byte;
     static const char *const bad[] = {
         "", "a\"b", "../a", "a\\b", "a b", "a\nb", "0123456789012345678901234567890123456789012345678901234567890123"};
@@ -119,7 +120,7 @@ TEST(test_name_that_could_not_stand_in_a_request_is_not_sent) {
     TEST_ASSERT_EQUAL(-1, recv(server, &byte, 1, MSG_DONTWAIT));
 }
 
-TEST(test_refusal_leaves_the_connection) {
+TEST(test_recording_refusal_does_not_end_the_connection) {
     say("{\"id\":2,\"ok\":false,\"error\":\"bad_value\",\"message\":\"gone\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_recording(gateway, NAME, SOON, out, &piece));
     TEST_ASSERT_EQUAL_STRING("gone", iwc_reason(gateway));

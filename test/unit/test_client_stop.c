@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libiwheel-client: what a person's request says of itself, and stops by one socket of a gateway or the other.
+// libiwheel-client: optional members of a request, and stops through either socket of a gateway.
 #include "iwheel_client/client.h"
 
 #include "unity.h"
@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #define HELLO "{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n"
-#define SOON  20 ///< ms; what has to come is there already.
+#define SOON  20 ///< ms; the expected bytes are already there.
 #define LONG  2000
 
 static iwc_t *gateway;
@@ -28,7 +28,7 @@ static void say(const char *text) {
     TEST_ASSERT_EQUAL_INT((int)strlen(text), (int)send(server, text, strlen(text), MSG_NOSIGNAL));
 }
 
-/// What has come since the last time.
+/// Returns the bytes that were received since the last call.
 static const char *hear(void) {
     static char heard[4096];
     const ssize_t length = recv(server, heard, sizeof heard - 1U, MSG_DONTWAIT);
@@ -60,9 +60,9 @@ void tearDown(void) {
     (void)unlink(watch_path);
 }
 
-// What a request says of itself ----------------------------------------------------------------------------------------
+// Optional members of a request ---------------------------------------------------------------------------------------
 
-static void test_ask_helpers_with_time_stop_and_key_send_them(void) {
+static void test_ask_helpers_send_time_stop_and_key(void) {
     adopt();
     const iwc_drive_t drive = {.left_mm_s = 1, .right_mm_s = 2};
     const iwc_twist_t twist = {.v_mm_s = 5, .yaw_mrad_s = -6};
@@ -81,20 +81,20 @@ static void test_ask_helpers_with_time_stop_and_key_send_them(void) {
                              hear());
 }
 
-static void test_ask_arm_gives_the_key_of_the_lease(void) {
+static void test_ask_arm_returns_the_key_of_the_lease(void) {
     adopt();
     char key[IWC_KEY_SIZE] = "before";
     say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"key\":\"0123456789abcdef0123456789abcdef\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
     TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", key);
-    say("{\"id\":4,\"ok\":true,\"lease_ms\":200}\n"); // A microcontroller.
+    say("{\"id\":4,\"ok\":true,\"lease_ms\":200}\n"); // The reply of a microcontroller has no key.
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
     TEST_ASSERT_EQUAL_STRING("", key);
 }
 
-// Either socket ----------------------------------------------------------------------------------------------------------
+// Either socket -------------------------------------------------------------------------------------------------------
 
-/// A gateway's process, which answers each connection to that socket with `reply` after its first line.
+/// Starts a process of a gateway that answers each connection to this socket with `reply` after its first line.
 static pid_t serve(const char *path, const char *reply) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
@@ -137,7 +137,7 @@ static void test_stop_at_sends_its_line_without_a_greeting(void) {
     end(child);
 }
 
-static void test_stop_at_takes_the_other_socket_if_one_is_missing(void) {
+static void test_stop_at_missing_socket_uses_the_other_one(void) {
     pid_t child = serve(watch_path,
                         "{\"id\":4,\"ok\":true,\"state\":\"latched\"}\n{\"id\":2,\"ok\":true,\"state\":\"latched\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_estop_at(gateway, drive_path, "stairs", LONG));
@@ -148,7 +148,7 @@ static void test_stop_at_takes_the_other_socket_if_one_is_missing(void) {
     end(child);
 }
 
-static void test_stop_at_takes_the_other_socket_if_one_has_no_place(void) {
+static void test_stop_at_full_socket_uses_the_other_one(void) {
     const pid_t full = serve(drive_path, CROWD);
     const pid_t child = serve(watch_path, "{\"id\":4,\"ok\":true,\"state\":\"stopping\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_stop_at(gateway, drive_path, LONG));
@@ -157,14 +157,14 @@ static void test_stop_at_takes_the_other_socket_if_one_has_no_place(void) {
     end(child);
 }
 
-static void test_stop_at_both_full_reports_the_first(void) {
+static void test_stop_at_full_socket_alone_is_refused(void) {
     const pid_t full = serve(drive_path, CROWD);
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_stop_at(gateway, drive_path, 60));
     TEST_ASSERT_EQUAL_STRING("too_many_clients", iwc_error(gateway));
     end(full);
 }
 
-static void test_stop_at_nobody_there_ends_at_once(void) {
+static void test_stop_at_without_gateway_returns_immediately(void) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_stop_at(gateway, drive_path, IWC_FOREVER));
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_estop_at(gateway, drive_path, "a\nb", LONG));
 }
@@ -175,13 +175,13 @@ int main(void) {
     char watch[64];
     (void)snprintf(watch, sizeof watch, "%s/watch", folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(watch, 0755));
-    RUN_TEST(test_ask_helpers_with_time_stop_and_key_send_them);
-    RUN_TEST(test_ask_arm_gives_the_key_of_the_lease);
+    RUN_TEST(test_ask_helpers_send_time_stop_and_key);
+    RUN_TEST(test_ask_arm_returns_the_key_of_the_lease);
     RUN_TEST(test_stop_at_sends_its_line_without_a_greeting);
-    RUN_TEST(test_stop_at_takes_the_other_socket_if_one_is_missing);
-    RUN_TEST(test_stop_at_takes_the_other_socket_if_one_has_no_place);
-    RUN_TEST(test_stop_at_both_full_reports_the_first);
-    RUN_TEST(test_stop_at_nobody_there_ends_at_once);
+    RUN_TEST(test_stop_at_missing_socket_uses_the_other_one);
+    RUN_TEST(test_stop_at_full_socket_uses_the_other_one);
+    RUN_TEST(test_stop_at_full_socket_alone_is_refused);
+    RUN_TEST(test_stop_at_without_gateway_returns_immediately);
     (void)rmdir(watch);
     (void)rmdir(folder);
     return UNITY_END();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// libiwheel-client against a gateway that a test plays itself, at the other end of a socket pair.
+// libiwheel-client against a gateway that the test plays at the other end of a socket pair.
 #include "iwheel_client/client.h"
 
 #include "unit.h"
@@ -13,12 +13,12 @@
 #include <unistd.h>
 
 #define HELLO "{\"event\":\"hello\",\"name\":\"iwheel-gateway\",\"api\":1,\"state\":\"listening\",\"client\":7}\n"
-#define BRIEF 20   ///< ms; nothing is to come.
-#define SOON  2000 ///< ms; what has to come is there already, but the machine may be busy.
+#define BRIEF 20   ///< ms; nothing is expected.
+#define SOON  2000 ///< ms; the expected bytes are already there, but the machine may be busy.
 
 static iwc_t *gateway;
 static int server;
-static char heard[1 << 20]; ///< What the gateway of the test has read, terminated.
+static char heard[1 << 20]; ///< Bytes that the gateway of the test has read, terminated.
 static iwc_message_t message;
 
 static void say(const char *text) {
@@ -31,7 +31,7 @@ static void say(const char *text) {
     }
 }
 
-/// What has come since the last time.
+/// Returns the bytes that were received since the last call.
 static const char *hear(void) {
     size_t used = 0;
     for (ssize_t now = 1; now > 0; used += (now > 0) ? (size_t)now : 0U) {
@@ -49,7 +49,7 @@ static bool server_sees_the_end(void) {
 
 static iwc_result_t adopt_with(const char *first) {
     int pair[2];
-    const int room = 4 << 20; // Of the fake: it may say a lot before anybody reads.
+    const int room = 4 << 20; // Buffer of the fake gateway, which may send much before the client reads.
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
     if (server >= 0) {
         (void)close(server);
@@ -78,15 +78,15 @@ static void expect_event(const char *text) {
     TEST_ASSERT_EQUAL_size_t(strlen(text), message.length);
 }
 
-// ---- connecting ---------------------------------------------------------------------------------------------------
+// ---- connection -----------------------------------------------------------------------------------------------------
 
-TEST(test_connect_greeting_tells_our_number_and_sends_nothing) {
+TEST(test_connect_greeting_sets_the_number_and_sends_nothing) {
     TEST_ASSERT_EQUAL_INT64(7, iwc_number(gateway));
     TEST_ASSERT_EQUAL_STRING("", hear());
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-TEST(test_connect_too_many_clients_is_refused_with_its_words) {
+TEST(test_connect_too_many_clients_is_refused_with_reason) {
     TEST_ASSERT_EQUAL(
         IWC_REFUSED,
         adopt_with("{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"16 of 16\"}\n"));
@@ -95,7 +95,7 @@ TEST(test_connect_too_many_clients_is_refused_with_its_words) {
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
 }
 
-TEST(test_connect_without_greeting_is_given_up) {
+TEST(test_connect_without_greeting_times_out) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, adopt_with("{\"event\":\"hel"));
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
     TEST_ASSERT_TRUE(server_sees_the_end());
@@ -111,7 +111,7 @@ TEST(test_connect_another_service_is_garbled) {
     }
 }
 
-TEST(test_connect_nobody_there_is_told_with_the_reason) {
+TEST(test_connect_without_gateway_returns_errno) {
     char path[200];
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_connect(gateway, "/nonexistent/x.sock", 0));
     TEST_ASSERT_EQUAL_INT(ENOENT, iwc_errno(gateway));
@@ -122,7 +122,7 @@ TEST(test_connect_nobody_there_is_told_with_the_reason) {
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwc_errno(gateway));
 }
 
-TEST(test_connect_newer_protocol_only_reads_and_stops) {
+TEST(test_connect_newer_protocol_allows_only_status_and_stop) {
     const iwc_drive_t command = {.left_mm_s = 1};
     TEST_ASSERT_EQUAL(IWC_NEWER, adopt_with("{\"event\":\"hello\",\"api\":2,\"client\":1}\n"));
     TEST_ASSERT_EQUAL(IWC_NEWER, iwc_arm(gateway, NULL, false, 0, NULL));
@@ -137,22 +137,22 @@ TEST(test_connect_newer_protocol_only_reads_and_stops) {
     TEST_ASSERT_NOT_NULL(strstr(hear(), "\"cmd\":\"stop\""));
 }
 
-// ---- asking -------------------------------------------------------------------------------------------------------
+// ---- requests -------------------------------------------------------------------------------------------------------
 
-TEST(test_ask_reply_with_its_id_is_the_answer_and_events_are_kept) {
+TEST(test_ask_returns_the_reply_with_its_id_and_queues_events) {
     say("{\"event\":\"a\"}\n{\"id\":99,\"ok\":true}\n{\"id\":2,\"ok\":true,\"x\":5}\n{\"event\":\"b\"}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_ask(gateway, "{\"cmd\":\"status\"}", SOON, &message));
     TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"status\"}\n", hear());
     TEST_ASSERT_EQUAL_INT64(5, iwc_integer(&message, "x").value);
     TEST_ASSERT_FALSE(message.is_event);
     expect_event("{\"event\":\"a\"}");
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_next(gateway, 0, &message)); // Somebody else's: handed out, not taken for the answer.
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_next(gateway, 0, &message)); // The reply with another id is returned later.
     TEST_ASSERT_EQUAL_INT64(99, message.id);
     expect_event("{\"event\":\"b\"}");
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-TEST(test_ask_late_reply_answers_nothing_else) {
+TEST(test_ask_late_reply_is_dropped) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"why\"}", 1, &message));
     say("{\"id\":2,\"ok\":false,\"error\":\"late\",\"message\":\"\"}\n{\"id\":4,\"ok\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_reset(gateway, SOON));
@@ -160,7 +160,7 @@ TEST(test_ask_late_reply_answers_nothing_else) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-TEST(test_ask_refusal_tells_name_and_words) {
+TEST(test_ask_refusal_has_error_and_reason) {
     say("{\"id\":2,\"ok\":false,\"error\":\"estop_pressed\",\"message\":\"release \\\"it\\\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_arm(gateway, "test", false, SOON, NULL));
     TEST_ASSERT_EQUAL_STRING("estop_pressed", iwc_error(gateway));
@@ -168,13 +168,13 @@ TEST(test_ask_refusal_tells_name_and_words) {
     TEST_ASSERT_GREATER_OR_EQUAL(0, iwc_fd(gateway));
 }
 
-TEST(test_ask_refusal_without_id_is_for_who_waits) {
+TEST(test_ask_refusal_without_id_ends_the_pending_request) {
     say("{\"id\":null,\"ok\":false,\"error\":\"bad_json\",\"message\":\"\"}\n");
     TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_reset(gateway, SOON));
     TEST_ASSERT_EQUAL_STRING("bad_json", iwc_error(gateway));
 }
 
-TEST(test_ask_events_without_end_do_not_outlast_the_timeout) {
+TEST(test_ask_flood_of_events_does_not_extend_the_timeout) {
     const pid_t flood = fork();
     if (flood == 0) {
         for (;;) {
@@ -189,7 +189,7 @@ TEST(test_ask_events_without_end_do_not_outlast_the_timeout) {
     TEST_ASSERT_EQUAL(IWC_OK, latest);
 }
 
-TEST(test_ask_what_is_no_request_is_not_sent) {
+TEST(test_ask_invalid_request_is_not_sent) {
     char text[IWC_REQUEST_MAX + 10U];
     int64_t id = 0;
     static const char *const bad[] = {"",
@@ -213,7 +213,7 @@ TEST(test_ask_what_is_no_request_is_not_sent) {
     TEST_ASSERT_EQUAL_STRING("", hear());
 }
 
-TEST(test_ask_helpers_send_what_the_protocol_says) {
+TEST(test_ask_helpers_send_lines_of_the_protocol) {
     const iwc_drive_t plain = {.left_mm_s = -300, .right_mm_s = 200};
     const iwc_drive_t full = {.left_mm_s = 1, .right_mm_s = 2, .has_current = true, .left_mA = 3, .right_mA = -4};
     (void)iwc_arm(gateway, "a \"b\\", true, 0, NULL);
@@ -236,7 +236,7 @@ TEST(test_ask_helpers_send_what_the_protocol_says) {
         hear());
 }
 
-TEST(test_ask_terms_and_applied_values_come_back) {
+TEST(test_ask_terms_and_applied_values_are_returned) {
     iwc_terms_t terms;
     iwc_applied_t applied;
     const iwc_drive_t command = {.left_mm_s = 2000, .right_mm_s = 2000};
@@ -262,7 +262,7 @@ TEST(test_ask_terms_and_applied_values_come_back) {
     TEST_ASSERT_TRUE(applied.limited);
 }
 
-// ---- lines --------------------------------------------------------------------------------------------------------
+// ---- lines ----------------------------------------------------------------------------------------------------------
 
 TEST(test_line_in_single_bytes_is_one_message) {
     static const char text[] = "{\"event\":\"a\"}\n{\"event\":\"b\"}\n";
@@ -279,7 +279,7 @@ TEST(test_line_in_single_bytes_is_one_message) {
     }
 }
 
-/// An event of so many bytes without its newline.
+/// Sends an event of this many bytes, without its newline.
 static void say_long(size_t length) {
     static char text[IWC_LINE_MAX + 10U];
     const int n = snprintf(text, sizeof text, "{\"event\":\"");
@@ -288,7 +288,7 @@ static void say_long(size_t length) {
     say(text);
 }
 
-TEST(test_line_of_the_longest_length_is_taken_again_and_again) {
+TEST(test_line_of_maximum_length_is_accepted_repeatedly) {
     for (int i = 0; i < 10; i++) {
         say_long(IWC_LINE_MAX);
         TEST_ASSERT_EQUAL(IWC_OK, iwc_next(gateway, SOON, &message));
@@ -296,7 +296,7 @@ TEST(test_line_of_the_longest_length_is_taken_again_and_again) {
     }
 }
 
-TEST(test_line_longer_than_that_ends_the_connection) {
+TEST(test_line_longer_than_the_maximum_ends_the_connection) {
     say("{\"event\":\"a\"}\n");
     say_long(IWC_LINE_MAX + 1U);
     expect_event("{\"event\":\"a\"}");
@@ -304,14 +304,14 @@ TEST(test_line_longer_than_that_ends_the_connection) {
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
-TEST(test_line_without_end_ends_the_connection) {
+TEST(test_line_without_newline_ends_the_connection) {
     for (unsigned i = 0; i <= IWC_LINE_MAX / 64U; i++) {
         say("{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{{");
     }
     TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_next(gateway, SOON, &message));
 }
 
-TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones) {
+TEST(test_line_of_garbage_ends_the_connection_after_good_ones) {
     static const char *const bad[] = {"x\n", "\n", "{\"ok\":true,\"event\":\"both\"}\n", "{\"neither\":1}\n",
                                       "{\"event\":\"\xff\"}\n"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
@@ -325,7 +325,7 @@ TEST(test_line_of_garbage_ends_the_connection_behind_the_good_ones) {
     }
 }
 
-TEST(test_line_that_the_dead_gateway_left_half_is_no_message) {
+TEST(test_line_cut_by_end_of_gateway_is_no_message) {
     const iwc_drive_t command = {.left_mm_s = 100};
     say("{\"event\":\"a\"}\n{\"event\":\"b\"}");
     (void)shutdown(server, SHUT_RDWR);
@@ -336,13 +336,13 @@ TEST(test_line_that_the_dead_gateway_left_half_is_no_message) {
     }
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
     TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
-    TEST_ASSERT_EQUAL_STRING("", hear()); // Connected again, and nothing armed or driven by itself.
+    TEST_ASSERT_EQUAL_STRING("", hear()); // After the new connection nothing is armed or driven automatically.
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_next(gateway, 0, &message));
 }
 
-// ---- more than is taken -------------------------------------------------------------------------------------------
+// ---- more messages than the client reads ----------------------------------------------------------------------------
 
-TEST(test_flood_nobody_takes_leaves_the_newest_and_the_count) {
+TEST(test_flood_of_unread_events_retains_newest_and_count) {
     char text[300];
     uint64_t told = 0;
     int64_t last = -1;
@@ -363,7 +363,7 @@ TEST(test_flood_nobody_takes_leaves_the_newest_and_the_count) {
     TEST_ASSERT_EQUAL_UINT64(5000, told);
 }
 
-TEST(test_flood_of_different_things_drops_the_oldest) {
+TEST(test_flood_of_different_events_drops_the_oldest) {
     char text[100];
     uint64_t told = 0;
     int64_t last = -1;
@@ -380,7 +380,7 @@ TEST(test_flood_of_different_things_drops_the_oldest) {
     TEST_ASSERT_EQUAL_UINT64(300, told);
 }
 
-TEST(test_latest_keeps_one_of_each_thing_in_order) {
+TEST(test_latest_retains_one_message_of_each_kind_in_order) {
     say("{\"event\":\"fault\",\"cause\":\"overspeed\"}\n{\"event\":\"state\",\"n\":1}\n{\"id\":1,\"ok\":true}\n"
         "{\"event\":\"fault\",\"cause\":\"bus_down\"}\n{\"event\":\"lost\",\"count\":10}\n{\"event\":\"state\",\"n\":2}"
         "\n"
@@ -401,7 +401,7 @@ TEST(test_latest_keeps_one_of_each_thing_in_order) {
     TEST_ASSERT_FALSE(iwc_pending(gateway));
 }
 
-TEST(test_latest_leaves_the_message_in_hand_alone) {
+TEST(test_latest_does_not_change_the_current_message) {
     say("{\"event\":\"a\"}\n");
     expect_event("{\"event\":\"a\"}");
     say("{\"event\":\"b\"}\n{\"event\":\"b\"}\n{\"event\":");
@@ -413,9 +413,9 @@ TEST(test_latest_leaves_the_message_in_hand_alone) {
     expect_event("{\"event\":\"c\"}");
 }
 
-// ---- driving ------------------------------------------------------------------------------------------------------
+// ---- driving --------------------------------------------------------------------------------------------------------
 
-TEST(test_drive_leaves_once_and_is_never_repeated) {
+TEST(test_drive_is_sent_once_and_never_repeated) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL_STRING("{\"id\":1,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n", hear());
@@ -426,7 +426,7 @@ TEST(test_drive_leaves_once_and_is_never_repeated) {
     TEST_ASSERT_EQUAL_STRING("", hear());
 }
 
-TEST(test_drive_to_a_gateway_that_hangs_is_told_and_forgotten) {
+TEST(test_drive_without_replies_is_full_and_dropped) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     for (unsigned i = 0; i < IWC_DRIVES_MAX; i++) {
         TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL));
@@ -437,14 +437,14 @@ TEST(test_drive_to_a_gateway_that_hangs_is_told_and_forgotten) {
     say("{\"id\":1,\"ok\":true}\n");
     TEST_ASSERT_EQUAL_STRING("", hear());
     TEST_ASSERT_EQUAL(IWC_OK,
-                      iwc_drive(gateway, &command, 0, NULL)); // There is a reply again; nobody has to take it first.
+                      iwc_drive(gateway, &command, 0, NULL)); // A reply has arrived; the client need not read it first.
     TEST_ASSERT_EQUAL(IWC_FULL, iwc_drive(gateway, &command, 0, NULL));
     TEST_ASSERT_EQUAL(IWC_TIMEOUT,
-                      iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL)); // Everything else still goes out.
+                      iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL)); // All other requests are still sent.
     TEST_ASSERT_NOT_NULL(strstr(hear(), "status"));
 }
 
-/// Fills our way to the gateway.
+/// Fills the socket to the gateway.
 static void stuff(void) {
     const int room = 1;
     int64_t id = 0;
@@ -459,7 +459,7 @@ static void stuff(void) {
     TEST_FAIL_MESSAGE("the socket never fills");
 }
 
-TEST(test_drive_that_cannot_leave_never_leaves_later) {
+TEST(test_drive_on_full_socket_is_never_sent_later) {
     const iwc_drive_t command = {.left_mm_s = 300, .right_mm_s = 300};
     stuff();
     for (unsigned i = 0; i <= IWC_DRIVES_MAX; i++) {
@@ -471,23 +471,23 @@ TEST(test_drive_that_cannot_leave_never_leaves_later) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 1, NULL));
     TEST_ASSERT_NULL(strstr(hear(), "drive"));
     TEST_ASSERT_NOT_NULL(strstr(heard, "status"));
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL)); // What did not leave counts not as unanswered.
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL)); // An unsent drive does not wait for a reply.
 }
 
-TEST(test_drive_of_which_half_has_left_ends_the_connection) {
+TEST(test_drive_sent_in_part_ends_the_connection) {
     char text[IWC_REQUEST_MAX - 20U];
     char line[] = "{\"id\":1,\"cmd\":\"hello\"}\n";
     int64_t id = 0;
     (void)snprintf(text, sizeof text, "{\"cmd\":\"drive\",\"x\":\"%*s\"}", (int)sizeof text - 30, "");
     stuff();
-    TEST_ASSERT_EQUAL(sizeof line - 1U, recv(server, line, sizeof line - 1U, 0)); // Room for a part.
+    TEST_ASSERT_EQUAL(sizeof line - 1U, recv(server, line, sizeof line - 1U, 0)); // Makes space for a part.
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_send(gateway, text, 0, &id));
     TEST_ASSERT_NOT_NULL(strstr(hear(), "drive"));
     TEST_ASSERT_NULL(strchr(strstr(heard, "drive"), '\n'));
     TEST_ASSERT_TRUE(server_sees_the_end());
 }
 
-TEST(test_stop_that_is_not_answered_ends_the_connection) {
+TEST(test_stop_without_reply_ends_the_connection) {
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_stop(gateway, 1));
     TEST_ASSERT_TRUE(server_sees_the_end());
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_next(gateway, 0, &message));
@@ -497,18 +497,18 @@ TEST(test_stop_that_is_not_answered_ends_the_connection) {
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
 }
 
-TEST(test_drive_to_a_gateway_that_is_gone_raises_no_signal) {
+TEST(test_drive_to_a_closed_gateway_raises_no_signal) {
     const iwc_drive_t command = {.left_mm_s = 300};
     say("{\"event\":\"stop\"}\n");
     (void)shutdown(server, SHUT_RDWR);
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_drive(gateway, &command, 0, NULL));
-    expect_event("{\"event\":\"stop\"}"); // What it said before it went is not lost.
+    expect_event("{\"event\":\"stop\"}"); // The last event of the gateway is not lost.
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_next(gateway, 0, &message));
 }
 
-// ---- processes and signals ----------------------------------------------------------------------------------------
+// ---- processes and signals ------------------------------------------------------------------------------------------
 
-TEST(test_close_ends_the_connection_although_a_copy_of_it_is_open) {
+TEST(test_close_ends_the_connection_despite_a_duplicate) {
     const int copy = dup(iwc_fd(gateway));
     iwc_close(gateway);
     TEST_ASSERT_TRUE(server_sees_the_end());
@@ -535,7 +535,7 @@ static void note(int number) {
     (void)number;
 }
 
-TEST(test_signal_let_in_ends_the_wait) {
+TEST(test_wait_ends_with_an_unblocked_signal) {
     struct sigaction action = {.sa_handler = note};
     struct sigaction before;
     sigset_t blocked;
@@ -553,7 +553,7 @@ TEST(test_signal_let_in_ends_the_wait) {
     (void)sigaction(SIGUSR1, &before, NULL);
 }
 
-TEST(test_words_every_result_has_some) {
+TEST(test_words_exist_for_every_result) {
     for (int i = IWC_OK; i <= IWC_SEVERAL; i++) {
         TEST_ASSERT_GREATER_THAN(3, strlen(iwc_words((iwc_result_t)i)));
     }

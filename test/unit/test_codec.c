@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The codec against the golden vectors, and the rules that no single vector shows.
+// Codec: golden vectors, and rules that no single vector shows.
 #include <string.h>
 
 #include "golden_vectors.h"
@@ -90,7 +90,7 @@ TEST(test_encode_golden_values_gives_golden_frame) {
     }
 }
 
-TEST(test_decode_longer_frame_ignores_what_is_behind_the_table) {
+TEST(test_decode_longer_frame_ignores_the_additional_bytes) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         for (uint8_t dlc = golden->frame.dlc; dlc <= IW_CAN_DATA_MAX; dlc++) {
@@ -105,7 +105,7 @@ TEST(test_decode_longer_frame_ignores_what_is_behind_the_table) {
     }
 }
 
-TEST(test_decode_shorter_frame_is_refused_and_leaves_output_alone) {
+TEST(test_decode_shorter_frame_is_refused_output_unchanged) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         for (uint8_t dlc = 0; dlc < golden->frame.dlc; dlc++) {
@@ -119,7 +119,7 @@ TEST(test_decode_shorter_frame_is_refused_and_leaves_output_alone) {
     }
 }
 
-/// Where the values of a kind lie, and how many bytes they take.
+/// Returns offset and size of the values of a kind.
 static void place_of(iw_codec_kind_t kind, size_t *out_at, size_t *out_size) {
 #define PLACE(kind, member) [kind] = { offsetof(iw_codec_wheel_t, member), sizeof(((iw_codec_wheel_t *)NULL)->member) }
     static const size_t places[][2] = {PLACE(IW_CODEC_SPEED, speed),   PLACE(IW_CODEC_STATUS, status),
@@ -130,7 +130,7 @@ static void place_of(iw_codec_kind_t kind, size_t *out_at, size_t *out_size) {
     *out_size = places[kind][1];
 }
 
-TEST(test_decode_touches_only_what_the_frame_speaks_of) {
+TEST(test_decode_writes_only_the_values_of_the_frame) {
     for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
         const golden_vector_t *golden = &golden_vectors[v];
         iw_codec_wheel_t told[IW_SIDES];
@@ -144,7 +144,7 @@ TEST(test_decode_touches_only_what_the_frame_speaks_of) {
     }
 }
 
-TEST(test_rows_are_the_eleven_messages_and_nothing_else_is_found) {
+TEST(test_codec_find_agrees_with_decode_for_every_id) {
     for (uint32_t id = 0; id <= IW_CAN_ID_MASK; id++) {
         const iw_codec_row_t *row = iw_codec_find(id);
         iw_codec_wheel_t told[IW_SIDES];
@@ -159,7 +159,7 @@ TEST(test_rows_are_the_eleven_messages_and_nothing_else_is_found) {
     }
 }
 
-TEST(test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives) {
+TEST(test_codec_row_length_agrees_with_decode_and_encode) {
     for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         const iw_codec_wheel_t zero = {.pose = {0, 0, 0, 0}};
@@ -174,7 +174,7 @@ TEST(test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives) {
     }
 }
 
-TEST(test_name_is_that_of_the_kind) {
+TEST(test_codec_name_of_each_kind) {
     TEST_ASSERT_EQUAL_STRING("speed", iw_codec_name(IW_CODEC_SPEED));
     TEST_ASSERT_EQUAL_STRING("status", iw_codec_name(IW_CODEC_STATUS));
     TEST_ASSERT_EQUAL_STRING("force", iw_codec_name(IW_CODEC_FORCE));
@@ -194,7 +194,7 @@ TEST(test_decode_own_echo_gives_the_same_values) {
     }
 }
 
-TEST(test_decode_does_not_clamp_what_others_send) {
+TEST(test_decode_setpoint_of_another_sender_is_not_clamped) {
     const iw_can_frame_t frame = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .data = {0xEE, 0x80, 0x00, 0x7F, 0xFF}};
     message_t message;
     memset(&message, POISON, sizeof message);
@@ -204,7 +204,7 @@ TEST(test_decode_does_not_clamp_what_others_send) {
     TEST_ASSERT_EQUAL_INT16(32767, message.as.setpoint.current_mA);
 }
 
-TEST(test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone) {
+TEST(test_encode_pose_of_left_wheel_is_refused_output_unchanged) {
     const message_t message = {IW_CODEC_POSE, IW_LEFT, {.pose = {1, 2, 3, 4}}};
     iw_can_frame_t frame;
     memset(&frame, POISON, sizeof frame);
@@ -229,7 +229,7 @@ TEST(test_encode_setpoint_pads_every_length_with_zeros) {
     }
 }
 
-/// What must be on the bus for a wanted current.
+/// Returns the current that the frame must contain for a wanted current.
 static int32_t clamped(int32_t current_mA) {
     return (current_mA > 2000) ? 2000 : (current_mA < -2000) ? -2000 : current_mA;
 }
@@ -261,7 +261,7 @@ TEST(test_encode_message_clamps_a_setpoint_too) {
     }
 }
 
-TEST(test_encode_setpoint_leaves_its_argument_alone) {
+TEST(test_encode_setpoint_does_not_change_its_argument) {
     iw_codec_setpoint_t setpoint = {.type = 9, .speed_mm_s = 7, .current_mA = 30000};
     iw_can_frame_t frame;
     TEST_ASSERT_TRUE(iw_codec_encode_setpoint(IW_LEFT, &setpoint, 5, &frame));

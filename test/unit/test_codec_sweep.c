@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The codec, exhaustively: every id with every length, format and kind; every value of every field, both ways.
+// Codec, exhaustive: every id with every length, format and kind; every value of every field, encoded and decoded.
 #include <stdio.h>
 #include <string.h>
 
@@ -10,7 +10,7 @@
 #define FIELDS_MAX  4
 #define FORMAT_BITS 4
 
-/// A field as the document's table has it, and where the codec's struct keeps it.
+/// Field as in the table of the document, and its member in the struct of the codec.
 typedef struct {
     size_t member;
     uint8_t byte;
@@ -182,7 +182,7 @@ static void check_frame(const layout_t *layout, const iw_can_frame_t *frame) {
     }
 }
 
-/// A frame of this message whose bytes are all `background`, zero behind its length.
+/// Returns a frame of this message with `background` in all its bytes and zeros after its length.
 static iw_can_frame_t frame_of(const layout_t *layout, uint8_t background) {
     iw_can_frame_t frame;
     memset(&frame, 0, sizeof frame);
@@ -202,7 +202,7 @@ static void sweep_narrow_field(const layout_t *layout, const field_t *field, uin
     }
 }
 
-/// Four bytes have too many values to try all: every value of every byte, and around every power of two.
+/// Four bytes have too many values for a full sweep: every value of each byte, and values near each power of two.
 static void sweep_wide_field(const layout_t *layout, const field_t *field, uint8_t background) {
     iw_can_frame_t frame = frame_of(layout, background);
     for (unsigned byte = field->byte; byte < (unsigned)field->byte + field->width; byte++) {
@@ -222,7 +222,7 @@ static void sweep_wide_field(const layout_t *layout, const field_t *field, uint8
     }
 }
 
-TEST(test_every_value_of_every_field_passes_both_ways) {
+TEST(test_codec_every_value_of_every_field_encodes_and_decodes) {
     static const uint8_t backgrounds[] = {0x00, 0xFF, 0x80, 0x5A};
     for (size_t i = 0; i < LAYOUTS * sizeof backgrounds; i++) {
         const layout_t *layout = &layouts[i / sizeof backgrounds];
@@ -237,7 +237,7 @@ TEST(test_every_value_of_every_field_passes_both_ways) {
     }
 }
 
-/// What the contract says about a frame with this number, format and length.
+/// Returns the kind that the contract requires for a frame with this number, format and length.
 static iw_codec_kind_t expected_kind(uint32_t number, uint32_t format, uint8_t dlc) {
     const layout_t *layout = layout_of(number);
     if (layout == NULL) {
@@ -266,7 +266,7 @@ static void check_kind(const iw_can_frame_t *frame, iw_codec_kind_t expected) {
     }
 }
 
-TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_kind) {
+TEST(test_decode_every_id_length_and_format_gives_documented_kind) {
     static const uint32_t formats[FORMAT_BITS] = {IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD};
     for (uint32_t number = 0; number <= IW_CAN_ID_MASK; number++) {
         for (unsigned rest = 0; rest < 2U * 16U * 16U; rest++) {
@@ -282,7 +282,7 @@ TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_kind) {
     }
 }
 
-TEST(test_decode_absurd_lengths_are_refused) {
+TEST(test_decode_lengths_above_8_are_refused) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         for (unsigned dlc = 9; dlc < 256; dlc++) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);
@@ -292,8 +292,8 @@ TEST(test_decode_absurd_lengths_are_refused) {
     }
 }
 
-/// A 29-bit id whose low 11 bits look like ours is another number, with and without the flag that says so.
-TEST(test_decode_wider_number_with_our_low_bits_is_not_ours) {
+/// A 29-bit id with the low 11 bits of a known id is another number, with and without the extended flag.
+TEST(test_decode_29_bit_id_with_known_low_bits_is_unknown) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         for (unsigned bit = 11; bit < 28; bit++) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);

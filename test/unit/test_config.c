@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The configuration: every value of every field, the relations between fields, the stop budget against figures worked out by hand.
+// Configuration: every value of every field, relations between fields, and the stop budget against figures calculated
+// by hand.
 #include <string.h>
 
 #include "iwheel/config.h"
@@ -7,7 +8,7 @@
 
 #define POISON 0xA5
 
-/// A numeric field: where it is, what it may be (from the documentation), which fault names it.
+/// Numeric field: its member, its range from the documentation, and its fault.
 typedef struct {
     size_t member;
     uint16_t min;
@@ -56,8 +57,8 @@ static void put(const limit_t *limit, uint16_t value) {
     memcpy((uint8_t *)&config + limit->member, &value, sizeof value);
 }
 
-/// Room on all sides: no value of one field within its range breaks the stop budget, nor the gear ratio if the other of its two
-/// numbers follows.
+/// Sets a configuration with reserves: no value of one field within its range violates the stop budget, nor the gear
+/// ratio if the other number of the ratio follows.
 static void make_room(uint16_t gear) {
     iw_config_default(&config);
     config.max_speed_mm_s = 10;
@@ -67,7 +68,7 @@ static void make_room(uint16_t gear) {
     config.rest_rpm = 0;
 }
 
-TEST(test_default_is_the_documented_one) {
+TEST(test_config_default_is_the_documented_one) {
     TEST_ASSERT_EQUAL_UINT16(20, config.period_ms);
     TEST_ASSERT_EQUAL_UINT16(200, config.lease_ms);
     TEST_ASSERT_EQUAL_UINT16(800, config.accel_mm_s2);
@@ -101,17 +102,17 @@ TEST(test_default_is_the_documented_one) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_DN, config.force_unit[IW_RIGHT]);
 }
 
-TEST(test_default_leaves_open_what_nobody_can_know) {
+TEST(test_config_default_leaves_type_role_and_track_unset) {
     TEST_ASSERT_FALSE(config.setpoint_type_set);
     TEST_ASSERT_EQUAL_INT(IW_ROLE_UNSET, config.current_role);
     TEST_ASSERT_EQUAL_UINT16(0, config.track_mm);
 }
 
-TEST(test_check_default_is_fine) {
+TEST(test_check_default_is_ok) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
 }
 
-TEST(test_range_is_the_documented_one) {
+TEST(test_config_range_is_the_documented_one) {
     for (size_t i = 0; i < LIMITS; i++) {
         const iw_config_range_t range = iw_config_range(limits[i].fault);
         TEST_ASSERT_EQUAL_UINT16(limits[i].min, range.min);
@@ -119,14 +120,14 @@ TEST(test_range_is_the_documented_one) {
     }
 }
 
-TEST(test_faults_of_numbers_stand_in_the_order_of_the_struct) {
+TEST(test_config_faults_of_numbers_follow_the_struct_order) {
     for (size_t i = 0; i < LIMITS; i++) {
         TEST_ASSERT_EQUAL_INT((int)i + 1, limits[i].fault);
         TEST_ASSERT_EQUAL_UINT(limits[0].member + i * sizeof(uint16_t), limits[i].member);
     }
 }
 
-TEST(test_check_every_value_of_every_field_is_judged_by_its_range) {
+TEST(test_check_every_value_of_every_field_follows_its_range) {
     for (size_t i = 0; i < LIMITS; i++) {
         for (uint32_t value = 0; value <= 65535; value++) {
             const bool unset = limits[i].fault == IW_CONFIG_TRACK && value == 0;
@@ -159,7 +160,7 @@ TEST(test_check_two_faults_names_the_first) {
     }
 }
 
-TEST(test_check_field_fault_comes_before_a_broken_relation) {
+TEST(test_check_field_fault_precedes_a_violated_relation) {
     config.lease_ms = 500;
     config.decel_mm_s2 = 100;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_STOP_BUDGET, iw_config_check(&config));
@@ -167,7 +168,7 @@ TEST(test_check_field_fault_comes_before_a_broken_relation) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_SETPOINT_DLC, iw_config_check(&config));
 }
 
-TEST(test_check_every_role_and_unit_that_exists_is_fine) {
+TEST(test_check_every_defined_role_and_unit_is_ok) {
     for (int role = IW_ROLE_UNSET; role <= IW_ROLE_SETPOINT; role++) {
         for (unsigned units = 0; units < 4; units++) {
             config.current_role = (iw_current_role_t)role;
@@ -178,9 +179,8 @@ TEST(test_check_every_role_and_unit_that_exists_is_fine) {
     }
 }
 
-TEST(test_check_role_or_unit_that_does_not_exist_is_a_fault) {
-    for (int value = IW_ROLE_SETPOINT + 1; value <= UINT8_MAX;
-         value++) { // All that an enumeration has room for on Cortex-M.
+TEST(test_check_undefined_role_or_unit_is_a_fault) {
+    for (int value = IW_ROLE_SETPOINT + 1; value <= UINT8_MAX; value++) { // All values of an enumeration on Cortex-M.
         setUp();
         config.current_role = (iw_current_role_t)value;
         TEST_ASSERT_EQUAL_INT(IW_CONFIG_CURRENT_ROLE, iw_config_check(&config));
@@ -193,7 +193,7 @@ TEST(test_check_role_or_unit_that_does_not_exist_is_a_fault) {
     }
 }
 
-TEST(test_check_switches_and_types_are_never_at_fault) {
+TEST(test_check_switches_and_types_are_always_ok) {
     for (unsigned bits = 0; bits < 32; bits++) {
         config.setpoint_type_set = (bits & 1U) != 0;
         config.rpm_of_rotor = (bits & 2U) != 0;
@@ -207,7 +207,7 @@ TEST(test_check_switches_and_types_are_never_at_fault) {
     }
 }
 
-TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred) {
+TEST(test_check_gear_ratio_must_be_within_1_and_100) {
     for (uint16_t turns = 1; turns <= 1000; turns++) {
         for (uint16_t per = 1; per <= 1000; per++) {
             config.gear_turns = turns;
@@ -221,7 +221,7 @@ TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred) {
     }
 }
 
-TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not) {
+TEST(test_check_stop_budget_is_at_most_one_second) {
     static const struct {
         uint16_t lease_ms;
         uint16_t period_ms;
@@ -249,7 +249,7 @@ TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not
     }
 }
 
-/// Radius, gear, and what they make of rest_rpm. 1 rpm at 192 mm is 20.106 mm/s.
+/// Radius, gear, and the resulting values of rest_rpm. 1 rpm at 192 mm is 20.106 mm/s.
 static const struct {
     uint16_t radius_mm;
     bool rotor;
@@ -260,11 +260,11 @@ static const struct {
     {192, false, 1, 1, {2, 2}},       // 45 / 20.106 = 2.24, 60 / 20.106 = 2.98
     {60, false, 1, 1, {7, 9}},        // 1 rpm is 6.283 mm/s: 7.16, 9.55
     {400, false, 1, 1, {1, 1}},       // 41.888 mm/s: 1.07, 1.43
-    {192, false, 27, 2, {2, 2}},      // A gear does not matter where the wheel's turns count ...
-    {192, true, 27, 2, {30, 40}},     // ... and does where the rotor's do: 1.4893 mm/s: 30.2, 40.3
+    {192, false, 27, 2, {2, 2}},      // The gear has no effect if the telemetry counts turns of the wheel.
+    {192, true, 27, 2, {30, 40}},     // Turns of the rotor: 1 rpm is 1.4893 mm/s: 30.2, 40.3
     {60, true, 37, 1, {264, 353}},    // 0.16982 mm/s: 264.99, 353.3
     {60, true, 1000, 10, {716, 954}}, // 0.062832 mm/s: 716.2, 954.9
-    {400, true, 1000, 1000, {1, 1}},  // As without.
+    {400, true, 1000, 1000, {1, 1}},  // Same as without a gear
 };
 
 static void set_rest_case(size_t i) {
@@ -275,7 +275,7 @@ static void set_rest_case(size_t i) {
     config.gear_per = rests[i].per;
 }
 
-TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel) {
+TEST(test_rest_rpm_default_is_at_most_45_mm_s_and_limit_60_mm_s) {
     for (size_t i = 0; i < sizeof rests / sizeof rests[0]; i++) {
         set_rest_case(i);
         TEST_ASSERT_EQUAL_UINT16(rests[i].rest.standard, iw_config_rest(&config).standard);
@@ -291,8 +291,8 @@ TEST(test_rest_is_at_most_45_mm_s_and_never_more_than_60_at_the_wheel) {
     }
 }
 
-/// The default is at least 1, and with every radius it is permitted.
-TEST(test_rest_default_is_permitted_with_every_radius) {
+/// The default is at least 1, and it is permitted with every radius.
+TEST(test_rest_rpm_default_is_permitted_with_every_radius) {
     for (uint16_t radius = 60; radius <= 400; radius++) {
         config.radius_mm = radius;
         config.rest_rpm = iw_config_rest(&config).standard;
@@ -312,7 +312,7 @@ TEST(test_check_current_floor_is_at_most_the_maximum) {
     }
 }
 
-TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget) {
+TEST(test_check_gear_ratio_precedes_rest_and_rest_precedes_budget) {
     config.decel_mm_s2 = 100;
     config.rest_rpm = 3;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_REST_SPEED, iw_config_check(&config));
@@ -320,8 +320,8 @@ TEST(test_check_gear_ratio_comes_before_rest_and_rest_before_the_stop_budget) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_GEAR_RATIO, iw_config_check(&config));
 }
 
-/// What a setpoint means is fixed at 192 mm: with another wheel the ways differ, not the times.
-TEST(test_stop_budget_is_of_the_configured_radius) {
+/// The unit of a setpoint is fixed at 192 mm: with another radius the distances differ, not the times.
+TEST(test_stop_budget_distances_scale_with_the_radius) {
     static const struct {
         uint16_t radius_mm;
         uint32_t client_lost_mm;
@@ -338,15 +338,15 @@ TEST(test_stop_budget_is_of_the_configured_radius) {
     }
 }
 
-TEST(test_check_gear_ratio_comes_before_the_stop_budget) {
+TEST(test_check_gear_ratio_precedes_the_stop_budget) {
     config.decel_mm_s2 = 100;
     config.gear_turns = 1000;
     config.gear_per = 1;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_GEAR_RATIO, iw_config_check(&config));
 }
 
-/// The way has two legs, and each may have been rounded up: 1 mm more than worked out is no fault, less is.
-TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand) {
+/// The distance has two parts, and each may be rounded up: 1 mm more than calculated is correct, less is a fault.
+TEST(test_stop_budget_is_the_hand_calculation_rounded_up) {
     static const struct {
         uint16_t lease_ms;
         uint16_t period_ms;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The gateway's configuration file: what is accepted, what is refused, and what the refusal says.
+// Configuration file of the gateway: which texts are accepted or refused, and the messages of a refusal.
 #include "config/gateway_config.h"
 
 #include "unit.h"
@@ -32,7 +32,7 @@ static void accepted(const char *text) {
     TEST_ASSERT_EQUAL_STRING("", messages);
 }
 
-/// Refused, nothing applied, and every one of the words is in the messages.
+/// Checks that the text is refused, that nothing is applied, and that the messages contain both strings.
 static void refused(const char *text, const char *where, const char *what) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(GATEWAY_CONFIG_ERROR, parse(text), text);
     TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
@@ -232,7 +232,7 @@ TEST(test_parse_numbers_with_anything_around_them_are_refused) {
     }
 }
 
-/// Whatever the key, a value in quotes is refused with the cure, never taken with the quotes as part of it.
+/// For every key a value in quotes is refused with the fix; the quotes never become part of the value.
 TEST(test_parse_value_in_quotes_is_refused_for_every_key) {
     gateway_config_t whole;
     unsigned keys = 0;
@@ -268,12 +268,12 @@ TEST(test_parse_value_in_quotes_is_refused_for_every_key) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(38U, keys);
 }
 
-TEST(test_parse_lease_zero_says_that_it_cannot_be_disabled) {
+TEST(test_parse_lease_zero_is_refused_as_not_optional) {
     refused("[drive]\n\nlease_ms = 0\n", "iw.conf:3: ", "cannot be disabled");
     refused("[drive]\nlease_ms = 5000\n", "iw.conf:2: lease_ms = 5000 is out of range", "20..500 ms");
 }
 
-TEST(test_parse_words_other_than_the_listed_are_refused) {
+TEST(test_parse_words_outside_the_list_are_refused) {
     refused("[left]\ninvert = true\n", "iw.conf:2: ", "no or yes");
     refused("[left]\ninvert = Yes\n", "iw.conf:2: ", "no or yes");
     refused("[right]\nforce_unit = N\n", "iw.conf:2: ", "cN or dN");
@@ -297,7 +297,7 @@ TEST(test_parse_gear_ratio_forms) {
     }
 }
 
-TEST(test_parse_mode_is_octal_and_keeps_the_owner) {
+TEST(test_parse_mode_is_octal_and_requires_owner_bits) {
     accepted("[northbound]\nmode = 666\n");
     TEST_ASSERT_EQUAL_HEX16(0666, config.northbound.mode);
     refused("[northbound]\nmode = 0680\n", "iw.conf:2: ", "octal");
@@ -306,7 +306,7 @@ TEST(test_parse_mode_is_octal_and_keeps_the_owner) {
     refused("[northbound]\nmode = rw-rw----\n", "iw.conf:2: ", "octal");
 }
 
-TEST(test_parse_texts_that_cannot_be_names_are_refused) {
+TEST(test_parse_invalid_names_are_refused) {
     refused("[bus]\ninterface = averylonginterfacename\n", "iw.conf:2: ", "at most 15 characters");
     refused("[bus]\ninterface = /dev/can0\n", "iw.conf:2: ", "unix:PATH");
     refused("[bus]\ninterface = unix:\n", "iw.conf:2: ", "no path");
@@ -316,7 +316,7 @@ TEST(test_parse_texts_that_cannot_be_names_are_refused) {
     refused("[record]\ndirectory = /var/\xC3\xA4\n", "iw.conf:2: ", "printable ASCII");
 }
 
-TEST(test_parse_socket_path_as_long_as_an_address_allows) {
+TEST(test_parse_socket_path_up_to_the_address_size_is_accepted) {
     char text[512];
     char path[GATEWAY_PATH_SIZE + 1U];
     memset(path, 'a', sizeof path);
@@ -365,7 +365,7 @@ TEST(test_parse_ids_cannot_be_configured) {
     }
 }
 
-TEST(test_parse_unknown_section_is_told_once_and_hides_no_other_error) {
+TEST(test_parse_unknown_section_is_reported_once) {
     refused("[drives]\nlease_ms = 1\nfoo = 2\n[drive]\nperiod_ms = 1\n", "iw.conf:1: unknown section [drives]",
             "iw.conf:5: ");
     TEST_ASSERT_EQUAL_UINT(2, lines_in(messages));
@@ -375,12 +375,12 @@ TEST(test_parse_unknown_section_is_told_once_and_hides_no_other_error) {
     refused("[drive] lease_ms = 300\n", "iw.conf:1: ", "follows");
 }
 
-TEST(test_parse_duplicate_key_is_refused_even_in_a_repeated_section) {
+TEST(test_parse_duplicate_key_in_repeated_section_is_refused) {
     refused("[drive]\nlease_ms = 200\nlease_ms = 200\n", "iw.conf:3: ", "first on line 2");
     refused("[drive]\nlease_ms = 200\n[bus]\n[drive]\nlease_ms = 300\n", "iw.conf:5: ", "first on line 2");
 }
 
-TEST(test_parse_overlong_line_is_refused_wherever_the_cut_would_be) {
+TEST(test_parse_overlong_line_of_any_length_is_refused) {
     char text[512];
     for (size_t length = 190; length < 420; length++) {
         memset(text, ' ', sizeof text);
@@ -406,7 +406,7 @@ TEST(test_parse_nul_and_control_characters_are_refused) {
             "iw.conf:2: ", "lease_ms = 3?2J??");
 }
 
-TEST(test_parse_tells_all_errors_up_to_twenty) {
+TEST(test_parse_reports_all_errors_up_to_twenty) {
     char text[1024] = "[drive]\n";
     for (unsigned i = 0; i < 20; i++) {
         strcat(text, "nonsense = 1\n");
@@ -419,7 +419,7 @@ TEST(test_parse_tells_all_errors_up_to_twenty) {
     TEST_ASSERT_NOT_NULL(strstr(messages, "iw.conf: 2 more errors"));
 }
 
-TEST(test_parse_stop_budget_over_one_second_names_last_key_and_what_fits) {
+TEST(test_parse_stop_budget_error_names_last_key_and_valid_values) {
     refused("[drive]\nmax_speed_mm_s = 2000\nlease_ms = 300\naccel_mm_s2 = 900\n", "iw.conf:3: ", "= 1654 ms to stop");
     TEST_ASSERT_NOT_NULL(strstr(messages, "write max_speed_mm_s = 1020 at most, or decel_mm_s2 = 2942 at least\n"));
     accepted("[drive]\nmax_speed_mm_s = 1020\nlease_ms = 300\n");
@@ -428,13 +428,13 @@ TEST(test_parse_stop_budget_over_one_second_names_last_key_and_what_fits) {
     refused("[drive]\nmax_speed_mm_s = 2000\nlease_ms = 300\ndecel_mm_s2 = 2941\n", "iw.conf:4: ", "1001 ms");
 }
 
-TEST(test_parse_stop_budget_offers_a_lease_that_fits) {
+TEST(test_parse_stop_budget_error_names_the_longest_valid_lease) {
     refused("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 350\n", "iw.conf:3: ", "or lease_ms = 313 at most");
     accepted("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 313\n");
     refused("[drive]\nmax_speed_mm_s = 1000\nlease_ms = 314\n", "iw.conf:3: ", "1001 ms");
 }
 
-TEST(test_print_and_load_is_a_fixed_point_for_defaults_and_every_word) {
+TEST(test_print_and_load_is_a_fixed_point_for_every_word) {
     gateway_config_t wanted;
     gateway_config_default(&wanted);
     assert_fixed_point(&wanted);
@@ -479,7 +479,7 @@ TEST(test_print_fits_the_line_limit_with_the_longest_texts) {
     assert_fixed_point(&before);
 }
 
-TEST(test_shipped_example_is_what_print_gives_for_the_defaults) {
+TEST(test_print_of_defaults_equals_the_shipped_file) {
     static char shipped[32768];
     FILE *file = fopen(IWHEEL_SHARE_DIR "/gateway.conf", "r");
     TEST_ASSERT_NOT_NULL_MESSAGE(file, IWHEEL_SHARE_DIR "/gateway.conf is missing");
@@ -522,7 +522,7 @@ TEST(test_load_reads_a_file_and_names_it_in_errors) {
     unlink(path);
 }
 
-TEST(test_load_missing_directory_and_device_are_refused) {
+TEST(test_load_of_missing_file_directory_or_device_is_refused) {
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/nonexistent/gateway.conf"));
     TEST_ASSERT_NOT_NULL(strstr(messages, "/nonexistent/gateway.conf: cannot be opened (No such file or directory); "));
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/tmp"));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Values in the gateway's configuration file that would undo a safety rule: refused, with key, rule, value and what is permitted.
+// Values in the configuration file that would violate a safety rule are refused with key, rule, value and permitted
+// range.
 #include "config/gateway_config.h"
 
 #include "unit.h"
@@ -28,7 +29,7 @@ static void refused(const char *text, const char *where, const char *what) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, what), messages);
 }
 
-/// What is printed is accepted, and the same.
+/// Checks that the printed configuration is accepted and has the same values.
 static void assert_fixed_point(void) {
     const uint16_t rest_rpm = config.core.rest_rpm;
     char *text = NULL;
@@ -41,8 +42,8 @@ static void assert_fixed_point(void) {
     free(text);
 }
 
-/// A refusal names key, rule, the value that was written and what is permitted.
-TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule) {
+/// A refusal names the key, the rule, the written value and the permitted range.
+TEST(test_parse_value_against_a_rule_is_refused_with_the_rule) {
     static const struct {
         const char *line, *rule, *permitted;
     } rows[] = {
@@ -69,8 +70,9 @@ TEST(test_parse_value_that_undoes_a_rule_is_refused_with_the_rule) {
     }
 }
 
-/// Left out, it follows from radius and gear, wherever these stand in the file; given, it is judged by them.
-TEST(test_parse_rest_rpm_is_by_radius_and_gear) {
+/// Without a value rest_rpm follows from radius and gear, in any order of the keys. A given value is checked against
+/// them.
+TEST(test_parse_rest_rpm_depends_on_radius_and_gear) {
     accepted("[limits]\nrest_ms = 300\n[wheels]\nradius_mm = 60\n");
     TEST_ASSERT_EQUAL_UINT16(7, config.core.rest_rpm);
     accepted("[wheels]\nradius_mm = 400\n");
@@ -85,7 +87,7 @@ TEST(test_parse_rest_rpm_is_by_radius_and_gear) {
     refused("[wheels]\nradius_mm = 400\n[limits]\nrest_rpm = 2\n", "iw.conf:4: ", "write 0..1 rpm");
 }
 
-TEST(test_parse_second_contact_must_be_another_line_of_the_same_kind) {
+TEST(test_parse_second_contact_must_be_another_line_of_same_kind) {
     accepted("[estop]\nline = A\nline2 = B\n");
     accepted("[estop]\nline = unix:/a\nline2 = unix:/b\n");
     accepted("[estop]\nline = none\nline2 = none\n");

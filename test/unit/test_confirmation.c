@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The account of sent and echoed frames, beside a model, through every sequence of events.
+// Account of sent and echoed frames, compared with a model in every sequence of events.
 #include <string.h>
 
 #include "iwheel/codec.h"
@@ -30,7 +30,7 @@ static void echo_value(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
     iw_confirmation_echo(&account, side, &frame);
 }
 
-/// The same bytes every time.
+/// Sends the same bytes in every call.
 static void sent(iw_side_t side, iw_time_us_t now_us, bool accepted) {
     const iw_can_frame_t frame = setpoint(side, 0, 0);
     iw_confirmation_sent(&account, side, now_us, &frame, accepted);
@@ -44,12 +44,12 @@ static bool may_send(iw_side_t side, bool zero) {
     return ((iw_confirmation_may_send(&account, zero) >> side) & IW_SIDES_LEFT) != 0U;
 }
 
-/// One wheel as the header describes it. Times are those of the walk, from 1; 0: none.
+/// Model of one wheel as the header describes it. Times are steps of the walk, from 1; 0: none.
 typedef struct {
     unsigned pending;
     uint32_t sent[2];
-    uint32_t waiting; ///< An echo settles the refusals before it.
-    uint32_t proven;  ///< By an echo since the last clear.
+    uint32_t waiting; ///< An echo also ends the wait of earlier refused frames.
+    uint32_t proven;  ///< Time of the newest frame that an echo has confirmed since the last clear.
     uint32_t stray;
 } model_t;
 
@@ -84,7 +84,8 @@ static void model_clear(model_t *model) {
     model->proven = 0;
 }
 
-/// Does it to both. What may not be sent is not sent: that is the caller's contract.
+/// Applies the event to the account and the model. A frame that may not be sent is not sent: this is the contract of
+/// the caller.
 static void apply(iw_side_t side, event_t event, uint32_t now, model_t *models) {
     model_t *model = &models[side];
     const bool sends = event <= REFUSED;
@@ -105,7 +106,7 @@ static uint32_t earlier(uint32_t a, uint32_t b) {
     return (a == 0) ? b : (b == 0) ? a : (a < b) ? a : b;
 }
 
-/// The same to whoever looks from outside?
+/// Returns true if the account and the model give the same results to a caller.
 static bool agrees(const model_t *models, uint32_t now) {
     for (int zero = 0; zero <= 1; zero++) {
         const uint32_t left = model_may_send(&models[IW_LEFT], zero != 0) ? IW_SIDES_LEFT : IW_SIDES_NONE;
@@ -126,9 +127,10 @@ static bool agrees(const model_t *models, uint32_t now) {
 }
 
 static char path
-    [9]; ///< The events so far, for who reads of a failure: those of the left wheel from 0, those of the right one from 5.
+    [9]; ///< Events so far, for the message of a failure: events of the left wheel from 0, of the right wheel from 5.
 
-/// Every sequence of `length` events of these wheels, from the one of number `now` on. What begins alike is walked once; returns how many.
+/// Walks every sequence of `length` events of these wheels, from event number `now` on. A common prefix is walked once.
+/// Returns the number of sequences.
 static uint32_t walk(iw_side_t first, iw_side_t last, const model_t *before, uint32_t now, uint32_t length) {
     const iw_confirmation_t account_before = account;
     uint32_t walked = 0;
@@ -151,16 +153,16 @@ static uint32_t walk_all(iw_side_t first, iw_side_t last, uint32_t length) {
     return walk(first, last, nothing, 1, length);
 }
 
-TEST(test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model) {
+TEST(test_confirmation_every_8_events_of_one_wheel_match_model) {
     TEST_ASSERT_EQUAL_UINT32(390625, walk_all(IW_LEFT, IW_LEFT, 8));
     TEST_ASSERT_EQUAL_UINT32(390625, walk_all(IW_RIGHT, IW_RIGHT, 8));
 }
 
-TEST(test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model) {
+TEST(test_confirmation_every_6_events_of_both_wheels_match_model) {
     TEST_ASSERT_EQUAL_UINT32(1000000, walk_all(IW_LEFT, IW_RIGHT, 6));
 }
 
-TEST(test_init_owes_nothing) {
+TEST(test_confirmation_init_has_no_pending_frame) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
     TEST_ASSERT_TRUE(may_send(IW_RIGHT, false));
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
@@ -168,7 +170,7 @@ TEST(test_init_owes_nothing) {
     TEST_ASSERT_EQUAL_UINT32(0, account.stray);
 }
 
-TEST(test_may_send_zero_never_waits_for_an_echo) {
+TEST(test_may_send_allows_one_zero_after_an_unconfirmed_frame) {
     sent(IW_LEFT, 100, true);
     TEST_ASSERT_FALSE(may_send(IW_LEFT, false));
     TEST_ASSERT_TRUE(may_send(IW_LEFT, true));
@@ -187,7 +189,7 @@ TEST(test_waiting_refused_frame_waits_from_the_first_refusal) {
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
 }
 
-TEST(test_rest_ends_the_waiting_of_what_was_only_refused) {
+TEST(test_confirmation_rest_ends_the_wait_of_refused_frames) {
     sent(IW_LEFT, 1000, false);
     sent(IW_RIGHT, 1000, false);
     iw_confirmation_rest(&account);
@@ -195,7 +197,7 @@ TEST(test_rest_ends_the_waiting_of_what_was_only_refused) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
 }
 
-TEST(test_rest_forgets_nothing_that_was_handed_over) {
+TEST(test_confirmation_rest_retains_accepted_frames) {
     sent(IW_LEFT, 1000, false);
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 500, false);
@@ -210,7 +212,7 @@ TEST(test_rest_forgets_nothing_that_was_handed_over) {
     TEST_ASSERT_TRUE((iw_confirmation_proven_us(&account) >= 2000));
 }
 
-TEST(test_waiting_is_that_of_the_wheel_that_waits_longest) {
+TEST(test_waiting_is_the_longest_of_both_wheels) {
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 1000, true);
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
@@ -228,7 +230,7 @@ TEST(test_proven_since_needs_both_wheels) {
     TEST_ASSERT_FALSE((iw_confirmation_proven_us(&account) >= 5001));
 }
 
-TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer) {
+TEST(test_proven_since_echo_of_old_frame_does_not_prove_newer_one) {
     sent(IW_LEFT, 1000, true);
     sent(IW_LEFT, 9000, true);
     sent(IW_RIGHT, 9000, true);
@@ -250,7 +252,7 @@ TEST(test_echo_after_clear_is_stray_and_proves_nothing) {
     TEST_ASSERT_TRUE(may_send(IW_LEFT, false));
 }
 
-TEST(test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it) {
+TEST(test_echo_of_frame_before_clear_does_not_confirm_later_frame) {
     sent_value(IW_LEFT, 1000, 0, 2000);
     iw_confirmation_clear(&account);
     sent_value(IW_LEFT, 2000, 300, 2000);
@@ -274,7 +276,7 @@ TEST(test_echo_that_differs_in_one_byte_is_stray) {
     TEST_ASSERT_TRUE(may_send(IW_RIGHT, false));
 }
 
-TEST(test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo) {
+TEST(test_echo_of_setpoint_does_not_confirm_the_zero_after_it) {
     sent_value(IW_LEFT, 1000, 300, 2000);
     sent_value(IW_LEFT, 2000, 0, 2000);
     echo_value(IW_LEFT, 300, 2000);

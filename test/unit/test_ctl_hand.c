@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The sum of what wheels count under hands: a stall of ours is no gap of theirs.
+// Sum of the ticks of wheels that a person turns by hand: a stall of this program is not a gap of the wheels.
 #include "bringup/bringup.h"
 
 #include "unit.h"
 
 #include <math.h>
 
-#define RPM     100 // 100 ticks each second: a tick is a sixtieth of a turn.
+#define RPM     100 // 100 ticks per second: a tick is a sixtieth of a turn.
 #define LOOK_MS 20
 
 static hand_t hand;
@@ -19,7 +19,7 @@ void setUp(void) {
     hand_begin(&hand, &look, now_us);
 }
 
-/// The wheels turn for that time, the left one backwards; then an answer comes.
+/// The wheels turn for this time, the left one backwards; then an answer arrives.
 static void turn_until_an_answer(int ms) {
     now_us += ms * INT64_C(1000);
     look.rpm[IW_LEFT] = -RPM;
@@ -35,7 +35,7 @@ static void turn(int ms) {
     }
 }
 
-TEST(test_hand_adds_what_both_wheels_count) {
+TEST(test_hand_adds_the_ticks_of_both_wheels) {
     turn(3000);
     TEST_ASSERT_EQUAL_INT64(-300, hand.ticks[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT64(300, hand.ticks[IW_RIGHT]);
@@ -45,11 +45,11 @@ TEST(test_hand_adds_what_both_wheels_count) {
     TEST_ASSERT_INT_WITHIN(1, 100, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
 }
 
-/// What the machine under test did when it failed: it did not run for longer than the wheels may be offline.
-TEST(test_hand_stall_of_ours_loses_nothing) {
+/// Regression: the program did not run for longer than the wheels may be offline.
+TEST(test_hand_stall_of_the_program_loses_no_ticks) {
     turn(1000);
     turn_until_an_answer(HAND_OFFLINE_US / 1000 + 100);
-    look.heard = false; // What waited meanwhile has not been read yet.
+    look.heard = false; // Frames that waited meanwhile are not read yet.
     turn_until_an_answer(LOOK_MS);
     look.heard = true;
     turn(1000);
@@ -58,9 +58,9 @@ TEST(test_hand_stall_of_ours_loses_nothing) {
     TEST_ASSERT_EQUAL_INT64(-100 - 60 - 2 - 100 - 200, hand.ticks[IW_LEFT]);
 }
 
-TEST(test_hand_stall_of_ours_does_not_change_the_rpm) {
+TEST(test_hand_stall_of_the_program_does_not_change_the_rpm) {
     turn(2000);
-    now_us += 1000000; // It turned, and stands when the next answer comes.
+    now_us += 1000000; // The wheel turned, and is at standstill when the next answer arrives.
     look.ticks[IW_RIGHT] += RPM;
     look.rpm[IW_RIGHT] = 0;
     hand_add(&hand, &look, now_us);
@@ -75,13 +75,13 @@ TEST(test_hand_without_ticks_shows_no_rpm) {
     TEST_ASSERT_EQUAL_INT(0, lround(100.0 * hand_rpm_share(&hand, IW_RIGHT)));
 }
 
-TEST(test_hand_wheel_that_is_offline_is_a_gap) {
+TEST(test_hand_offline_wheel_is_a_gap) {
     turn(100);
     look.heard = false;
     turn(HAND_OFFLINE_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
     look.heard = true;
-    turn(100); // Moments do not add up.
+    turn(100); // Separate short gaps do not add up.
     look.heard = false;
     turn(HAND_OFFLINE_US / 1000);
     TEST_ASSERT_TRUE(hand_is_complete(&hand));
@@ -92,7 +92,7 @@ TEST(test_hand_wheel_that_is_offline_is_a_gap) {
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-TEST(test_hand_stall_while_a_wheel_is_offline_counts_little) {
+TEST(test_hand_stall_with_offline_wheel_counts_as_short_gap) {
     look.heard = false;
     turn_until_an_answer(1000);
     turn_until_an_answer(1000);
@@ -101,7 +101,7 @@ TEST(test_hand_stall_while_a_wheel_is_offline_counts_little) {
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);
 }
 
-TEST(test_hand_wheel_that_restarts_is_a_gap) {
+TEST(test_hand_restarted_wheel_is_a_gap) {
     turn(100);
     look.reboots = 1;
     turn(LOOK_MS);
@@ -110,14 +110,14 @@ TEST(test_hand_wheel_that_restarts_is_a_gap) {
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-TEST(test_hand_that_nobody_watched_is_a_gap) {
+TEST(test_hand_without_answers_for_too_long_is_a_gap) {
     turn(100);
     turn_until_an_answer(HAND_UNSEEN_US / 1000 + 1);
     TEST_ASSERT_EQUAL_INT(HAND_UNSEEN, hand.gap);
     TEST_ASSERT_FALSE(hand_is_complete(&hand));
 }
 
-TEST(test_hand_that_begins_offline_is_a_gap) {
+TEST(test_hand_begin_with_offline_wheel_is_a_gap) {
     look.heard = false;
     hand_begin(&hand, &look, now_us);
     TEST_ASSERT_EQUAL_INT(HAND_OFFLINE, hand.gap);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What `learn` counts in a recording, frame by frame: of the right wheel, at the right time, in the right direction.
+// `learn`: which frames of a recording count for which wheel, time and direction.
 #include "learn/learn_drives.h"
 
 #include "message.h"
@@ -58,7 +58,7 @@ void setUp(void) {
     learn_drives_init(&drives, &config);
 }
 
-TEST(test_learn_counts_each_wheel_for_itself) {
+TEST(test_learn_counts_each_wheel_separately) {
     setpoint(IW_RIGHT, 300, 500, CANDUMP_RECEIVED);
     speed(IW_RIGHT, 15);
     ticks(IW_LEFT, 7);
@@ -74,7 +74,7 @@ TEST(test_learn_counts_each_wheel_for_itself) {
     TEST_ASSERT_GREATER_THAN_INT32(learn.wheel[IW_RIGHT].force.high, learn.wheel[IW_RIGHT].force.low);
 }
 
-TEST(test_learn_keeps_currents_apart_by_the_direction_they_come_with) {
+TEST(test_learn_separates_currents_by_direction) {
     setpoint(IW_LEFT, 300, 500, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, -300, -700, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, 0, 20, CANDUMP_RECEIVED);
@@ -87,7 +87,7 @@ TEST(test_learn_keeps_currents_apart_by_the_direction_they_come_with) {
     TEST_ASSERT_EQUAL_INT32(20, left->current_at_rest_mA.high);
 }
 
-TEST(test_learn_counts_as_sent_only_what_is_marked_so) {
+TEST(test_learn_counts_only_marked_frames_as_sent) {
     setpoint(IW_LEFT, 0, 0, CANDUMP_SENT);
     setpoint(IW_LEFT, 0, 0, CANDUMP_RECEIVED);
     setpoint(IW_LEFT, 0, 0, CANDUMP_UNMARKED);
@@ -95,7 +95,7 @@ TEST(test_learn_counts_as_sent_only_what_is_marked_so) {
     TEST_ASSERT_EQUAL_UINT64(1, learn.setpoint[IW_LEFT].sent);
 }
 
-/// For so long, the left wheel is told that speed and shows that rpm, every 4 ms.
+/// Commands this speed to the left wheel for this time, every 4 ms; the wheel reports this rpm.
 static void drive(unsigned ms, int16_t speed_mm_s, int16_t rpm) {
     for (unsigned passed = 0; passed < ms; passed += 4U) {
         setpoint(IW_LEFT, speed_mm_s, 500, CANDUMP_RECEIVED);
@@ -104,7 +104,7 @@ static void drive(unsigned ms, int16_t speed_mm_s, int16_t rpm) {
     }
 }
 
-TEST(test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_sooner) {
+TEST(test_learn_judges_speed_after_one_second_of_setpoints) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     drive(996, 300, -15);
     TEST_ASSERT_EQUAL_INT64(0, left->forward.against_us);
@@ -117,7 +117,7 @@ TEST(test_learn_judges_a_speed_that_has_been_told_for_a_second_and_no_sooner) {
     TEST_ASSERT_EQUAL_INT64(8 * MS, left->steady_us);
 }
 
-TEST(test_learn_keeps_answers_apart_by_the_direction_that_was_told) {
+TEST(test_learn_separates_answers_by_commanded_direction) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     drive(996, 300, 15);
     drive(4, 300, -15);
@@ -132,7 +132,7 @@ TEST(test_learn_keeps_answers_apart_by_the_direction_that_was_told) {
     TEST_ASSERT_EQUAL_INT64(0, left->backward.still_us);
 }
 
-TEST(test_learn_judges_no_speed_that_is_no_longer_told) {
+TEST(test_learn_judges_no_speed_after_the_setpoints_end) {
     drive(1000, 300, 15);
     TEST_ASSERT_EQUAL_INT64(4 * MS, learn.wheel[IW_LEFT].forward.with_us);
     for (int64_t passed_us = 0; passed_us <= (int64_t)IW_WHEEL_WATCHDOG_US; passed_us += 4 * MS) {
@@ -143,11 +143,11 @@ TEST(test_learn_judges_no_speed_that_is_no_longer_told) {
     now_us += 4 * MS;
     speed(IW_LEFT, 15);
     TEST_ASSERT_EQUAL_INT64(judged_us, learn.wheel[IW_LEFT].forward.with_us);
-    drive(996, 300, -15); // The wheel had stopped: from the start.
+    drive(996, 300, -15); // The wheel had stopped: the second begins again.
     TEST_ASSERT_EQUAL_INT64(0, learn.wheel[IW_LEFT].forward.against_us);
 }
 
-/// For so long, the left wheel shows that rpm, every 10 ms.
+/// The left wheel reports this rpm for this time, every 10 ms.
 static void turn(unsigned ms, int16_t rpm) {
     for (unsigned passed = 0; passed < ms; passed += 10U) {
         now_us += 10 * MS;
@@ -155,7 +155,7 @@ static void turn(unsigned ms, int16_t rpm) {
     }
 }
 
-TEST(test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_only) {
+TEST(test_learn_uses_force_after_500_ms_at_standstill_only) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 0);
     turn(490, 0);
@@ -173,13 +173,13 @@ TEST(test_learn_takes_force_of_a_wheel_that_has_stood_for_half_a_second_only) {
     TEST_ASSERT_EQUAL_UINT64(1, left->rest_force_count);
 }
 
-TEST(test_learn_takes_no_force_of_a_wheel_that_was_not_heard) {
+TEST(test_learn_uses_no_force_after_a_gap_of_telemetry) {
     speed(IW_LEFT, 0);
     turn(500, 0);
     now_us += 100 * MS;
     force(IW_LEFT, 900);
     TEST_ASSERT_EQUAL_UINT64(0, learn.wheel[IW_LEFT].rest_force_count);
-    turn(500, 0); // Whether it stood in between, nobody knows.
+    turn(500, 0); // The wheel may have turned during the gap.
     force(IW_LEFT, 900);
     TEST_ASSERT_EQUAL_UINT64(0, learn.wheel[IW_LEFT].rest_force_count);
     turn(10, 0);
@@ -188,7 +188,7 @@ TEST(test_learn_takes_no_force_of_a_wheel_that_was_not_heard) {
     TEST_ASSERT_EQUAL_UINT64(3, learn.wheel[IW_LEFT].forces);
 }
 
-TEST(test_learn_turns_and_ticks_leave_out_gaps_and_reboots) {
+TEST(test_learn_turns_and_ticks_exclude_gaps_and_reboots) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 60);
     ticks(IW_LEFT, 1000);
@@ -196,13 +196,13 @@ TEST(test_learn_turns_and_ticks_leave_out_gaps_and_reboots) {
     ticks(IW_LEFT, 1050);
     TEST_ASSERT_EQUAL_UINT64(50, left->ticks);
     TEST_ASSERT_EQUAL_INT64(3000 * MS, left->turned_rpm_us);
-    now_us += 60000 * MS; // The recording stood still.
+    now_us += 60000 * MS; // Pause of the recording
     speed(IW_LEFT, 60);
     ticks(IW_LEFT, 1060);
     TEST_ASSERT_EQUAL_UINT64(50, left->ticks);
     TEST_ASSERT_EQUAL_INT64(3000 * MS, left->turned_rpm_us);
     turn(50, 60);
-    ticks(IW_LEFT, -500000); // It began anew.
+    ticks(IW_LEFT, -500000); // The wheel restarted.
     TEST_ASSERT_EQUAL_UINT64(50, left->ticks);
     TEST_ASSERT_EQUAL_INT64(3000 * MS, left->turned_rpm_us);
     turn(50, 60);
@@ -211,7 +211,7 @@ TEST(test_learn_turns_and_ticks_leave_out_gaps_and_reboots) {
     TEST_ASSERT_EQUAL_INT64(6000 * MS, left->turned_rpm_us);
 }
 
-TEST(test_learn_turns_and_ticks_leave_out_what_is_too_slow_or_turns_round) {
+TEST(test_learn_turns_and_ticks_exclude_slow_or_reversing_wheel) {
     const learn_wheel_t *left = &learn.wheel[IW_LEFT];
     speed(IW_LEFT, 60);
     ticks(IW_LEFT, 1000);
@@ -238,9 +238,9 @@ TEST(test_learn_pose_may_wrap) {
     TEST_ASSERT_GREATER_THAN_UINT64(100, learn.pose.way_little);
 }
 
-// How far a drive left its path -------------------------------------------------------------------------------------------
+// Deviation of a drive from its path ----------------------------------------------------------------------------------
 
-/// Both wheels are told that and show that, every 4 ms.
+/// Commands these speeds to both wheels and reports these rpm, every 4 ms.
 static void drive_both(unsigned ms, const int16_t commanded_mm_s[IW_SIDES], const int16_t rpm[IW_SIDES]) {
     for (unsigned passed = 0; passed < ms; passed += 4U) {
         setpoint(IW_LEFT, commanded_mm_s[IW_LEFT], 500, CANDUMP_RECEIVED);
@@ -252,10 +252,10 @@ static void drive_both(unsigned ms, const int16_t commanded_mm_s[IW_SIDES], cons
 }
 
 static const int16_t still[IW_SIDES] = {0, 0};
-static const int16_t straight[IW_SIDES] = {1005, 1005}; // 50 rpm.
+static const int16_t straight[IW_SIDES] = {1005, 1005}; // 50 rpm
 static const int16_t level[IW_SIDES] = {50, 50};
 
-TEST(test_learn_drive_that_keeps_its_path_has_no_deviation) {
+TEST(test_learn_drive_on_its_path_has_no_deviation) {
     drive_both(100, still, still);
     const int64_t begin_us = now_us;
     drive_both(2000, straight, level);
@@ -267,13 +267,14 @@ TEST(test_learn_drive_that_keeps_its_path_has_no_deviation) {
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[0].deviation_mm);
 }
 
-/// A fifth of the speed less, 4 % of it ordinary and 7/8 of an rpm: 142 mm/s too slow, for 0.3 s; of it some leaks.
-TEST(test_learn_deviation_is_the_one_by_which_the_gateway_judges) {
+/// A fifth of the speed is missing; 4 % of it and 7/8 of an rpm are tolerated: 142 mm/s too slow for 0.3 s, of which a
+/// part leaks.
+TEST(test_learn_deviation_equals_the_one_of_the_gateway) {
     drive_both(1000, straight, level);
     drive_both(300, straight, (const int16_t[IW_SIDES]){40, 50});
     TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm);
     drive_both(3000, straight, level);
-    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm); // The largest stays.
+    TEST_ASSERT_UINT32_WITHIN(3, 38, drives.drive[0].deviation_mm); // The largest value stays.
     TEST_ASSERT_EQUAL_UINT32(drives.drive[0].deviation_mm, drives.largest_mm);
 }
 
@@ -288,19 +289,19 @@ TEST(test_learn_each_drive_has_its_own_deviation) {
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[1].deviation_mm);
 }
 
-TEST(test_learn_half_a_second_at_zero_ends_no_drive_and_silence_does) {
+TEST(test_learn_drive_ends_with_silence_not_with_500_ms_at_zero) {
     drive_both(500, straight, level);
     drive_both(500, still, still);
     drive_both(500, straight, level);
     TEST_ASSERT_EQUAL_UINT32(1, drives.count);
-    now_us += 1100 * MS; // The wheels have stopped by themselves.
+    now_us += 1100 * MS; // The wheels have stopped on their own.
     drive_both(500, straight, level);
     TEST_ASSERT_EQUAL_UINT32(2, drives.count);
 }
 
-TEST(test_learn_nothing_is_compared_while_a_wheel_is_not_heard) {
+TEST(test_learn_compares_nothing_while_a_wheel_is_offline) {
     drive_both(1000, straight, level);
-    for (unsigned i = 0; i < 100U; i++) { // The left wheel stands, unheard.
+    for (unsigned i = 0; i < 100U; i++) { // The left wheel is at standstill and offline.
         setpoint(IW_LEFT, 1005, 500, CANDUMP_RECEIVED);
         setpoint(IW_RIGHT, 1005, 500, CANDUMP_RECEIVED);
         now_us += 4 * MS;
@@ -311,8 +312,8 @@ TEST(test_learn_nothing_is_compared_while_a_wheel_is_not_heard) {
     TEST_ASSERT_INT64_WITHIN(60 * MS, 1000 * MS, drives.drive[0].judged_us);
 }
 
-/// Both wheels 10 % slow: straight ahead that cancels out, unless one counts the other way.
-TEST(test_learn_mirrored_wheel_is_compared_as_it_is_mounted) {
+/// Both wheels are 10 % slow: straight ahead the errors cancel, unless one wheel counts in the other direction.
+TEST(test_learn_mirrored_wheel_is_compared_by_its_mount_sign) {
     const int16_t told[IW_SIDES] = {1005, -1005};
     const int16_t slow[IW_SIDES] = {45, -45};
     config.invert[IW_RIGHT] = true;
@@ -325,7 +326,7 @@ TEST(test_learn_mirrored_wheel_is_compared_as_it_is_mounted) {
     TEST_ASSERT_GREATER_THAN_UINT32(40, drives.largest_mm);
 }
 
-TEST(test_learn_of_more_drives_than_can_be_told_the_largest_counts) {
+TEST(test_learn_drives_beyond_the_list_count_for_the_largest) {
     for (unsigned i = 0; i < LEARN_DRIVES_MAX + 2U; i++) {
         drive_both(40, straight, level);
         now_us += 1100 * MS;
@@ -338,17 +339,17 @@ TEST(test_learn_of_more_drives_than_can_be_told_the_largest_counts) {
     TEST_ASSERT_LESS_THAN_UINT32(2, drives.drive[LEARN_DRIVES_MAX - 1U].deviation_mm);
 }
 
-// How far a wheel stays behind in time --------------------------------------------------------------------------------------
+// Lag of a wheel ------------------------------------------------------------------------------------------------------
 
-/// A wheel that follows with that lag, loses that many per mille of its speed, and shows whole rpm.
+/// Wheel that follows with this lag, loses this fraction of its speed, and reports whole rpm.
 typedef struct {
     double lag_ms;
     double droop;
     double speed_mm_s;
-    int32_t ramp_mm_s; ///< Its setpoint.
+    int32_t ramp_mm_s; ///< Its setpoint
 } model_t;
 
-/// So long towards that setpoint, by 1000 mm/s2 and every 20 ms.
+/// Follows towards this setpoint for this time, with 1000 mm/s2 and a setpoint every 20 ms.
 static void follow(model_t *wheel, unsigned ms, int16_t target_mm_s) {
     for (unsigned passed = 0; passed < ms; passed += 4U) {
         if (passed % 20U == 0U) {
@@ -375,7 +376,7 @@ static void assert_lag(double lag_ms, double droop) {
     TEST_ASSERT_INT_WITHIN(7, (int)lag_ms, (int)drives.lag[IW_LEFT].most_ms);
 }
 
-TEST(test_learn_lag_is_that_of_the_wheel_whatever_its_droop) {
+TEST(test_learn_lag_of_a_wheel_is_independent_of_its_droop) {
     assert_lag(30.0, 0.0);
     assert_lag(60.0, 0.04);
     assert_lag(120.0, 0.1);
@@ -388,18 +389,18 @@ static const learn_finding_t *lag_found(unsigned side, const char *item) {
     return learn_find(&findings, item, side);
 }
 
-TEST(test_learn_lag_speaks_against_what_the_gateway_assumes) {
+TEST(test_learn_lag_above_the_assumption_is_marked) {
     assert_lag(60.0, 0.0);
     TEST_ASSERT_EQUAL_CHAR('+', lag_found(IW_LEFT, "wheel_lag")->mark);
     assert_lag(120.0, 0.0);
     TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_LEFT, "wheel_lag")->mark);
     TEST_ASSERT_EQUAL_CHAR('?', lag_found(IW_RIGHT, "wheel_lag")->mark);
-    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // Not of one wheel alone.
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // One wheel alone gives no common value.
     drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
     TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
 }
 
-TEST(test_learn_lag_of_changes_that_differ_is_no_value) {
+TEST(test_learn_lag_of_differing_changes_has_no_value) {
     assert_lag(60.0, 0.0);
     drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
     drives.lag[IW_RIGHT].most_ms = 100.0;
@@ -407,11 +408,12 @@ TEST(test_learn_lag_of_changes_that_differ_is_no_value) {
     TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms"));
 }
 
-/// Small changes, a wheel that does not follow, a gap in its speed frames, no second of rest before: none of them counts.
-TEST(test_learn_lag_needs_a_change_from_steady_to_steady) {
+/// Not counted: small changes, a wheel that does not follow, a gap in its speed frames, less than a second of steady
+/// speed before the change.
+TEST(test_learn_lag_requires_steady_speed_before_and_after) {
     model_t wheel = {.lag_ms = 60.0};
     follow(&wheel, 900, 0);
-    follow(&wheel, 2500, 600); // Of 0.9 s it had the speed for 0.4.
+    follow(&wheel, 2500, 600); // Of 0.9 s the speed was steady for 0.4 s.
     TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);
     follow(&wheel, 2500, 400);
     TEST_ASSERT_EQUAL_UINT32(0, drives.lag[IW_LEFT].count);

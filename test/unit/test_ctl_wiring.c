@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What bringup stores of the e-stop's line, by a port that the test plays.
+// bringup: the stored wiring of the e-stop line, read from a port that the test plays.
 #include "bringup/bringup.h"
 
 #include "iwheel_linux/backend.h"
@@ -40,21 +40,21 @@ static void stored(const char *chip, const char *line, unsigned notes) {
     TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip2_line);
 }
 
-TEST(test_wiring_is_stored_with_a_note_for_each_name) {
+TEST(test_wiring_is_stored_with_one_note_per_name) {
     stored("pinctrl-bcm2711", "ESTOP", 2);
 }
 
-TEST(test_wiring_of_a_line_without_a_name_is_that_of_its_chip) {
+TEST(test_wiring_of_unnamed_line_stores_the_chip_only) {
     seen.line[0] = '\0';
     stored("pinctrl-bcm2711", "any", 1);
 }
 
-TEST(test_wiring_that_cannot_be_read_is_not_stored) {
+TEST(test_wiring_unreadable_is_not_stored) {
     error = ENOTSUP;
     stored("any", "any", 0);
 }
 
-TEST(test_wiring_that_a_configuration_cannot_hold_is_left_out) {
+TEST(test_wiring_name_invalid_in_configuration_is_not_stored) {
     strcpy(seen.chip, "a;b");
     stored("any", "ESTOP", 1);
 }
@@ -73,7 +73,7 @@ TEST(test_wiring_of_both_contacts_is_stored) {
     TEST_ASSERT_EQUAL_UINT(4, bringup.notes);
 }
 
-TEST(test_wiring_of_an_earlier_bringup_is_forgotten) {
+TEST(test_wiring_of_an_earlier_bringup_is_reset) {
     use_two_contacts();
     bringup_store_wiring(&bringup);
     bringup_forget_wiring(&bringup);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What every verb understands: durations, and words that are nearly right.
+// Durations and suggestions for mistyped words, as all verbs parse them.
 #include "config/similar.h"
 #include "text/duration.h"
 
@@ -22,7 +22,7 @@ TEST(test_duration_in_every_unit_with_decimals_is_read) {
     }
 }
 
-TEST(test_duration_that_is_none_is_refused_and_touches_nothing) {
+TEST(test_duration_invalid_is_refused_output_unchanged) {
     static const char *const cases[] = {"",        "2",    "s",        "2 s", "-1s",  "+1s", "1.s",
                                         "1.2345s", ".5s",  "1,5s",     "2m",  "2sec", "2S",  "1.5.2s",
                                         "1e3s",    "0x1s", "1234567s", "2s ", " 2s",  "infs"};
@@ -33,7 +33,7 @@ TEST(test_duration_that_is_none_is_refused_and_touches_nothing) {
     }
 }
 
-TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written) {
+TEST(test_duration_option_out_of_range_prints_the_range) {
     static const duration_range_t range = {20000, 600000000};
     char why[DURATION_WHY_SIZE];
     int64_t us = 77;
@@ -48,7 +48,7 @@ TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written) {
     TEST_ASSERT_EQUAL_INT64(20000, us);
 }
 
-TEST(test_duration_option_without_its_unit_is_told_as_it_should_be_written) {
+TEST(test_duration_option_without_unit_prints_the_correct_form) {
     static const duration_range_t range = {20000, 600000000};
     static const struct {
         const char *text;
@@ -77,7 +77,7 @@ TEST(test_duration_option_without_its_unit_is_told_as_it_should_be_written) {
     }
 }
 
-TEST(test_word_nearly_right_is_near_and_a_strange_one_is_not) {
+TEST(test_word_distance_is_small_only_for_similar_words) {
     TEST_ASSERT_EQUAL_size_t(0, settings_word_distance("stat", "status"));
     TEST_ASSERT_EQUAL_size_t(1, settings_word_distance("staus", "status"));
     TEST_ASSERT_EQUAL_size_t(2, settings_word_distance("hlep", "help"));

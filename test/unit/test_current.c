@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Current limits of a client: what becomes of each pair of them, and how fast they fall.
+// Current limits of a client: the applied pair of limits, and the slope at which limits fall.
 #include "iwheel/private/current.h"
 #include "unit.h"
 
@@ -14,7 +14,7 @@ static int32_t larger(int32_t a, int32_t b) {
     return (a > b) ? a : b;
 }
 
-/// Each pair of limits in steps of 50 mA against the words of the rule.
+/// Compares each pair of limits in steps of 50 mA with the rule.
 static void sweep(int32_t lowest, bool zero) {
     for (int32_t left = 0; left <= config.max_current_mA; left += 50) {
         for (int32_t right = 0; right <= config.max_current_mA; right += 50) {
@@ -24,24 +24,24 @@ static void sweep(int32_t lowest, bool zero) {
                                               larger(apart ? right : larger(left, right), lowest)};
             const bool limited = iw_current_limit(&config, limit, zero);
             TEST_ASSERT_EQUAL_INT32_ARRAY(wanted, limit, IW_SIDES);
-            TEST_ASSERT_EQUAL_INT32(-7, limit[IW_SIDES]); // No third wheel.
+            TEST_ASSERT_EQUAL_INT32(-7, limit[IW_SIDES]); // There is no third wheel.
             TEST_ASSERT_EQUAL_INT(wanted[IW_LEFT] != left || wanted[IW_RIGHT] != right, limited);
         }
     }
 }
 
-TEST(test_current_sides_get_the_larger_limit_and_the_floor) {
+TEST(test_current_limit_is_the_larger_side_and_at_least_the_floor) {
     sweep(300, false);
     config.min_current_mA = 1234;
     sweep(1234, false);
 }
 
-TEST(test_current_sides_may_differ_only_if_configured) {
+TEST(test_current_limits_of_sides_differ_only_if_configured) {
     config.asymmetric_current = true;
     sweep(300, false);
 }
 
-TEST(test_current_of_two_zero_speeds_is_the_maximum) {
+TEST(test_current_limit_at_two_zero_speeds_is_the_maximum) {
     config.max_current_mA = 1500;
     sweep(1500, true);
     config.asymmetric_current = true;
@@ -58,7 +58,7 @@ TEST(test_current_floor_is_never_above_the_maximum) {
     TEST_ASSERT_EQUAL_INT32(300, iw_current_floor(&config));
 }
 
-TEST(test_current_limit_falls_with_time_and_rises_without) {
+TEST(test_current_limit_falls_by_a_slope_and_rises_immediately) {
     static const struct {
         int16_t from, target;
         uint32_t elapsed_us;

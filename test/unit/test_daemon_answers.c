@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the daemon answers, notes in the black box and warns of, in virtual time.
+// Daemon: replies, entries of the black box and warnings, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -13,9 +13,9 @@ static uint64_t noted_so_far(void) {
     return blackbox_ring_written(daemon_rig.daemon->box.ring);
 }
 
-static blackbox_entry_t *found; ///< By `look`, and kept until the next.
+static blackbox_entry_t *found; ///< Result of the last `look`.
 
-/// What the black box holds from `*at` on; `*at` is the first of it then. How many.
+/// Copies the entries of the black box from `*at` on. Sets `*at` to the first of them. Returns their number.
 static size_t look(uint64_t *at) {
     const blackbox_ring_t *ring = daemon_rig.daemon->box.ring;
     size_t count = 0;
@@ -25,7 +25,7 @@ static size_t look(uint64_t *at) {
     return count;
 }
 
-/// The next entry of that kind in the black box, from `*at` on.
+/// Returns the next entry of this kind in the black box, from `*at` on.
 static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
     uint64_t first = *at;
     const size_t count = look(&first);
@@ -39,7 +39,7 @@ static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
     return (blackbox_entry_t){0};
 }
 
-TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it) {
+TEST(test_blackbox_request_has_client_and_result) {
     const iw_client_t id = daemon_rig.daemon->clients.client[0].id;
     uint64_t at = noted_so_far();
     daemon_rig_arm(client);
@@ -67,7 +67,7 @@ TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it) {
     TEST_ASSERT_EQUAL_UINT8(IW_TARE_OK, tare.b);
 }
 
-TEST(test_tare_tells_of_each_wheel_the_zero_it_had) {
+TEST(test_tare_reply_has_the_previous_offset_of_each_wheel) {
     iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     daemon_rig_run(3000);
     assert_reply("{\"cmd\":\"tare\"}", "\"ok\":true");
@@ -85,7 +85,7 @@ TEST(test_tare_tells_of_each_wheel_the_zero_it_had) {
     TEST_ASSERT_TRUE_MESSAGE(strstr(reply, left) < second, reply);
 }
 
-TEST(test_tare_of_one_wheel_tells_of_that_wheel) {
+TEST(test_tare_of_one_wheel_replies_with_its_offset) {
     static const char *const sides[] = {"left", "right"};
     iw_force_t *force = daemon_rig.daemon->wheels.core.force;
     char line[64];
@@ -103,16 +103,16 @@ TEST(test_tare_of_one_wheel_tells_of_that_wheel) {
     }
 }
 
-/// The daemon's own steps stand still: what a request does, and at which time, is its own doing.
+/// The daemon does not step: the action of a request and its time come from the request alone.
 static void carry_out(const char *line) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    daemon->wheels.now_us = daemon_rig.now_us - 5000U; // Of a cycle that has gone on for a while,
-    daemon->wheels.time_used = true;                   // and in which there was a request before.
+    daemon->wheels.now_us = daemon_rig.now_us - 5000U; // The cycle has already run for a while,
+    daemon->wheels.time_used = true;                   // and it has already served a request.
     daemon->wheels.requested = false;
     daemon->clients.handler.carry_out(daemon->clients.handler.context, &daemon->clients.client[0], line, strlen(line));
 }
 
-TEST(test_request_happens_when_it_is_carried_out_and_asks_for_a_step) {
+TEST(test_request_has_its_own_time_and_triggers_a_step) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     daemon_rig_arm(client);
     carry_out("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}");
@@ -137,7 +137,7 @@ TEST(test_request_happens_when_it_is_carried_out_and_asks_for_a_step) {
     TEST_ASSERT_TRUE(daemon->wheels.requested);
 }
 
-TEST(test_reset_that_waited_through_a_stop_is_refused) {
+TEST(test_reset_that_waited_during_a_stop_is_refused) {
     sock_client_t *own = &daemon_rig.daemon->clients.client[0];
     assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
     daemon_rig_run(2000);
@@ -149,7 +149,7 @@ TEST(test_reset_that_waited_through_a_stop_is_refused) {
     TEST_ASSERT_TRUE(daemon_rig_state() != IW_STATE_LATCHED);
 }
 
-TEST(test_change_of_state_is_noted_with_what_each_wheel_was_told) {
+TEST(test_blackbox_state_has_the_setpoint_of_each_wheel) {
     daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
@@ -166,7 +166,7 @@ TEST(test_change_of_state_is_noted_with_what_each_wheel_was_told) {
     TEST_ASSERT_EQUAL_INT(900, state.as.drive.current_mA[IW_RIGHT]);
 }
 
-TEST(test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on) {
+TEST(test_blackbox_assumption_has_state_of_restored_item) {
     const iw_assumption_entry_t known = {IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
     uint64_t at = noted_so_far();
     gw_wheels_set_assumption(&daemon_rig.daemon->wheels, IW_ASSUMPTION_TRACK, &known);
@@ -175,8 +175,8 @@ TEST(test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on) {
     TEST_ASSERT_EQUAL_UINT8(IW_CONFIRMED, entry.b);
 }
 
-/// At rest: a step with frames is noted by them, and they have its time.
-TEST(test_frames_are_noted_at_the_time_of_the_step_that_took_them) {
+/// At standstill the frames of a step stand for the step and have its time.
+TEST(test_blackbox_frames_have_the_time_of_their_step) {
     unsigned frames = 0;
     for (unsigned ms = 0; ms < 100U; ms++) {
         const iw_time_us_t begin_us = daemon_rig.now_us;
@@ -193,7 +193,7 @@ TEST(test_frames_are_noted_at_the_time_of_the_step_that_took_them) {
     TEST_ASSERT_GREATER_THAN_UINT(20U, frames);
 }
 
-TEST(test_reply_to_each_request_is_whole) {
+TEST(test_reply_to_each_request_has_its_members) {
     static const char *const replies[][2] = {
         {"{\"cmd\":\"watch\",\"topics\":[\"stop\",\"bus\"],\"rate_hz\":7}",
          "\"topics\":[\"bus\",\"stop\"],\"rate_hz\":7,\"limited\":false"},
@@ -209,7 +209,7 @@ TEST(test_reply_to_each_request_is_whole) {
     }
 }
 
-TEST(test_status_tells_of_each_wheel_its_own_zero) {
+TEST(test_status_has_the_offset_samples_of_each_wheel) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     daemon->assumptions.known.offset[IW_LEFT].samples = 11;
     daemon->assumptions.known.offset[IW_RIGHT].samples = 22;
@@ -223,7 +223,7 @@ TEST(test_arm_is_answered_once) {
     char text[8192];
     unsigned answers = 0;
     daemon_rig_run(10);
-    while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Of before.
+    while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Bytes of before
     }
     static const char line[] = "{\"cmd\":\"arm\"}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
@@ -237,15 +237,15 @@ TEST(test_arm_is_answered_once) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1U, answers, text);
 }
 
-TEST(test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_the_reason) {
+TEST(test_twist_with_contradicted_track_is_denied_with_the_reason) {
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"900\"}", "\"state\":\"contradicted\"");
     daemon_rig_arm(client);
     assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":100}", "\"error\":\"denied\",\"message\":\"track");
     assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":0}", "\"ok\":true");
 }
 
-/// Answers of the port that have changed, told again and again: they are news once.
-TEST(test_facts_of_the_bus_are_taken_once_for_each_change) {
+/// The port reports its changed state repeatedly: only the first report counts.
+TEST(test_bus_facts_are_recorded_once_per_change) {
     daemon_rig.link.changes++;
     daemon_rig_run(20);
     uint64_t at = noted_so_far();
@@ -259,10 +259,10 @@ TEST(test_facts_of_the_bus_are_taken_once_for_each_change) {
     for (size_t i = 0; i < count; i++) {
         facts += (found[i].kind == BLACKBOX_FACTS) ? 1U : 0U;
     }
-    TEST_ASSERT_LESS_OR_EQUAL_UINT(1U, facts); // And once a second.
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(1U, facts); // One entry per second is normal.
 }
 
-TEST(test_purge_by_the_port_is_told_once_in_the_log) {
+TEST(test_purge_by_the_port_is_logged_once) {
     static const char *const words[] = {[IWL_LINK_PURGE_DONE] = "taken down and up again",
                                         [IWL_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
                                         [IWL_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
@@ -278,7 +278,7 @@ TEST(test_purge_by_the_port_is_told_once_in_the_log) {
     }
 }
 
-TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link) {
+TEST(test_warnings_contain_left_setpoint_and_wrong_bitrate_once) {
     daemon_rig.link =
         (iwl_bus_link_t){.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
     daemon_rig.daemon->answers.server.told.left_behind = true;
@@ -292,7 +292,7 @@ TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_th
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "500000 bit/s"), warnings);
 }
 
-/// The log names the contact too.
+/// Checks the contacts in the status and in the log.
 static void expect_contacts(int first, int second, const char *status, const char *told) {
     daemon_rig.estop = first;
     daemon_rig.estop2 = second;
@@ -302,7 +302,7 @@ static void expect_contacts(int first, int second, const char *status, const cha
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), told), daemon_rig_log());
 }
 
-TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree) {
+TEST(test_estop_two_contacts_status_names_pressed_and_disagreeing) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     TEST_ASSERT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "pressed_at"));
     wheels->hal.two_contacts = true;
@@ -328,7 +328,7 @@ TEST(test_estop_of_two_contacts_says_which_is_pressed_and_that_they_disagree) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
 }
 
-TEST(test_refusal_names_the_contact_that_is_meant) {
+TEST(test_refusal_names_the_affected_contact) {
     static const struct {
         int first;
         int second;
@@ -349,14 +349,14 @@ TEST(test_refusal_names_the_contact_that_is_meant) {
         const char *reply = daemon_rig_ask(client, "{\"cmd\":\"reset\"}");
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, cases[i].said), reply);
     }
-    wheels->hal.two_contacts = false; // What the second said last is worth nothing then.
+    wheels->hal.two_contacts = false; // The last state of the second contact must not count.
     TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
     daemon_rig.estop2 = -1;
     wheels->hal.contact_last[1] = -1;
     TEST_ASSERT_EQUAL_STRING("FIRST", gw_wheels_estop(wheels));
 }
 
-TEST(test_warning_that_goes_on_is_said_once) {
+TEST(test_warning_that_persists_is_listed_once) {
     static iwl_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
     none.present = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
+// State of an earlier run compared with this run: in the loop of the daemon, with a file process that the test plays.
 #include "answers/answers.h"
 #include "daemon_rig.h"
 #include "inspect/assumption.h"
@@ -18,7 +18,7 @@ static char text[GW_ASSUMPTIONS_FILE_SIZE];
 static size_t length;
 static unsigned writes;
 static bool set_aside;
-static char status_before[SOCK_REPLY_MAX]; ///< The last status that was looked at.
+static char status_before[SOCK_REPLY_MAX]; ///< Last status that was compared
 
 int gw_file_store_open(gw_file_store_t *self, const char *directory, const char *name) {
     (void)directory;
@@ -63,10 +63,10 @@ static const iw_assumption_entry_t *entry(iw_assumption_item_t item) {
     return iw_assumption_entry(&daemon_rig.daemon->wheels.core.assumptions, item);
 }
 
-/// A finding of an earlier run for what is configured now.
+/// Stores a finding of an earlier run for the configured value.
 static void store(iw_assumption_item_t item, iw_assumption_state_t state, iw_source_t source) {
     gw_stored_item_t *known = &stored.item[item];
-    const bool measured = source == IW_SOURCE_BUS; // The operator's word has no figure.
+    const bool measured = source == IW_SOURCE_BUS; // A confirmation by the operator has no figure.
     known->entry = (iw_assumption_entry_t){.state = state, .source = source, .figure = measured ? 1000 : 0};
     known->since_wall_us = 1700000000000000;
     inspect_assumption_value(&daemon_rig.daemon->assumptions.configured, item, known->value);
@@ -82,7 +82,7 @@ static void observe(void) {
     gw_assumptions_observe(&daemon_rig.daemon->assumptions, &seen);
 }
 
-/// The keeper tells it, as soon as the loop runs.
+/// The file process sends the text as soon as the loop runs.
 static void tell_stored(void) {
     length = gw_assumptions_file_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
     news = GW_FILE_STORE_READ;
@@ -108,28 +108,28 @@ void tearDown(void) {
     daemon_rig_end();
 }
 
-TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for) {
+TEST(test_stored_finding_for_the_configured_value_is_applied) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_BUS);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
     TEST_ASSERT_EQUAL_INT(IW_SOURCE_BUS, entry(IW_ASSUMPTION_GEAR_RATIO)->source);
 }
 
-TEST(test_memory_finding_for_another_value_is_forgotten) {
+TEST(test_stored_finding_for_another_value_is_dropped) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     (void)strcpy(stored.item[IW_ASSUMPTION_GEAR_RATIO].value, "7");
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, entry(IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
-TEST(test_memory_contradiction_stays_one) {
+TEST(test_stored_contradiction_denies_arm) {
     store(IW_ASSUMPTION_SETPOINT_TYPE, IW_CONTRADICTED, IW_SOURCE_OPERATOR);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry(IW_ASSUMPTION_SETPOINT_TYPE)->state);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
 }
 
-TEST(test_memory_contradiction_of_this_run_is_not_talked_over) {
+TEST(test_stored_confirmation_does_not_lift_a_contradiction) {
     store(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED, IW_SOURCE_OPERATOR);
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_BUS,
                              3000);
@@ -147,7 +147,7 @@ static bool is_warned_of(const char *what) {
     return false;
 }
 
-TEST(test_memory_button_that_was_tried_before_is_not_warned_of) {
+TEST(test_stored_button_proof_removes_the_warning) {
     const gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     tell_stored();
     daemon_rig_run(50);
@@ -168,8 +168,9 @@ static const iwl_estop_seen_t *see_line(const void *self) {
     return &line;
 }
 
-/// The file may come after the first look: what it says is compared with the wiring all the same, and is not newer than what was seen.
-TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file) {
+/// The file may arrive after the first poll of the button: it is compared with the wiring anyway, and does not replace
+/// a newer proof.
+TEST(test_stored_button_proof_of_another_wiring_is_void) {
     static iwl_estop_ops_t ops;
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     ops = *wheels->hal.estop_ops;
@@ -190,8 +191,8 @@ TEST(test_memory_button_of_another_wiring_is_void_however_late_the_file) {
     TEST_ASSERT_EQUAL_INT64(1700000000000000, wheels->estop_tried_us);
 }
 
-/// A battery beyond its threshold is told and warned of, and stops nothing.
-TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop) {
+/// A battery below its threshold causes a report and a warning, but no stop.
+TEST(test_battery_below_threshold_is_a_fault_and_no_stop) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     wheels->health.limits.battery_low_dV = 254;
     daemon_rig_begin_driving(client);
@@ -210,7 +211,7 @@ TEST(test_battery_below_its_threshold_is_a_fault_and_no_stop) {
     TEST_ASSERT_FALSE(is_warned_of("the right wheel's battery has "));
 }
 
-TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only) {
+TEST(test_stored_offset_is_restored_for_the_same_side_and_unit) {
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
     tell_stored();
@@ -220,7 +221,7 @@ TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only) {
     TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
 }
 
-TEST(test_memory_offset_of_an_earlier_run_keeps_its_time) {
+TEST(test_stored_offset_retains_its_time) {
     store_offset(IW_LEFT, IW_FORCE_CN, 4321);
     tell_stored();
     daemon_rig_run(3000);
@@ -229,7 +230,7 @@ TEST(test_memory_offset_of_an_earlier_run_keeps_its_time) {
     TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
 }
 
-TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel) {
+TEST(test_tare_is_stored_with_the_figures_of_its_wheel) {
     daemon_rig_run(3000);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
     const gw_stored_t *known = &daemon_rig.daemon->assumptions.known;
@@ -240,7 +241,7 @@ TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel) {
     TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, known->offset[IW_LEFT].from);
 }
 
-TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second) {
+TEST(test_store_is_written_at_most_once_a_second) {
     daemon_rig.daemon->assumptions.write_us = 0;
     daemon_rig_run(3000);
     const unsigned before = writes;
@@ -251,7 +252,7 @@ TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than
     TEST_ASSERT_UINT_WITHIN(1, 3, writes - before);
 }
 
-// The bytes of the ledger that a status keeps ---------------------------------------------------------------------------------
+// Stored bytes of the assumptions in a status -------------------------------------------------------------------------
 
 static gw_assumptions_written_t *written(void) {
     return &daemon_rig.daemon->assumptions.written;
@@ -269,7 +270,7 @@ static const char *write_status(char out_line[SOCK_REPLY_MAX]) {
     return out_line;
 }
 
-/// The next status is what it would be had nothing been kept. It differs from the one before, or the change was none.
+/// Checks that the next status equals one without stored bytes, and that it differs from the previous one.
 static void expect_new_status(const char *changed) {
     static char next[SOCK_REPLY_MAX];
     static char anew[SOCK_REPLY_MAX];
@@ -282,13 +283,13 @@ static void expect_new_status(const char *changed) {
     memcpy(status_before, next, sizeof status_before);
 }
 
-/// From "nobody knows" through all that may become of it.
+/// Changes an item from its initial state through all states.
 static void change_item(iw_assumption_item_t item) {
     iw_assumption_store_t *assumptions = &daemon_rig.daemon->wheels.core.assumptions;
     gw_stored_item_t *known = &daemon_rig.daemon->assumptions.known.item[item];
     const inspect_word_t word = {"", "a tape"};
     iwn_refusal_t refusal;
-    *known = (gw_stored_item_t){0}; // Some were settled by the first frames.
+    *known = (gw_stored_item_t){0}; // The first frames may have settled some items.
     assumptions->entry[item] = (iw_assumption_entry_t){0};
     iw_assumption_confirm(assumptions, item, IW_SOURCE_BUS, 1000);
     expect_new_status("confirmed by the bus");
@@ -312,7 +313,7 @@ static void change_item(iw_assumption_item_t item) {
     expect_new_status("as if it had never been asked");
 }
 
-TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before) {
+TEST(test_store_failed_write_is_repeated_after_the_retry_time) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     assumptions->write_us = 0;
     daemon_rig_run(3000);
@@ -330,7 +331,7 @@ TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_n
     TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
 }
 
-TEST(test_memory_whose_process_has_gone_says_so) {
+TEST(test_store_without_process_reports_failure) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     assumptions->store.waits = true;
     news = GW_FILE_STORE_GONE;
@@ -340,7 +341,7 @@ TEST(test_memory_whose_process_has_gone_says_so) {
     TEST_ASSERT_EQUAL_INT(ECHILD, assumptions->error);
 }
 
-TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent) {
+TEST(test_store_contains_the_offset_that_a_wheel_sent) {
     iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
     force->provenance = IW_OFFSET_WHEEL;
     force->offset_us = daemon_rig.now_us;
@@ -351,7 +352,7 @@ TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent) {
     TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
 }
 
-TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus) {
+TEST(test_store_drops_the_operators_value_after_a_bus_finding) {
     gw_assumptions_t *assumptions = &daemon_rig.daemon->assumptions;
     const iw_assumption_item_t item = IW_ASSUMPTION_GEAR_RATIO;
     (void)snprintf(assumptions->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
@@ -365,13 +366,13 @@ TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus) {
     TEST_ASSERT_EQUAL_STRING("", assumptions->known.item[item].word.found);
 }
 
-TEST(test_status_after_a_change_of_an_item_is_as_written_anew) {
+TEST(test_status_after_change_of_an_item_is_current) {
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         change_item((iw_assumption_item_t)item);
     }
 }
 
-TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew) {
+TEST(test_status_after_change_of_the_configuration_is_current) {
     iw_config_t *core = &daemon_rig.daemon->config.core;
     core->setpoint_type++;
     expect_new_status("setpoint_type");
@@ -397,7 +398,7 @@ TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew) {
     }
 }
 
-TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew) {
+TEST(test_status_after_tare_or_restored_file_is_current) {
     daemon_rig_run(3000);
     expect_new_status("three seconds later");
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
@@ -409,22 +410,21 @@ TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew) {
     TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
 }
 
-TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept) {
+TEST(test_status_without_change_reuses_the_stored_bytes) {
     static char next[SOCK_REPLY_MAX];
     (void)write_status(next);
-    char *const kept = (char *)memchr(written()->text, 's', written()->length); // Of "setpoint_type".
+    char *const kept = (char *)memchr(written()->text, 's', written()->length); // First letter of "setpoint_type"
     TEST_ASSERT_NOT_NULL(kept);
     *kept = 'S';
     TEST_ASSERT_NOT_NULL(strstr(write_status(next), "\"ledger\":{\"Setpoint_type\""));
 }
 
-TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time) {
+TEST(test_status_with_too_long_assumptions_stores_no_bytes) {
     static char first[SOCK_REPLY_MAX];
     static char again[SOCK_REPLY_MAX];
     (void)write_status(first);
     TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
-    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS;
-         item++) { // What moves a terminal is escaped: six bytes for one.
+    for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) { // Control characters are escaped: six bytes for one.
         gw_stored_item_t *known = &daemon_rig.daemon->assumptions.known.item[item];
         known->entry = (iw_assumption_entry_t){IW_CONFIRMED, IW_SOURCE_OPERATOR, 0};
         memset(known->word.how, 0x7F, sizeof known->word.how - 1U);
@@ -436,7 +436,7 @@ TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time) {
     TEST_ASSERT_EQUAL_STRING(first, write_status(again));
 }
 
-TEST(test_status_that_does_not_fit_keeps_nothing) {
+TEST(test_status_that_overflows_stores_no_bytes) {
     char line[64];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
@@ -447,7 +447,7 @@ TEST(test_status_that_does_not_fit_keeps_nothing) {
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }
 
-TEST(test_memory_watches_the_button_of_the_configured_line) {
+TEST(test_button_uses_the_configured_lines) {
     const gateway_config_t *config = &daemon_rig.daemon->config;
     TEST_ASSERT_EQUAL_STRING(config->estop.line, daemon_rig.daemon->assumptions.button.contact[0].line);
     TEST_ASSERT_EQUAL_STRING(config->estop.line2, daemon_rig.daemon->assumptions.button.contact[1].line);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// after_stop = hold through the daemon, in virtual time: zeros, the crash marker, the request that ends it, the end of the process.
+// after_stop = hold through the daemon, in virtual time: zeros, crash marker, the request that ends the hold, end of
+// the process.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -58,7 +59,7 @@ static const char *aged_release(int64_t age_ms) {
     return line;
 }
 
-TEST(test_hold_lasts_until_release_and_so_does_its_marker) {
+TEST(test_hold_and_its_marker_last_until_release) {
     drive_and_stop();
     assert_held(IW_STATE_STOPPING, 120000);
     assert_reply("{\"cmd\":\"status\"}", "\"zeros hold the wheels until release (iwheelctl release) or arm;");
@@ -66,7 +67,7 @@ TEST(test_hold_lasts_until_release_and_so_does_its_marker) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-TEST(test_hold_of_a_latch_outlives_its_reset) {
+TEST(test_hold_of_a_latch_continues_after_reset) {
     begin_again();
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
@@ -92,7 +93,7 @@ TEST(test_hold_is_resumed_by_the_next_start) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-TEST(test_hold_ends_with_the_process_which_warns) {
+TEST(test_hold_ends_with_the_process_after_a_warning) {
     drive_and_stop();
     daemon_rig_keep_log();
     TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
@@ -102,7 +103,7 @@ TEST(test_hold_ends_with_the_process_which_warns) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-TEST(test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns) {
+TEST(test_hold_before_its_begin_ends_with_a_warning) {
     for (unsigned crashed = 0; crashed < 2U; crashed++) {
         if (crashed != 0U) {
             drive_and_stop();
@@ -124,7 +125,7 @@ TEST(test_hold_that_has_not_begun_yet_ends_with_the_process_which_warns) {
     }
 }
 
-TEST(test_process_that_sends_nothing_ends_without_a_warning) {
+TEST(test_process_without_setpoints_ends_without_a_warning) {
     daemon_rig_keep_log();
     TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
     daemon_rig_run(200);
@@ -132,7 +133,7 @@ TEST(test_process_that_sends_nothing_ends_without_a_warning) {
     TEST_ASSERT_NULL(strstr(daemon_rig_log(), "use its parking brake"));
 }
 
-TEST(test_release_that_is_too_old_changes_nothing) {
+TEST(test_release_too_old_changes_nothing) {
     static const int64_t late_ms[] = {1001, 1100, 60000};
     drive_and_stop();
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
@@ -143,7 +144,7 @@ TEST(test_release_that_is_too_old_changes_nothing) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing) {
+TEST(test_release_older_than_a_stop_of_another_changes_nothing) {
     drive_and_stop();
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
@@ -154,7 +155,7 @@ TEST(test_release_from_before_a_stop_of_somebody_else_changes_nothing) {
     (void)close(other);
 }
 
-TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives) {
+TEST(test_release_by_watcher_or_while_driving_is_refused) {
     drive_and_stop();
     const int watcher = daemon_rig_connect_with(SOCK_WATCH);
     daemon_rig_run(20);
@@ -167,7 +168,7 @@ TEST(test_release_is_refused_to_who_only_watches_and_while_somebody_drives) {
     (void)close(watcher);
 }
 
-TEST(test_release_in_the_ramp_is_told_to_wait_for_its_end) {
+TEST(test_release_during_the_ramp_is_refused) {
     drive_and_stop();
     daemon_rig_arm(client);
     (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");

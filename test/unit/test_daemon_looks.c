@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What wakes the daemon's loop, and what it looks at before anything leaves, in virtual time.
+// Daemon: what wakes the loop, and what it polls before a setpoint is sent, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -8,12 +8,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// Sent, and not read yet.
+/// Sends a line that the daemon has not read yet.
 static void say(const char *line) {
     TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
 }
 
-/// Driving, and well between two pairs, so that nothing but what is said next is due.
+/// Starts driving and stops between two pairs, so that only the next request is due.
 static void begin_driving_between_pairs(void) {
     daemon_rig_begin_driving(client);
     while (daemon_rig.now_us - daemon_rig.sent_us != MS(8)) {
@@ -24,7 +24,7 @@ static void begin_driving_between_pairs(void) {
 
 #define SLOWER "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n"
 
-TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves) {
+TEST(test_estop_pressed_before_wake_latches_before_next_setpoint) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -41,7 +41,7 @@ TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_l
     }
 }
 
-TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves) {
+TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
     begin_driving_between_pairs();
     daemon_rig.estop_late = true;
     say(SLOWER);
@@ -52,7 +52,7 @@ TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_lea
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
 }
 
-TEST(test_command_of_who_drives_leaves_after_one_look) {
+TEST(test_command_of_the_holder_is_sent_after_one_poll) {
     begin_driving_between_pairs();
     const uint32_t looks = daemon_rig.looks;
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
@@ -63,7 +63,7 @@ TEST(test_command_of_who_drives_leaves_after_one_look) {
     TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
 }
 
-TEST(test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read) {
+TEST(test_wait_reads_the_clock_only_while_setpoints_are_sent) {
     daemon_rig_run(100);
     TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
     daemon_rig_begin_driving(client);
@@ -75,7 +75,7 @@ TEST(test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_r
     TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
 }
 
-TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next) {
+TEST(test_poll_is_not_just_before_a_setpoint_and_within_3_ms) {
     begin_driving_between_pairs();
     for (unsigned ms = 0; ms < 150U; ms++) {
         const uint32_t sent = daemon_rig.sent[IW_LEFT];
@@ -85,7 +85,7 @@ TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next) {
     }
 }
 
-/// Taken for what it is: sent before the stop that it now comes behind.
+/// Checks that the command is refused because it was sent before the stop.
 static void assert_refused_behind_a_stop(void) {
     char reply[4096] = "";
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
@@ -95,7 +95,7 @@ static void assert_refused_behind_a_stop(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
 }
 
-TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop) {
+TEST(test_command_that_waited_during_a_stall_is_refused) {
     begin_driving_between_pairs();
     say(SLOWER);
     daemon_rig.stolen_us = 150000U;
@@ -109,7 +109,7 @@ TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_sto
     assert_refused_behind_a_stop();
 }
 
-TEST(test_command_that_comes_with_the_estop_is_refused) {
+TEST(test_command_together_with_the_estop_is_refused) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
     const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
@@ -124,19 +124,19 @@ static uint32_t waits_in_a_second(void) {
     return daemon_rig.waits;
 }
 
-TEST(test_frames_that_nobody_watches_are_taken_together) {
+TEST(test_frames_without_watcher_are_read_in_groups) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
     (void)close(client);
     client = -1;
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
 }
 
-TEST(test_frames_that_somebody_watches_are_taken_one_by_one) {
+TEST(test_frames_with_watcher_are_read_one_by_one) {
     (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
     TEST_ASSERT_GREATER_THAN_UINT32(450, waits_in_a_second());
 }
 
-TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop) {
+TEST(test_frames_are_read_in_groups_if_armed_singly_in_a_stop) {
     daemon_rig_begin_driving(client);
     daemon_rig.waits = 0;
     daemon_rig_run(190);
@@ -149,7 +149,7 @@ TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop) {
     TEST_ASSERT_GREATER_THAN_UINT32(450, daemon_rig.waits);
 }
 
-TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait) {
+TEST(test_foreign_setpoint_latches_within_4_ms_while_frames_wait) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -166,7 +166,7 @@ TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wa
     }
 }
 
-TEST(test_estop_wakes_a_loop_that_lets_frames_wait) {
+TEST(test_estop_wakes_the_loop_while_frames_wait) {
     (void)close(client);
     client = -1;
     daemon_rig_run(100);

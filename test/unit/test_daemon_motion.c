@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The daemon's loop in motion, in virtual time: the crash marker, the e-stop, the clocks, the lease, the end.
+// Loop of the daemon in motion, in virtual time: crash marker, e-stop, clocks, lease, end of the process.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -22,7 +22,8 @@ static bool is_cause(const char *name) {
     return strncmp(is, name, strlen(name)) == 0 && is[strlen(name)] == '"';
 }
 
-/// Killed now and started again: zeros and nothing else, at once, for as long as the wheels might keep their last command.
+/// Kills the gateway and starts it again: it must send zeros immediately, and nothing else, as long as the wheels may
+/// retain their last setpoint.
 static void assert_next_start_sends_zeros(void) {
     daemon_rig_crash();
     const uint32_t before = daemon_rig.sent[IW_LEFT];
@@ -39,7 +40,7 @@ static void assert_next_start_sends_zeros(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last) {
+TEST(test_marker_exists_from_first_to_last_nonzero_setpoint) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
     daemon_rig_begin_driving(client);
     (void)close(client);
@@ -52,7 +53,7 @@ TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_
     TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
 }
 
-TEST(test_killed_before_anything_was_sent_the_next_start_sends_nothing) {
+TEST(test_killed_before_any_setpoint_next_start_sends_nothing) {
     daemon_rig.full = true;
     (void)daemon_rig_ask(client, "{\"cmd\":\"arm\"}");
     TEST_ASSERT_FALSE(daemon_rig_marked());
@@ -64,10 +65,10 @@ TEST(test_killed_before_anything_was_sent_the_next_start_sends_nothing) {
     TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_LEFT]);
 }
 
-TEST(test_marker_that_could_not_be_set_is_tried_again) {
+TEST(test_marker_that_cannot_be_set_is_tried_again) {
     char path[128];
     (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
-    TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
+    TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // A directory can neither be opened for writing nor unlinked.
     daemon_rig_begin_driving(client);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->loop.mark_us,
                                                 "not in each cycle");
@@ -85,7 +86,7 @@ TEST(test_marker_that_could_not_be_set_is_tried_again) {
     TEST_ASSERT_TRUE(daemon_rig_marked());
 }
 
-TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held) {
+TEST(test_marker_of_a_latch_remains_until_the_zeros_end) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop = 1;
     daemon_rig_run(1000);
@@ -96,12 +97,12 @@ TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held) {
     TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
 }
 
-TEST(test_killed_while_armed_the_next_start_sends_zeros) {
+TEST(test_killed_while_armed_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     assert_next_start_sends_zeros();
 }
 
-TEST(test_killed_in_the_ramp_the_next_start_sends_zeros) {
+TEST(test_killed_in_the_ramp_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(60);
@@ -109,7 +110,7 @@ TEST(test_killed_in_the_ramp_the_next_start_sends_zeros) {
     assert_next_start_sends_zeros();
 }
 
-TEST(test_killed_in_the_hold_the_next_start_sends_zeros) {
+TEST(test_killed_in_the_hold_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(1000);
@@ -118,7 +119,7 @@ TEST(test_killed_in_the_hold_the_next_start_sends_zeros) {
     assert_next_start_sends_zeros();
 }
 
-TEST(test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew) {
+TEST(test_killed_in_zeros_of_restart_next_start_sends_zeros) {
     daemon_rig_begin_driving(client);
     daemon_rig_crash();
     daemon_rig_start();
@@ -126,7 +127,7 @@ TEST(test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew) {
     assert_next_start_sends_zeros();
 }
 
-TEST(test_killed_while_listening_the_next_start_sends_nothing) {
+TEST(test_killed_while_listening_next_start_sends_nothing) {
     daemon_rig_begin_driving(client);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
     daemon_rig_run(4000);
@@ -137,7 +138,7 @@ TEST(test_killed_while_listening_the_next_start_sends_nothing) {
     TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_RIGHT]);
 }
 
-TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond) {
+TEST(test_estop_edge_sends_zeros_in_the_same_millisecond) {
     for (unsigned phase = 0; phase < 20U; phase++) {
         daemon_rig_begin_driving(client);
         daemon_rig_run(phase);
@@ -151,7 +152,7 @@ TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond) {
     }
 }
 
-TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds) {
+TEST(test_estop_unreadable_without_event_latches_within_5_ms) {
     daemon_rig_begin_driving(client);
     daemon_rig.estop_silent = true;
     daemon_rig.estop = -1;
@@ -160,14 +161,14 @@ TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds) {
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
 
-TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds) {
+TEST(test_estop_unreadable_on_silent_bus_latches_within_5_ms) {
     for (unsigned phase = 0; phase < 20U; phase += 3U) {
         daemon_rig_begin_driving(client);
-        if (phase % 2U == 1U) { // Then frames do not wait to be looked at.
+        if (phase % 2U == 1U) { // With this topic frames are read one by one.
             (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
         }
         daemon_rig_run(phase);
-        sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes us now.
+        sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes the loop now.
         daemon_rig.estop_silent = true;
         daemon_rig.estop = -1;
         daemon_rig_run(5);
@@ -179,7 +180,7 @@ TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_millis
     }
 }
 
-TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches) {
+TEST(test_estop_pulse_that_ends_before_the_poll_latches) {
     daemon_rig_begin_driving(client);
     daemon_rig_run(7);
     daemon_rig.estop_pulse = true;
@@ -190,7 +191,7 @@ TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches) {
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
 
-TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after) {
+TEST(test_software_estop_stays_latched_after_its_client_ends) {
     static const unsigned hold_ms[] = {0, 100, 1000, 3000};
     for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
         const int other = daemon_rig_connect();
@@ -205,7 +206,7 @@ TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_afte
     }
 }
 
-TEST(test_suspended_machine_latches_with_zeros_first) {
+TEST(test_suspension_in_motion_latches_with_zeros_first) {
     daemon_rig_begin_driving(client);
     daemon_rig.suspended_us += 2000000U;
     const uint32_t before = daemon_rig.sent[IW_LEFT];
@@ -216,7 +217,7 @@ TEST(test_suspended_machine_latches_with_zeros_first) {
     TEST_ASSERT_TRUE(is_cause("loop_hung"));
 }
 
-TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all) {
+TEST(test_suspension_counts_once_and_not_from_before_the_start) {
     daemon_rig_crash();
     daemon_rig.suspended_us += 3600000000U;
     daemon_rig_start();
@@ -233,7 +234,7 @@ TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count) {
+TEST(test_time_never_decreases_after_a_short_suspension) {
     while (daemon_rig.now_us - daemon_rig.looked_us > MS(1)) {
         daemon_rig_run(1);
     }
@@ -241,7 +242,7 @@ TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count) {
     iw_time_us_t before_us = 0;
     bool ahead = false;
     for (unsigned ms = 0; ms < 1500U; ms++) {
-        (void)daemon_rig_ask(client, "{\"cmd\":\"hello\"}"); // Wakes it before it can be late.
+        (void)daemon_rig_ask(client, "{\"cmd\":\"hello\"}"); // The request wakes the loop before it can be late.
         const iw_time_us_t now_us = daemon_rig.daemon->wheels.now_us;
         TEST_ASSERT_TRUE(now_us >= before_us);
         ahead = ahead || now_us > daemon_rig.now_us;
@@ -252,7 +253,7 @@ TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count) {
     TEST_ASSERT_EQUAL_UINT32(0, gw_wheels_look(&daemon_rig.daemon->wheels).counters->late_steps);
 }
 
-TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own) {
+TEST(test_second_request_of_a_cycle_reads_the_clock_again) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     const iw_time_us_t read_us = daemon_rig.now_us;
     gw_wheels_time(wheels, read_us);
@@ -263,7 +264,7 @@ TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own) {
     TEST_ASSERT_EQUAL_UINT64(read_us + 300U, wheels->now_us);
 }
 
-TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late) {
+TEST(test_suspension_counts_if_longer_than_a_late_step) {
     daemon_rig_keep_log();
     daemon_rig_begin_driving(client);
     daemon_rig.suspended_us += IW_GATEWAY_LATE_US;
@@ -274,7 +275,7 @@ TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late) {
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "the machine was suspended for 21 ms"));
 }
 
-TEST(test_loop_that_stood_still_goes_on_with_zeros) {
+TEST(test_loop_after_a_stall_continues_with_zeros) {
     daemon_rig_begin_driving(client);
     daemon_rig.stolen_us = 150000U;
     daemon_rig_run(1);
@@ -288,7 +289,7 @@ TEST(test_loop_that_stood_still_goes_on_with_zeros) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
 }
 
-TEST(test_lease_is_lost_when_commands_end_although_requests_go_on) {
+TEST(test_lease_is_lost_without_commands_despite_other_requests) {
     daemon_rig_begin_driving(client);
     const iw_time_us_t last_us = daemon_rig.now_us;
     while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - last_us < MS(1000)) {
@@ -299,14 +300,14 @@ TEST(test_lease_is_lost_when_commands_end_although_requests_go_on) {
     TEST_ASSERT_TRUE(is_cause("lease_lost"));
 }
 
-TEST(test_clients_are_served_at_the_time_of_the_cycle) {
+TEST(test_clients_are_served_with_the_time_of_the_cycle) {
     for (unsigned ms = 0; ms < 50U; ms++) {
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_UINT64(daemon_rig.daemon->wheels.now_us, daemon_rig.daemon->clients.now_us);
     }
 }
 
-TEST(test_lease_ends_with_the_connection_at_once) {
+TEST(test_lease_ends_immediately_with_the_connection) {
     daemon_rig_begin_driving(client);
     (void)close(client);
     client = -1;
@@ -314,7 +315,7 @@ TEST(test_lease_ends_with_the_connection_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
 }
 
-TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last) {
+TEST(test_lease_end_by_hangup_precedes_the_last_request) {
     static const char line[] = "{\"cmd\":\"stop\"}\n";
     daemon_rig_begin_driving(client);
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
@@ -324,7 +325,7 @@ TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent
     TEST_ASSERT_TRUE(is_cause("client_gone"));
 }
 
-/// How often the service manager has been told that this gateway is ready.
+/// Counts the messages READY=1 to the service manager.
 static unsigned told_ready(int manager) {
     char word[32];
     unsigned count = 0;
@@ -335,7 +336,7 @@ static unsigned told_ready(int manager) {
     return count;
 }
 
-/// What the service manager has heard: the longest time between two words that feed its watchdog.
+/// Returns the longest time between two messages to the watchdog of the service manager.
 static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
     char word[32];
     iw_time_us_t fed_us = daemon_rig.now_us;
@@ -351,7 +352,7 @@ static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
     return longest_us;
 }
 
-TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion) {
+TEST(test_watchdog_is_fed_at_half_its_time_in_every_state) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/notify", daemon_rig.folder);
@@ -375,7 +376,7 @@ TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion) {
     TEST_ASSERT_TRUE(armed_us <= MS(220));
 }
 
-TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels) {
+TEST(test_setpoints_are_at_most_21_ms_apart) {
     daemon_rig_begin_driving(client);
     for (unsigned ms = 0; ms < 2000U; ms++) {
         (void)((ms % 50U == 0U) ? daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}")
@@ -400,12 +401,12 @@ static void end_by(int number) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker) {
+TEST(test_signal_to_end_ramps_holds_and_removes_the_marker) {
     static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         sigset_t none;
         (void)sigemptyset(&none);
-        (void)sigprocmask(SIG_SETMASK, &none, NULL); // As a process begins, before the loop is opened.
+        (void)sigprocmask(SIG_SETMASK, &none, NULL); // Signal mask of a new process, before the loop is opened
         (void)signal(numbers[i], SIG_DFL);
         tearDown();
         setUp();
@@ -413,8 +414,8 @@ TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker) {
     }
 }
 
-/// Root's name on the bus is our own; only a gateway of another user looks for it.
-TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends) {
+/// The test itself has the name of root on the bus; only a gateway of another user checks this name.
+TEST(test_gateway_that_gives_way_ramps_logs_why_and_ends) {
     if (geteuid() != 0) {
         return;
     }
@@ -437,7 +438,7 @@ TEST(test_start_with_healthy_wheels_logs_no_fault) {
     daemon_rig_crash();
     daemon_rig_start();
     TEST_ASSERT_EQUAL_UINT32(0,
-                             daemon_rig.daemon->answers.server.told.present); // The first look finds no telemetry yet.
+                             daemon_rig.daemon->answers.server.told.present); // The first poll finds no telemetry yet.
     daemon_rig_keep_log();
     daemon_rig_run(2000);
     TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Several clients in one wake-up of the gateway: the outcome does not depend on the order in which the gateway serves them.
+// Several clients in one wake-up of the gateway: the outcome does not depend on the order in which the gateway serves
+// them.
 #include "daemon_client.h"
 
 #include "unity.h"
@@ -82,7 +83,7 @@ static void test_estop_and_reset_in_one_wake_up_stay_latched(void) {
     crowd_goes();
 }
 
-static void test_log_without_a_reader_ends_nothing(void) {
+static void test_log_to_a_closed_pipe_does_not_end_the_gateway(void) {
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
     (void)close(ends[0]);
@@ -103,6 +104,6 @@ int main(void) {
     RUN_TEST(test_two_takeovers_in_one_wake_up_grant_one_lease);
     RUN_TEST(test_stop_and_command_in_one_wake_up_stop);
     RUN_TEST(test_estop_and_reset_in_one_wake_up_stay_latched);
-    RUN_TEST(test_log_without_a_reader_ends_nothing);
+    RUN_TEST(test_log_to_a_closed_pipe_does_not_end_the_gateway);
     return UNITY_END();
 }

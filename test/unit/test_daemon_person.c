@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A lease belongs to one person, and what permits motion or clears a latch says since when it is wanted: in virtual time.
+// A lease belongs to one person, and a request that permits motion or clears a latch states its age: in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -28,7 +28,7 @@ static unsigned stop_number(void) {
     return gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
 }
 
-/// The key in a reply to arm.
+/// Copies the key from a reply to arm.
 static void read_key(const char *reply, char out_key[KEY_DIGITS + 1U]) {
     const char *at = strstr(reply, "\"key\":\"");
     TEST_ASSERT_NOT_NULL_MESSAGE(at, reply);
@@ -50,7 +50,7 @@ static const char *drive_with(const char *key, int speed_mm_s) {
     return line_;
 }
 
-// Age --------------------------------------------------------------------------------------------------------------------
+// Age -----------------------------------------------------------------------------------------------------------------
 
 /// Ages in ms beyond the default limit of 1000.
 static const int64_t late_ms[] = {1001, 1100, 2000, 10000, 60000};
@@ -65,7 +65,7 @@ TEST(test_one_person_arm_too_old_changes_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-TEST(test_one_person_reset_too_old_leaves_the_latch) {
+TEST(test_one_person_reset_too_old_does_not_clear_the_latch) {
     latch();
     for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
         assert_reply(aged("reset", late_ms[i]), "\"error\":\"stale_command\"");
@@ -86,7 +86,7 @@ TEST(test_one_person_confirm_too_old_is_refused) {
     assert_reply("{\"cmd\":\"status\"}", "\"track\":{\"state\":\"confirmed\"");
 }
 
-/// What a network held back comes at once.
+/// Requests that a network has delayed arrive together.
 TEST(test_one_person_burst_of_old_requests_changes_nothing) {
     static const char *const cmds[] = {"reset", "arm", "confirm"};
     static const unsigned counts[] = {2, 10, 100};
@@ -121,23 +121,23 @@ TEST(test_one_person_limit_of_the_age_is_configured) {
 TEST(test_one_person_arm_from_before_a_stop_is_refused) {
     const int other = daemon_rig_connect();
     daemon_rig_run(2000);
-    (void)daemon_rig_ask(other, "{\"cmd\":\"stop\"}"); // Nothing moves: no stop is recorded, but one was wanted.
+    (void)daemon_rig_ask(other, "{\"cmd\":\"stop\"}"); // Without motion no stop is recorded, but one was requested.
     daemon_rig_run(100);
     (void)close(client);
-    client = daemon_rig_connect(); // Which has not waited through anything.
+    client = daemon_rig_connect(); // The new connection has not waited.
     assert_reply(aged("arm", 500), "\"error\":\"stale_command\"");
     assert_reply(aged("arm", 50), "\"ok\":true");
     (void)close(other);
 }
 
-// The stop that a reset means ----------------------------------------------------------------------------------------------
+// Stop number of a reset ----------------------------------------------------------------------------------------------
 
 static void reset_of(unsigned stop, const char *part) {
     (void)snprintf(line_, sizeof line_, "{\"cmd\":\"reset\",\"stop\":%u}", stop);
     assert_reply(line_, part);
 }
 
-TEST(test_one_person_reset_of_another_stop_leaves_the_latch) {
+TEST(test_one_person_reset_of_another_stop_does_not_clear_latch) {
     latch();
     const unsigned first = stop_number();
     reset_of(first, "\"ok\":true");
@@ -153,7 +153,7 @@ TEST(test_one_person_reset_of_another_stop_leaves_the_latch) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
-/// The latch keeps its first cause and its number: an e-stop on top of it makes an older reset late.
+/// The latch retains its first cause and number: an e-stop after it makes an older reset late.
 TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     const int other = daemon_rig_connect();
     latch();
@@ -168,12 +168,12 @@ TEST(test_one_person_reset_from_before_a_second_estop_is_late) {
     (void)close(other);
 }
 
-// The key ------------------------------------------------------------------------------------------------------------------
+// The key -------------------------------------------------------------------------------------------------------------
 
 TEST(test_one_person_key_is_new_for_every_grant) {
     char key[4][KEY_DIGITS + 1U];
     for (unsigned i = 0; i < 4U; i++) {
-        arm_with_key(client, key[i]); // The second of each two is the holder's own.
+        arm_with_key(client, key[i]); // The second of each pair is a repeated arm of the holder.
         for (unsigned before = 0; before < i; before++) {
             TEST_ASSERT_NOT_EQUAL_INT(0, strcmp(key[before], key[i]));
         }
@@ -186,7 +186,7 @@ TEST(test_one_person_key_is_new_for_every_grant) {
     assert_reply(drive_with(key[3], 100), "\"ok\":true");
 }
 
-TEST(test_one_person_refused_arm_leaves_the_key) {
+TEST(test_one_person_refused_arm_does_not_change_the_key) {
     char key[KEY_DIGITS + 1U];
     arm_with_key(client, key);
     assert_reply(aged("arm", 5000), "\"error\":\"stale_command\"");
@@ -208,7 +208,7 @@ TEST(test_one_person_drive_with_another_key_feeds_nothing) {
         TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
         daemon_rig_run(20);
     }
-    TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(1100), daemon_rig.now_us - armed_us); // The first lease, and not more.
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(1100), daemon_rig.now_us - armed_us); // The first lease, not longer
     TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
 }
 
@@ -221,7 +221,7 @@ TEST(test_one_person_twist_with_another_key_feeds_nothing) {
     assert_reply(line_, "\"ok\":true");
 }
 
-/// Row 7 holds for every command, accepted or not.
+/// Row 7 applies to every command, accepted or refused.
 TEST(test_one_person_drive_with_another_key_is_a_deflected_stick) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
@@ -237,7 +237,7 @@ TEST(test_one_person_drive_with_another_key_is_a_deflected_stick) {
     (void)close(other);
 }
 
-/// One wheel is enough, and in the role of a setpoint a current.
+/// One wheel is sufficient; with the role of a setpoint also a current.
 TEST(test_one_person_other_key_is_a_stick_by_any_value) {
     static const char *const fields[] = {"\"left_mm_s\":300,\"right_mm_s\":0", "\"left_mm_s\":0,\"right_mm_s\":-300",
                                          "\"left_mm_s\":0,\"right_mm_s\":0,\"left_mA\":500,\"right_mA\":0",
@@ -297,25 +297,25 @@ TEST(test_one_person_key_is_in_no_other_line) {
     (void)close(other);
 }
 
-// Two people at the gateway ------------------------------------------------------------------------------------------------
+// Two people at the gateway -------------------------------------------------------------------------------------------
 
-TEST(test_one_person_plain_arm_takes_no_lease_from_another) {
+TEST(test_one_person_arm_without_takeover_is_busy) {
     char key[KEY_DIGITS + 1U];
     const int other = daemon_rig_connect();
     assert_reply("{\"cmd\":\"arm\",\"name\":\"Ann\"}", "\"ok\":true");
     for (unsigned i = 0; i < 3U; i++) {
-        const char *reply = daemon_rig_ask(other, "{\"cmd\":\"arm\",\"name\":\"Ann\"}"); // A name is no right.
+        const char *reply = daemon_rig_ask(other, "{\"cmd\":\"arm\",\"name\":\"Ann\"}"); // A name gives no right.
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"busy\""), reply);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "Ann"), reply);
         TEST_ASSERT_NULL(strstr(reply, "key"));
         reply = daemon_rig_ask(other, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":-300}");
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"not_holder\""), reply);
     }
-    arm_with_key(client, key); // Whoever holds it may ask again.
+    arm_with_key(client, key); // The holder may arm again.
     const iw_time_us_t until_us = gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us;
     arm_with_key(client, key);
     TEST_ASSERT_EQUAL_UINT64(until_us,
-                             gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us); // Which feeds nothing.
+                             gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us); // The lease is the same.
     assert_reply(drive_with(key, 300), "\"ok\":true");
     (void)close(other);
 }

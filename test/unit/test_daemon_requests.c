@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Requests as the daemon carries them out, from the line to the wheels, in virtual time.
+// Requests as the daemon executes them, from the line to the wheels, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -9,7 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// The object `side` of the snapshot.
+/// Returns the object `side` of the snapshot.
 static const char *wheel(const char *side) {
     char name[16];
     (void)snprintf(name, sizeof name, "\"%s\":{", side);
@@ -24,7 +24,7 @@ static bool says(const char *object, const char *words) {
     return found != NULL && (next == NULL || found < next);
 }
 
-TEST(test_drive_reaches_the_wheel_it_is_for) {
+TEST(test_drive_speed_reaches_the_correct_wheel) {
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 100, 1000);
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
@@ -33,7 +33,7 @@ TEST(test_drive_reaches_the_wheel_it_is_for) {
     TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
 }
 
-TEST(test_current_reaches_the_wheel_it_is_for) {
+TEST(test_drive_current_reaches_the_correct_wheel) {
     daemon_rig.daemon->wheels.core.config.asymmetric_current = true;
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
@@ -57,7 +57,7 @@ TEST(test_twist_to_the_left_turns_the_right_wheel_faster) {
                           daemon_rig.commanded_mm_s[IW_RIGHT]);
 }
 
-TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it) {
+TEST(test_drive_number_out_of_range_is_refused_and_never_wraps) {
     static const char *const lines[] = {
         "{\"cmd\":\"drive\",\"left_mm_s\":4294967496,\"right_mm_s\":200}",
         "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":-4294967096}",
@@ -78,7 +78,7 @@ TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it) {
     }
 }
 
-TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then) {
+TEST(test_battery_is_saturated_only_at_255) {
     daemon_rig.world.pair.battery_dV = 255;
     daemon_rig_run(100);
     TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":true"));
@@ -88,13 +88,13 @@ TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then) {
     TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
     daemon_rig.world.pair.battery_dV = 255;
     daemon_rig_run(100);
-    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // What is no longer heard is not known.
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // A value of an offline wheel is unknown.
     daemon_rig_run(2000);
     TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
     TEST_ASSERT_TRUE(says(wheel("left"), "\"battery_dV\":null"));
 }
 
-TEST(test_tare_of_one_wheel_leaves_the_other) {
+TEST(test_tare_of_one_wheel_does_not_change_the_other) {
     daemon_rig_run(3000);
     const iw_time_us_t asked_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"tare\",\"side\":\"left\"}", "\"left\":{");
@@ -103,7 +103,7 @@ TEST(test_tare_of_one_wheel_leaves_the_other) {
     TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance != IW_OFFSET_OPERATOR);
 }
 
-TEST(test_tare_of_both_that_one_cannot_have_changes_neither) {
+TEST(test_tare_of_both_refused_for_one_changes_neither) {
     daemon_rig_run(3000);
     daemon_rig_arm(client);
     daemon_rig_drive(client, 0, 100, 500);
@@ -113,7 +113,7 @@ TEST(test_tare_of_both_that_one_cannot_have_changes_neither) {
     TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance != IW_OFFSET_OPERATOR);
 }
 
-TEST(test_client_that_goes_while_it_arms_leaves_no_lease) {
+TEST(test_client_that_ends_during_arm_leaves_no_lease) {
     static const char line[] = "{\"cmd\":\"arm\"}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
     (void)close(client);
@@ -123,7 +123,7 @@ TEST(test_client_that_goes_while_it_arms_leaves_no_lease) {
     daemon_rig_arm(client);
 }
 
-TEST(test_command_behind_arm_in_one_breath_is_stale) {
+TEST(test_command_sent_together_with_arm_is_stale) {
     static const char lines[] =
         "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
@@ -138,8 +138,8 @@ static void say_at_once(int who, const char *lines) {
     TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(who, lines, strlen(lines), MSG_NOSIGNAL));
 }
 
-/// Granted, but stopped by somebody else before the wheels answer.
-TEST(test_arm_that_a_stop_overtakes_is_refused) {
+/// The arm is granted, but another client stops before the wheels answer.
+TEST(test_arm_followed_by_estop_of_another_client_is_refused) {
     char text[4096];
     const int other = daemon_rig_connect();
     say_at_once(client, "{\"id\":7,\"cmd\":\"arm\"}\n");
@@ -153,8 +153,8 @@ TEST(test_arm_that_a_stop_overtakes_is_refused) {
     (void)close(other);
 }
 
-/// What somebody has sent behind an arm, waits here for its answer.
-TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else) {
+/// Requests that a client sends after an arm wait for the reply to it.
+TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop) {
     static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\"}\n"};
     static const iw_state_t after[] = {IW_STATE_LISTENING, IW_STATE_LATCHED};
     const int other = daemon_rig_connect();
@@ -164,26 +164,26 @@ TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else) {
         say_at_once(other, stops[i]);
         daemon_rig_run(100);
         TEST_ASSERT_EQUAL_INT(after[i], daemon_rig_state());
-        daemon_rig_run(2000); // Zeros are held as long.
+        daemon_rig_run(2000); // Zeros are held for this time.
     }
-    assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true"); // One that is sent now counts.
+    assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true"); // A reset that is sent now counts.
     daemon_rig_arm(client);
     (void)close(other);
 }
 
-TEST(test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out) {
+TEST(test_stop_and_arm_of_one_client_are_both_executed) {
     daemon_rig_run(20);
     say_at_once(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
     daemon_rig_run(50);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now) {
+TEST(test_command_that_waited_during_a_stall_renews_from_its_time) {
     static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
     TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
-    daemon_rig.stolen_us = 90000U; // Late, but not so late that it stops for that.
+    daemon_rig.stolen_us = 90000U; // Late, but not late enough for a stop
     const iw_time_us_t sent_us = daemon_rig.now_us;
     daemon_rig_run(1);
     while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - sent_us < MS(1000)) {
@@ -192,7 +192,7 @@ TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_
     TEST_ASSERT_TRUE(daemon_rig.now_us - sent_us <= MS(202));
 }
 
-TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest) {
+TEST(test_takeover_is_refused_in_motion_granted_at_standstill) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 200, 200, 500);
@@ -207,12 +207,12 @@ TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest) {
 
 TEST(test_arm_while_shutting_down_is_refused) {
     daemon_rig.daemon->wheels.shutting_down = true;
-    daemon_rig.daemon->wheels.core.permit.phase = IW_PHASE_HOLDING; // So that the loop goes on.
+    daemon_rig.daemon->wheels.core.permit.phase = IW_PHASE_HOLDING; // The loop must continue.
     daemon_rig.daemon->wheels.core.permit.hold_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"arm\"}", "shutting down");
 }
 
-TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied) {
+TEST(test_arm_with_contradicted_setpoint_type_is_denied) {
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
                              IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"denied\"");
@@ -230,7 +230,7 @@ static unsigned events_waiting(const char *name) {
     return count;
 }
 
-TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall) {
+TEST(test_telemetry_has_its_rate_without_burst_after_a_stall) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}", "\"ok\":true");
     (void)events_waiting("force");
     daemon_rig_run(1000);
@@ -240,14 +240,14 @@ TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall) {
     TEST_ASSERT_UINT_WITHIN(2, 5, events_waiting("\"event\":\"force\""));
 }
 
-TEST(test_telemetry_leaves_in_the_cycle_in_which_it_is_due) {
+TEST(test_telemetry_is_sent_in_the_cycle_in_which_it_is_due) {
     char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":5}", "\"ok\":true");
-    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // Else each frame wakes it.
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // Otherwise each frame wakes the loop.
     daemon_rig_run(1000);
     for (unsigned event = 0; event < 5U; event++) {
         const iw_time_us_t due_us = daemon_rig.daemon->answers.served[0].client.next_us;
-        while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Of before.
+        while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Bytes of before
         }
         while (daemon_rig.now_us <= due_us) {
             daemon_rig_run(1);
@@ -256,7 +256,7 @@ TEST(test_telemetry_leaves_in_the_cycle_in_which_it_is_due) {
     }
 }
 
-TEST(test_burst_of_requests_is_answered_without_waiting_for_periods) {
+TEST(test_burst_of_requests_is_answered_in_one_cycle) {
     static const char line[] = "{\"cmd\":\"why\"}\n";
     static char text[65536];
     unsigned answers = 0;
@@ -284,10 +284,10 @@ TEST(test_stop_and_estop_need_no_lease) {
     (void)close(other);
 }
 
-TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it) {
+TEST(test_lease_runs_from_the_command_not_from_the_last_poll) {
     const iw_time_us_t lease_us = MS(daemon_rig.daemon->config.core.lease_ms);
     daemon_rig_arm(client);
-    for (unsigned ms = 1; ms < 20U; ms += 6U) { // At any place between two setpoints.
+    for (unsigned ms = 1; ms < 20U; ms += 6U) { // At several times between two setpoints
         daemon_rig_drive(client, 100, 100, 200);
         daemon_rig_run(ms);
         static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}\n";
@@ -297,13 +297,13 @@ TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it) {
     }
 }
 
-TEST(test_answer_to_arm_comes_without_waiting_for_the_next_period) {
+TEST(test_arm_is_answered_within_3_ms) {
     const iw_time_us_t asked_us = daemon_rig.now_us;
     daemon_rig_arm(client);
     TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(3), daemon_rig.now_us - asked_us);
 }
 
-TEST(test_reader_that_has_ended_leaves_nobody_waiting) {
+TEST(test_reader_that_ended_leaves_no_client_waiting) {
     const int others[] = {daemon_rig_connect(), daemon_rig_connect(), daemon_rig_connect()};
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     int pair[2];
@@ -322,7 +322,7 @@ TEST(test_reader_that_has_ended_leaves_nobody_waiting) {
     }
 }
 
-TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept) {
+TEST(test_confirm_of_unset_item_is_refused_short_how_is_stored) {
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     daemon_rig.daemon->config.core.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
@@ -336,7 +336,7 @@ TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept)
     assert_reply("{\"cmd\":\"status\"}", "\"found\":\"7\"");
 }
 
-TEST(test_zero_that_changes_is_told_to_who_watches_the_force) {
+TEST(test_offset_change_is_sent_to_watchers_of_force) {
     daemon_rig_run(3000);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":1}", "\"ok\":true");
     (void)events_waiting("force");
@@ -360,7 +360,7 @@ TEST(test_stop_names_the_client_that_asked_for_it) {
     assert_reply("{\"cmd\":\"why\"}", "joystick");
 }
 
-TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole) {
+TEST(test_still_moving_is_reported_once_as_a_complete_event) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     static char text[8192];
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
@@ -377,7 +377,7 @@ TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole) {
     TEST_ASSERT_NULL(strstr(told + strlen("\"cause\":\"still_moving"), "still_moving"));
 }
 
-/// Shows the daemon a gateway whose wheels roll, or not, and counts what a watcher is told of it.
+/// Gives the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
 static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     static char text[8192];
     gw_daemon_t *daemon = daemon_rig.daemon;
@@ -396,7 +396,7 @@ static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     return count;
 }
 
-TEST(test_end_of_zeros_is_told_before_it_comes) {
+TEST(test_end_of_zeros_is_reported_in_advance) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
@@ -406,7 +406,7 @@ TEST(test_end_of_zeros_is_told_before_it_comes) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"cause\":\"zeros_ending\",\"present\":true}"));
 }
 
-TEST(test_rolling_is_told_when_it_begins_and_when_it_ends) {
+TEST(test_rolling_is_reported_at_its_begin_and_end) {
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     TEST_ASSERT_EQUAL_UINT(1, count_told(true, false, "\"present\":true}"));
     TEST_ASSERT_EQUAL_UINT(0, count_told(true, false, "rolling"));
@@ -415,7 +415,7 @@ TEST(test_rolling_is_told_when_it_begins_and_when_it_ends) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, "\"present\":false}"));
 }
 
-TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute) {
+TEST(test_rolling_after_a_stop_is_reported_once_a_minute) {
     static const char *const fault = "\"cause\":\"rolling\"";
     assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
     TEST_ASSERT_EQUAL_UINT(1, count_told(true, true, fault));
@@ -431,7 +431,7 @@ TEST(test_rolling_after_a_stop_is_told_as_a_fault_once_a_minute) {
     TEST_ASSERT_EQUAL_UINT(1, count_told(false, false, fault));
 }
 
-/// How many recordings were ordered since the last call, and the last of them.
+/// Returns the number of recordings that were ordered since the last call, and the last of them.
 static unsigned take_orders(int writer, gw_box_order_t *out_last) {
     unsigned orders = 0;
     while (recv(writer, out_last, sizeof *out_last, MSG_DONTWAIT) == (ssize_t)sizeof *out_last) {
@@ -440,7 +440,7 @@ static unsigned take_orders(int writer, gw_box_order_t *out_last) {
     return orders;
 }
 
-TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told) {
+TEST(test_rolling_fault_is_recorded_with_each_report) {
     static gw_box_order_t order;
     gw_box_t *box = &daemon_rig.daemon->box;
     int ends[2];
@@ -448,7 +448,7 @@ TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told) {
     box->config.blackbox_s = 1;
     box->writer.fd = ends[0];
     (void)count_told(true, false, "rolling");
-    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes it.
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes the machine.
     (void)count_told(true, true, "rolling");
     TEST_ASSERT_EQUAL_UINT(1, take_orders(ends[1], &order));
     TEST_ASSERT_EQUAL_STRING("rolling", order.cause);
@@ -458,11 +458,11 @@ TEST(test_rolling_as_a_fault_is_recorded_each_time_that_it_is_told) {
     (void)count_told(false, false, "rolling");
     daemon_rig_run(1000);
     (void)count_told(true, true, "rolling");
-    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // The second within a minute.
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Second fault within a minute
     (void)close(ends[1]);
     (void)count_told(false, false, "rolling");
     daemon_rig_run(60000);
-    (void)count_told(true, true, "rolling"); // Nobody writes: the loop goes on.
+    (void)count_told(true, true, "rolling"); // Without a writer the loop continues.
     box->config.blackbox_s = 0;
     box->writer.fd = -1;
     (void)close(ends[0]);

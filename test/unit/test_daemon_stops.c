@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stop is never refused and never queues: with every place of both sockets taken, in virtual time.
+// A stop is never refused and never queues, even if all places of both sockets are taken, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -10,7 +10,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#define STOP_WITHIN_MS 60U ///< Fault 33, on this machine.
+#define STOP_WITHIN_MS 60U ///< Fault 33, on this machine
 #define CROWD          160U
 #define FOREIGN        65534U
 
@@ -20,7 +20,7 @@ static int crowd[CROWD];
 static unsigned crowded;
 static char text[1U << 17];
 
-/// Nothing of the gateway runs meanwhile.
+/// Connects while nothing of the gateway runs.
 static int knock(sock_right_t door) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
@@ -38,10 +38,10 @@ static void join(sock_right_t door, unsigned count) {
     }
 }
 
-/// Every ordinary place of both sockets, with `client` in one of them.
+/// Takes every ordinary place of both sockets; `client` has one of them.
 static void take_all_places(void) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
-    while (crowded > 0U) { // Of the test before.
+    while (crowded > 0U) { // Connections of the test before
         (void)close(crowd[--crowded]);
     }
     clients->most[SOCK_DRIVE] = 16;
@@ -56,7 +56,7 @@ static void say(int fd, const char *lines) {
     (void)send(fd, lines, strlen(lines), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-/// What has come, terminated.
+/// Returns the received bytes, terminated.
 static const char *hear(int fd) {
     const ssize_t length = recv(fd, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(length > 0) ? length : 0] = '\0';
@@ -68,7 +68,7 @@ static bool has_ended(int fd) {
     return recv(fd, &byte, 1, MSG_DONTWAIT) == 0;
 }
 
-/// The state without time for anything else to stop the wheels.
+/// Starts driving, without time for another cause of a stop.
 static void begin_driving(void) {
     if (daemon_rig_state() == IW_STATE_LATCHED) {
         assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true");
@@ -78,7 +78,7 @@ static void begin_driving(void) {
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-/// The first slower setpoint leaves in time.
+/// Checks that the first slower setpoint is sent in time.
 static void assert_slower(const char *why) {
     for (unsigned ms = 0; ms < STOP_WITHIN_MS; ms++) {
         daemon_rig_run(1);
@@ -108,12 +108,12 @@ TEST(test_stop_never_refused_with_all_places_idle) {
             come_to_rest();
         }
     }
-    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[SOCK_DRIVE]); // Nobody was evicted.
+    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[SOCK_DRIVE]); // No connection was evicted.
     TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[SOCK_STOP]);
 }
 
-/// Eight connections wait for their first line; the next one at the same moment is refused without a wait.
+/// Eight connections wait for their first line; the ninth at the same time is refused without a wait.
 TEST(test_stop_places_are_eight_on_each_socket) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
@@ -129,7 +129,7 @@ TEST(test_stop_places_are_eight_on_each_socket) {
     }
 }
 
-/// Each of the crowd asks for more than it reads, without end.
+/// Each connection continuously sends more requests than it reads replies.
 TEST(test_stop_never_refused_with_all_places_polling) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
@@ -146,7 +146,7 @@ TEST(test_stop_never_refused_with_all_places_polling) {
     }
 }
 
-/// Its line comes a while after it, into a place that waits for it.
+/// The line arrives after the connection, in a place that waits for it.
 TEST(test_stop_never_refused_if_its_line_comes_later) {
     take_all_places();
     begin_driving();
@@ -178,7 +178,7 @@ TEST(test_stop_never_refused_without_descriptors) {
     (void)close(fd);
 }
 
-/// A thousand silent connections a second, which stay as long as they are let, of the same user.
+/// Opens a thousand silent connections of the same user per second, which stay open as long as possible.
 static void flood(sock_right_t door, unsigned for_ms) {
     static int open_ones[64];
     static unsigned next;
@@ -192,10 +192,10 @@ static void flood(sock_right_t door, unsigned for_ms) {
     }
 }
 
-TEST(test_stop_never_refused_beside_1000_connections_a_second) {
+TEST(test_stop_never_refused_with_1000_connections_a_second) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
-        for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // The line, after its connection.
+        for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // Time of the line after its connection
             flood(door, 300);
             begin_driving();
             flood(door, 100);
@@ -211,7 +211,7 @@ TEST(test_stop_never_refused_beside_1000_connections_a_second) {
     }
 }
 
-// What the places are not for ------------------------------------------------------------------------------------------------
+// Requests that a stop place refuses ----------------------------------------------------------------------------------
 
 TEST(test_stop_place_for_anything_else_is_refused) {
     static const char *const others[] = {"{\"cmd\":\"status\"}\n",
@@ -239,7 +239,7 @@ TEST(test_stop_place_for_anything_else_is_refused) {
     TEST_ASSERT_EQUAL_INT(300, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-TEST(test_stop_behind_another_line_is_carried_out) {
+TEST(test_stop_after_another_line_is_executed) {
     take_all_places();
     for (sock_right_t door = SOCK_DRIVE; door < SOCK_RIGHTS; door++) {
         begin_driving();
@@ -256,7 +256,7 @@ TEST(test_stop_behind_another_line_is_carried_out) {
     }
 }
 
-/// It asks for more than it reads, and its stop comes with the request whose answer finds no room any more.
+/// Sends more requests than the client reads; the stop follows the request whose reply has no more space.
 static void ask_too_much_and_stop(int fd, const sock_client_t *greedy) {
     for (unsigned i = 0; i < 5000U && greedy->out_end - greedy->out_start < sizeof greedy->out / 2U; i++) {
         say(fd, "{\"cmd\":\"status\"}\n");
@@ -272,7 +272,7 @@ static void ask_too_much_and_stop(int fd, const sock_client_t *greedy) {
     say(fd, text);
 }
 
-TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out) {
+TEST(test_stop_of_an_overflowing_connection_is_executed) {
     take_all_places();
     begin_driving();
     ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
@@ -280,8 +280,8 @@ TEST(test_stop_of_a_connection_that_is_given_up_is_carried_out) {
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
-/// An answer finds no room in the step, before its stop is read.
-TEST(test_stop_not_yet_read_of_a_broken_connection_is_carried_out) {
+/// A reply has no space in the step, before the stop of the connection is read.
+TEST(test_stop_not_yet_read_of_a_broken_connection_is_executed) {
     take_all_places();
     begin_driving();
     say(crowd[0], "{\"cmd\":\"stop\"}\n");
@@ -290,8 +290,8 @@ TEST(test_stop_not_yet_read_of_a_broken_connection_is_carried_out) {
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
-/// It has stopped before it is gone.
-TEST(test_stop_of_a_holder_that_is_given_up_is_its_own) {
+/// The stop counts before the end of the connection.
+TEST(test_stop_of_an_overflowing_holder_has_cause_client_stop) {
     begin_driving();
     ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
     assert_slower("given up");
@@ -311,7 +311,7 @@ TEST(test_stop_place_answers_one_line_and_all_stops) {
     (void)close(fd);
 }
 
-TEST(test_stop_place_of_the_silent_is_free_after_200_ms) {
+TEST(test_stop_place_of_a_silent_connection_is_free_after_200_ms) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     take_all_places();
     const unsigned before = crowded;
@@ -330,14 +330,14 @@ TEST(test_stop_place_of_the_silent_is_free_after_200_ms) {
     }
 }
 
-// A share for each user ----------------------------------------------------------------------------------------------------
+// Share of each user --------------------------------------------------------------------------------------------------
 
-/// As another user connects it. -1: this test runs as a user who cannot be another.
+/// Connects as another user. Returns -1 if the user of this test cannot change its id.
 static int knock_as(uid_t uid, sock_right_t door) {
     if (geteuid() != 0 || seteuid(uid) != 0) {
         return -1;
     }
-    const int fd = knock(door); // Its name is in no folder.
+    const int fd = knock(door); // The socket has no name in the file system.
     TEST_ASSERT_EQUAL_INT(0, seteuid(0));
     return fd;
 }
@@ -351,7 +351,7 @@ static unsigned held_by(uid_t uid) {
     return held;
 }
 
-TEST(test_stop_places_of_one_user_are_half_of_them) {
+TEST(test_stop_places_of_one_user_are_at_most_half) {
     take_all_places();
     for (unsigned i = 0; i < 12U; i++) {
         const int fd = knock_as(FOREIGN, SOCK_DRIVE);
@@ -363,19 +363,19 @@ TEST(test_stop_places_of_one_user_are_half_of_them) {
         TEST_ASSERT_LESS_OR_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
     }
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(FOREIGN));
-    join(SOCK_DRIVE, SOCK_STOP_PLACES / 2U); // The other half is for others, and those are not pushed out.
+    join(SOCK_DRIVE, SOCK_STOP_PLACES / 2U); // The other half is for other users, who are not evicted.
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
     crowd[crowded++] = knock_as(FOREIGN, SOCK_DRIVE);
     daemon_rig_run(10);
     TEST_ASSERT_EQUAL_UINT(SOCK_STOP_PLACES / 2U, held_by(0));
     begin_driving();
-    const int fd = knock_as(FOREIGN, SOCK_DRIVE); // And its stop needs no place.
+    const int fd = knock_as(FOREIGN, SOCK_DRIVE); // A stop of this user needs no place.
     say(fd, stops[0]);
     assert_slower("beyond its share");
     (void)close(fd);
 }
 
-TEST(test_stop_in_a_place_names_who_asked_for_it) {
+TEST(test_stop_in_a_stop_place_names_its_process) {
     char who[64];
     take_all_places();
     begin_driving();

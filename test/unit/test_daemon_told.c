@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the daemon tells of itself, and when: to watchers, in the log and in refusals, in virtual time.
+// Reports of the daemon about itself and their times: to watchers, in the log and in refusals, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-TEST(test_bus_that_cannot_be_opened_is_named_with_the_cure) {
+TEST(test_bus_that_cannot_be_opened_is_named) {
     const gateway_config_t *config = &daemon_rig.daemon->config;
     char *text = NULL;
     size_t length = 0;
@@ -26,8 +26,8 @@ TEST(test_bus_that_cannot_be_opened_is_named_with_the_cure) {
     free(text);
 }
 
-/// Until then its first telemetry may still come.
-TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on) {
+/// Before this time the first telemetry may still arrive.
+TEST(test_wheel_without_power_is_a_fault_one_second_after_start) {
     const uint32_t lost = 1U << IW_CAUSE_WHEEL_LOST;
     sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
     daemon_rig_crash();
@@ -38,7 +38,7 @@ TEST(test_wheel_without_power_is_a_fault_from_a_second_after_the_start_on) {
     TEST_ASSERT_EQUAL_UINT32(lost, daemon_rig.daemon->answers.server.told.present & lost);
 }
 
-TEST(test_status_has_no_more_warnings_than_places_for_them) {
+TEST(test_status_has_at_most_the_maximum_of_warnings) {
     gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
     iw_snapshot_t seen = gw_wheels_look(wheels);
     seen.holding = seen.rolling = true;
@@ -63,19 +63,19 @@ TEST(test_hello_has_the_time_of_its_cycle) {
     (void)close(other);
 }
 
-TEST(test_arm_without_a_setpoint_type_says_where_it_is_set) {
+TEST(test_arm_without_a_setpoint_type_names_the_section) {
     daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
     assert_reply("{\"cmd\":\"arm\"}", "under [wheels] in the configuration");
 }
 
-TEST(test_arm_without_a_track_names_the_key_where_it_is_set_and_who_measures_it) {
+TEST(test_arm_without_a_track_names_key_section_and_command) {
     daemon_rig.daemon->wheels.core.config.track_mm = 0;
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"track_not_set\"");
     assert_reply("{\"cmd\":\"arm\"}", "\"track_mm not configured, and every bound of turning rests on it; set it under "
                                       "[wheels] in the configuration (iwheelctl bringup measures it)\"");
 }
 
-TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not) {
+TEST(test_log_of_estop_is_warning_if_pressed_info_if_released) {
     daemon_rig_keep_log();
     daemon_rig.estop = 1;
     daemon_rig_run(20);
@@ -87,7 +87,7 @@ TEST(test_log_tells_of_a_pressed_button_as_a_warning_and_of_a_released_one_not) 
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(pressed, "info: e-stop "), daemon_rig_log());
 }
 
-/// Sends a line, lets 30 ms pass, and takes all that has come.
+/// Sends a line, waits for 30 ms, and returns all received bytes.
 static const char *said_after(const char *line) {
     static char text[1U << 16];
     TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
@@ -97,7 +97,7 @@ static const char *said_after(const char *line) {
     return text;
 }
 
-/// Fails unless an event of that name has come, with that in it.
+/// Checks that an event with this name has arrived and contains `part`.
 static void assert_told(const char *said, const char *name, const char *part) {
     char begin[64];
     char line[8192];
@@ -109,7 +109,7 @@ static void assert_told(const char *said, const char *name, const char *part) {
     TEST_ASSERT_EQUAL_CHAR('}', line[strlen(line) - 1U]);
 }
 
-TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later) {
+TEST(test_events_are_complete_and_do_not_wait_for_the_rate) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"bus\",\"lease\",\"stop\",\"state\"],\"rate_hz\":1}\n");
     daemon_rig_run(1000);
     do {
@@ -127,7 +127,7 @@ TEST(test_events_are_whole_and_come_at_once_to_who_is_due_later) {
     assert_told(said_after(""), "bus", "\"state\":\"bus_off\"");
 }
 
-TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence) {
+TEST(test_log_has_holder_of_a_lease_and_sentence_of_a_stop) {
     char sentence[1024];
     daemon_rig_keep_log();
     assert_reply("{\"cmd\":\"arm\",\"name\":\"pendant\"}", "\"ok\":true");
@@ -139,8 +139,8 @@ TEST(test_log_has_of_a_lease_who_has_it_and_of_a_stop_its_own_sentence) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), sentence), daemon_rig_log());
 }
 
-/// Before the next step: whoever asked may be gone then.
-TEST(test_stop_is_told_with_the_request_that_asks_for_it) {
+/// The report must precede the next step, because the client may have ended then.
+TEST(test_stop_is_reported_with_its_request) {
     static const char line[] = "{\"cmd\":\"stop\"}";
     gw_daemon_t *daemon = daemon_rig.daemon;
     const sock_handler_t *handler = &daemon->clients.handler;
@@ -151,7 +151,7 @@ TEST(test_stop_is_told_with_the_request_that_asks_for_it) {
     TEST_ASSERT_EQUAL_UINT32(before + 1U, daemon->answers.server.told.stop_number);
 }
 
-TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why) {
+TEST(test_arm_ended_by_estop_is_refused_with_id_and_reason) {
     static const char estop[] = "{\"cmd\":\"estop\",\"reason\":\"smoke\"}\n";
     const int other = daemon_rig_connect();
     daemon_rig_run(20);
@@ -166,7 +166,7 @@ TEST(test_arm_that_an_estop_ends_is_refused_with_its_id_and_why) {
     (void)close(other);
 }
 
-TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window) {
+TEST(test_tare_replies_with_the_window_of_each_wheel) {
     static const char *const sides[IW_SIDES] = {"left", "right"};
     char told[64];
     daemon_rig_run(3000);
@@ -182,7 +182,7 @@ TEST(test_tare_tells_and_keeps_of_each_wheel_its_own_window) {
     }
 }
 
-TEST(test_request_behind_an_arm_is_answered_after_it) {
+TEST(test_request_after_an_arm_is_answered_after_it) {
     (void)said_after("");
     const char *said = said_after("{\"id\":1,\"cmd\":\"arm\"}\n{\"id\":2,\"cmd\":\"hello\"}\n");
     const char *first = strstr(said, "\"id\":1,\"ok\":true");
@@ -190,14 +190,14 @@ TEST(test_request_behind_an_arm_is_answered_after_it) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":2,\"ok\":true"), said);
 }
 
-TEST(test_refusal_of_recordings_and_of_a_contradicted_arm_says_why) {
+TEST(test_refusal_of_recordings_and_arm_has_the_reason) {
     assert_reply("{\"cmd\":\"recordings\"}", "nothing is recorded: [record] blackbox_s is 0");
     iw_assumption_contradict(&daemon_rig.daemon->wheels.core.assumptions, IW_ASSUMPTION_SETPOINT_TYPE,
                              IW_SOURCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "setpoint_type");
 }
 
-TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both) {
+TEST(test_battery_low_names_its_wheel_and_fault_is_reported_once) {
     static const char *const sentences[IW_SIDES] = {"the left wheel's battery", "the right wheel's battery"};
     gw_health_t *health = &daemon_rig.daemon->wheels.health;
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}\n");
@@ -207,7 +207,7 @@ TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both) 
         const unsigned before[IW_SIDES] = {daemon_rig_logged(sentences[IW_LEFT]),
                                            daemon_rig_logged(sentences[IW_RIGHT])};
         health->limits.battery_low_dV = 255;
-        health->present[other][GW_BATTERY_LOW] = true; // Told already.
+        health->present[other][GW_BATTERY_LOW] = true; // Reported before
         daemon_rig_run(GW_HEALTH_US / IW_US_PER_MS + 200U);
         TEST_ASSERT_EQUAL_UINT(before[side] + 1U, daemon_rig_logged(sentences[side]));
         TEST_ASSERT_EQUAL_UINT(before[other], daemon_rig_logged(sentences[other]));
@@ -220,14 +220,14 @@ TEST(test_battery_is_told_by_the_name_of_its_wheel_and_the_fault_once_for_both) 
     }
 }
 
-TEST(test_frame_is_told_whole) {
+TEST(test_frame_event_is_complete) {
     (void)said_after("{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
     daemon_rig_run(200);
     const char *said = said_after("");
     assert_told(said, "frame", "\"data\":");
 }
 
-TEST(test_assumption_of_the_button_is_of_its_time_in_force) {
+TEST(test_button_uses_the_configured_debounce_time) {
     const gw_daemon_t *daemon = daemon_rig.daemon;
     TEST_ASSERT_NOT_EQUAL_UINT(0, daemon->config.estop.debounce_ms);
     TEST_ASSERT_EQUAL_UINT64(MS(daemon->config.estop.debounce_ms), daemon->assumptions.button.debounce_us);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
+// Rights of each socket to each request, and quotas: watchers do not reduce the resources of drivers.
 #include "answers/answers.h"
 #include "daemon_rig.h"
 #include "sockets/sock_clients.h"
@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #define CROWD SOCK_WATCHERS_MAX
-/// After so long whoever came too many and said no stop is turned away.
+/// After this time an additional connection that sent no stop is refused.
 #define STOP_MS (SOCK_STOP_US / IW_US_PER_MS + 2U)
 
 typedef struct {
@@ -22,7 +22,7 @@ typedef struct {
     bool watch; ///< Allowed on the socket for watching.
 } right_t;
 
-/// Every command there is.
+/// All commands
 static const right_t rights[IWN_CMDS] = {
     [IWN_CMD_HELLO] = {"{\"cmd\":\"hello\"}", true},
     [IWN_CMD_STATUS] = {"{\"cmd\":\"status\"}", true},
@@ -69,7 +69,7 @@ static void assert_has(const char *reply, const char *part) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : part);
 }
 
-/// Refused because of the socket; a recording may be denied for other reasons.
+/// Returns true if the request is refused because of the socket; a recording may be denied for other reasons.
 static bool is_denied(const char *reply) {
     TEST_ASSERT_NOT_EQUAL_MESSAGE('\0', reply[0], "no reply");
     return strstr(reply, "\"error\":\"denied\"") != NULL && strstr(reply, "this socket is for watching") != NULL;
@@ -86,9 +86,9 @@ static void connect_crowd(unsigned count) {
     }
 }
 
-// Rights -------------------------------------------------------------------------------------------------------------------
+// Rights --------------------------------------------------------------------------------------------------------------
 
-TEST(test_right_of_each_request_on_each_socket_is_as_listed) {
+TEST(test_right_to_each_request_on_each_socket_is_as_listed) {
     for (unsigned cmd = 0; cmd < IWN_CMDS; cmd++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(rights[cmd].line, "a command is missing in the table of this test");
         TEST_ASSERT_EQUAL_INT_MESSAGE(!rights[cmd].watch, is_denied(daemon_rig_ask(watcher, rights[cmd].line)),
@@ -97,7 +97,7 @@ TEST(test_right_of_each_request_on_each_socket_is_as_listed) {
     }
 }
 
-TEST(test_denial_names_the_socket_and_the_group_that_cure_it) {
+TEST(test_denial_names_the_socket_and_the_group_to_use) {
     const char *reply = daemon_rig_ask(watcher, "{\"id\":7,\"cmd\":\"arm\"}");
     assert_has(reply, "\"id\":7");
     assert_has(reply, daemon_rig.daemon->config.northbound.socket);
@@ -108,12 +108,12 @@ TEST(test_denial_names_the_socket_and_the_group_that_cure_it) {
     TEST_ASSERT_NULL(strstr(reply, "none"));
 }
 
-TEST(test_hello_tells_the_right) {
+TEST(test_hello_contains_the_right) {
     assert_has(daemon_rig_ask(driver, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
 }
 
-TEST(test_watcher_who_asks_to_drive_changes_nothing) {
+TEST(test_watcher_request_to_drive_changes_nothing) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"denied\"");
@@ -124,10 +124,10 @@ TEST(test_watcher_who_asks_to_drive_changes_nothing) {
     (void)daemon_rig_ask(driver, "{\"cmd\":\"stop\"}");
     daemon_rig_run(2000);
     (void)daemon_rig_ask(watcher, "{\"cmd\":\"drive\",\"left_mm_s\":900,\"right_mm_s\":900}");
-    daemon_rig_arm(driver); // What a watcher said is no command that somebody might arm into.
+    daemon_rig_arm(driver); // A drive of a watcher is no command and does not prevent arm.
 }
 
-TEST(test_stop_of_a_watcher_stops_whoever_drives) {
+TEST(test_stop_of_a_watcher_stops_the_driver) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"stop\"}"), "\"ok\":true");
@@ -140,7 +140,7 @@ TEST(test_stop_of_a_watcher_stops_whoever_drives) {
     assert_has(reply, who);
 }
 
-TEST(test_reset_that_an_estop_keeps_away_names_user_and_process) {
+TEST(test_reset_refused_by_a_new_estop_names_user_and_process) {
     char who[64];
     (void)snprintf(who, sizeof who, "user %u (process %d)", (unsigned)getuid(), (int)getpid());
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
@@ -154,9 +154,9 @@ TEST(test_reset_that_an_estop_keeps_away_names_user_and_process) {
     assert_has(daemon_rig_ask(driver, "{\"cmd\":\"reset\"}"), "\"ok\":true");
 }
 
-// Quotas -------------------------------------------------------------------------------------------------------------------
+// Quotas --------------------------------------------------------------------------------------------------------------
 
-TEST(test_watchers_take_no_slot_of_a_driver) {
+TEST(test_watchers_use_no_slot_of_a_driver) {
     daemon_rig.daemon->clients.most[SOCK_DRIVE] = 2;
     connect_crowd(CROWD - 1U);
     TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->clients.count[SOCK_WATCH]);
@@ -171,7 +171,7 @@ TEST(test_watchers_take_no_slot_of_a_driver) {
     (void)close(third);
 }
 
-TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again) {
+TEST(test_watcher_beyond_the_limit_is_refused_until_one_ends) {
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(2);
     char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
@@ -188,7 +188,7 @@ TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again) {
     TEST_ASSERT_EQUAL_UINT(3, sock_clients_count(&daemon_rig.daemon->clients));
 }
 
-TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing) {
+TEST(test_watchers_with_many_requests_do_not_delay_a_driver) {
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
         say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"force\",\"frame\"],\"rate_hz\":100}\n");
@@ -200,14 +200,14 @@ TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing) {
         for (unsigned i = 0; i < crowded; i++) {
             say(crowd[i], "{\"cmd\":\"status\"}\n{\"cmd\":\"arm\"}\n{\"cmd\":\"why\"}\n");
         }
-        daemon_rig_drive(driver, 300, 300, 20); // Fails if one command of it has no reply within 20 ms.
+        daemon_rig_drive(driver, 300, 300, 20); // Fails if a command has no reply within 20 ms.
     }
     const uint32_t periods = (uint32_t)((daemon_rig.now_us - begin_us) / 20000U);
     TEST_ASSERT_UINT_WITHIN(2, periods, daemon_rig.sent[IW_LEFT] - sent);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-/// How often `words` stand in what waits for it, which is taken.
+/// Receives all bytes of this client and counts `words` in them.
 static unsigned taken_with(int client, const char *words) {
     static char text[1U << 20];
     unsigned count = 0;
@@ -227,7 +227,7 @@ static unsigned frames_of(int client) {
     return taken_with(client, "\"event\":\"frame\"");
 }
 
-/// In how many of the next 200 ms frames came to it, and how many.
+/// Counts in how many of the next 200 ms frames arrive at this client, and the frames.
 static unsigned moments_with_frames(int client, unsigned *out_frames) {
     unsigned moments = 0;
     *out_frames = 0;
@@ -241,7 +241,7 @@ static unsigned moments_with_frames(int client, unsigned *out_frames) {
     return moments;
 }
 
-TEST(test_frames_come_one_by_one_to_few_and_together_to_many) {
+TEST(test_frames_are_sent_singly_to_few_and_grouped_to_many) {
     unsigned to_few;
     unsigned to_many;
     connect_crowd(GW_FRAMES_ONE_BY_ONE + 1U);
@@ -256,13 +256,13 @@ TEST(test_frames_come_one_by_one_to_few_and_together_to_many) {
     TEST_ASSERT_UINT_WITHIN_MESSAGE(4, to_few, to_many, "each of them, once");
 }
 
-TEST(test_states_for_many_are_written_once) {
+TEST(test_state_events_for_many_clients_are_equal) {
     char first[SOCK_REPLY_MAX];
     char second[SOCK_REPLY_MAX];
     connect_crowd(2);
     for (unsigned i = 0; i < crowded; i++) {
         say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}\n");
-        daemon_rig_run(7); // They have asked at different times.
+        daemon_rig_run(7); // The clients subscribe at different times.
     }
     daemon_rig_run(100);
     (void)recv(crowd[0], first, sizeof first - 1U, MSG_DONTWAIT);
@@ -274,7 +274,7 @@ TEST(test_states_for_many_are_written_once) {
     TEST_ASSERT_EQUAL_MEMORY(first, second, (size_t)length);
 }
 
-TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace) {
+TEST(test_flood_of_requests_of_a_watcher_is_served_at_its_rate) {
     for (unsigned i = 0; i < 100U; i++) {
         say(watcher, "{\"cmd\":\"hello\"}\n");
     }
@@ -293,7 +293,7 @@ TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
 }
 
-TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone) {
+TEST(test_flood_of_estop_latches_and_adds_few_stops) {
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     connect_crowd(CROWD - 1U);
@@ -318,7 +318,7 @@ static iw_time_us_t estop_seen_us(void) {
     return gw_wheels_look(&daemon_rig.daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
 }
 
-TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step) {
+TEST(test_estop_repeated_within_100_ms_is_answered_without_effect) {
     assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
     const iw_time_us_t first_us = estop_seen_us();
     daemon_rig_run(50);
@@ -329,7 +329,7 @@ TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_ste
     TEST_ASSERT_GREATER_THAN_UINT64(first_us, estop_seen_us());
 }
 
-TEST(test_estop_of_a_watcher_that_goes_at_once_counts) {
+TEST(test_estop_of_a_watcher_that_ends_immediately_latches) {
     say(watcher, "{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"estop\"}\n");
     (void)close(watcher);
     watcher = -1;
@@ -340,7 +340,7 @@ TEST(test_estop_of_a_watcher_that_goes_at_once_counts) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 
-TEST(test_flood_of_newcomers_that_watch_is_let_in_at_its_pace) {
+TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
     daemon_rig_keep_log();
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
@@ -361,7 +361,7 @@ TEST(test_flood_of_newcomers_that_watch_is_let_in_at_its_pace) {
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
 }
 
-TEST(test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in) {
+TEST(test_refused_watcher_is_logged_once_until_one_is_accepted) {
     daemon_rig_keep_log();
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(3);
@@ -375,7 +375,7 @@ TEST(test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
 }
 
-TEST(test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one) {
+TEST(test_client_without_descriptor_is_accepted_later) {
     sock_listener_t *listener = &daemon_rig.daemon->clients.listener[SOCK_DRIVE];
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
@@ -407,7 +407,7 @@ TEST(test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one) 
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
-TEST(test_requests_in_one_breath_are_answered_in_their_order) {
+TEST(test_requests_sent_together_are_answered_in_order) {
     char text[4096];
     say(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
     daemon_rig_run(1);
@@ -419,7 +419,7 @@ TEST(test_requests_in_one_breath_are_answered_in_their_order) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":72"), text);
 }
 
-TEST(test_round_of_sending_ends_when_its_time_is_up) {
+TEST(test_round_of_sending_ends_after_its_time) {
     static char text[65536];
     connect_crowd(CROWD - 1U);
     for (unsigned i = 0; i < crowded; i++) {
@@ -442,7 +442,7 @@ TEST(test_round_of_sending_ends_when_its_time_is_up) {
     }
     TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(sock_service_is_busy(clients));
-    daemon_rig_run(20); // All is sent: who has nothing waiting costs nothing of the time.
+    daemon_rig_run(20); // All is sent: a client without waiting bytes takes no time.
     daemon_rig.look_takes_us = 2U * SOCK_ROUND_US;
     sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;

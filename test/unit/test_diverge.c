@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Do both wheels together go where they are commanded? What counts, what is ordinary, when it is too much, and which wheel it is.
+// Divergence of the wheel pair from its commanded path: what counts, what is tolerated, the limit, and the responsible
+// wheel.
 #include "fixture.h"
 #include "iwheel/diverge.h"
 #include "unit.h"
@@ -7,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// At 192 mm, a wheel's own rpm.
+/// At 192 mm, for rpm of the wheel
 #define UM_S_PER_RPM 20106U
 #define STEP_US      2000U
 
@@ -33,7 +34,7 @@ typedef struct {
     int32_t right_mm_s;
 } speeds_t;
 
-/// That applied and measured for so long; ends early when it diverges. The time it took.
+/// Applies and measures these speeds for this time. Ends early if the pair diverges. Returns the time in ms.
 static uint32_t go_on(speeds_t applied, speeds_t measured, uint32_t for_ms) {
     const iw_time_us_t from_us = now_us;
     verdict = IW_DIVERGE_NOT;
@@ -48,7 +49,7 @@ static uint32_t go_on(speeds_t applied, speeds_t measured, uint32_t for_ms) {
     return (uint32_t)((now_us - from_us) / 1000U);
 }
 
-/// Both go as commanded: nothing differs, and what is expected has settled.
+/// Both wheels follow their command: there is no deviation, and the expected speeds are settled.
 static void settle(speeds_t speeds) {
     iw_diverge_receive(&pair, IW_LEFT, speeds.left_mm_s);
     iw_diverge_receive(&pair, IW_RIGHT, speeds.right_mm_s);
@@ -59,7 +60,7 @@ static void settle(speeds_t speeds) {
     TEST_ASSERT_EQUAL_INT32(speeds.right_mm_s * 1000, pair.expected_um_s[IW_RIGHT]);
 }
 
-TEST(test_diverge_pair_that_follows_does_not) {
+TEST(test_diverge_following_pair_has_no_deviation) {
     settle((speeds_t){800, -300});
     (void)go_on((speeds_t){800, -300}, (speeds_t){800, -300}, 10000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -67,7 +68,7 @@ TEST(test_diverge_pair_that_follows_does_not) {
     TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
 }
 
-TEST(test_diverge_expected_follows_what_is_applied_with_the_lag) {
+TEST(test_diverge_expected_speed_follows_the_applied_with_the_lag) {
     pair.applied_mm_s[IW_LEFT] = 1000;
     pair.applied_mm_s[IW_RIGHT] = -1000;
     for (uint32_t i = 0; i < 30U; i++) {
@@ -78,7 +79,7 @@ TEST(test_diverge_expected_follows_what_is_applied_with_the_lag) {
     TEST_ASSERT_INT32_WITHIN(4000, -632100, pair.expected_um_s[IW_RIGHT]);
 }
 
-TEST(test_diverge_expected_is_the_same_by_long_steps_and_short_ones) {
+TEST(test_diverge_expected_speed_is_equal_with_long_steps) {
     pair.applied_mm_s[IW_LEFT] = 1000;
     (void)iw_diverge_step(&pair, now_us + MS(20));
     (void)iw_diverge_step(&pair, now_us + MS(40));
@@ -86,7 +87,7 @@ TEST(test_diverge_expected_is_the_same_by_long_steps_and_short_ones) {
     TEST_ASSERT_INT32_WITHIN(8000, 632100, pair.expected_um_s[IW_LEFT]);
 }
 
-TEST(test_diverge_lag_is_the_configured_one) {
+TEST(test_diverge_lag_is_configured) {
     config.wheel_lag_ms = 120;
     pair.applied_mm_s[IW_LEFT] = 1000;
     for (uint32_t i = 0; i < 60U; i++) {
@@ -96,8 +97,8 @@ TEST(test_diverge_lag_is_the_configured_one) {
     TEST_ASSERT_INT32_WITHIN(4000, 632100, pair.expected_um_s[IW_LEFT]);
 }
 
-/// A wheel that is gone counts double: 60 mm at 2000 mm/s are 30 ms, a little more for what leaks.
-TEST(test_diverge_blocked_wheel_is_slow_within_its_millimetres) {
+/// A wheel that does not turn counts double: 60 mm at 2000 mm/s take 30 ms, and a little more because of the leak.
+TEST(test_diverge_blocked_wheel_is_slow_after_60_mm) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         begin();
         settle((speeds_t){1000, 1000});
@@ -109,27 +110,27 @@ TEST(test_diverge_blocked_wheel_is_slow_within_its_millimetres) {
     }
 }
 
-TEST(test_diverge_blocked_wheel_backwards_is_slow_too) {
+TEST(test_diverge_blocked_wheel_in_reverse_is_slow) {
     settle((speeds_t){-1000, -1000});
     TEST_ASSERT_UINT32_WITHIN(3, 32, go_on((speeds_t){-1000, -1000}, (speeds_t){0, -1000}, 1000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
 }
 
-TEST(test_diverge_wheel_that_turns_backwards_is_slow) {
+TEST(test_diverge_wheel_in_the_opposite_direction_is_slow) {
     settle((speeds_t){400, 400});
     (void)go_on((speeds_t){400, 400}, (speeds_t){400, -400}, 1000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-TEST(test_diverge_no_speed_is_too_low_to_be_compared) {
+TEST(test_diverge_compares_at_low_speed) {
     settle((speeds_t){99, 99});
     TEST_ASSERT_UINT32_WITHIN(10, 362, go_on((speeds_t){99, 99}, (speeds_t){0, 99}, 3000U));
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
-TEST(test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow) {
+TEST(test_diverge_wheel_below_80_percent_is_slow_else_away) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){800, 1000}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
@@ -139,8 +140,8 @@ TEST(test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
-/// Below a quarter of what is expected the whole difference counts, and double.
-TEST(test_diverge_wheel_below_a_quarter_counts_double) {
+/// Below a quarter of the expected speed the whole difference counts, and double.
+TEST(test_diverge_wheel_below_25_percent_counts_double) {
     settle((speeds_t){400, 400});
     const uint32_t quarter_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 100}, 1000U);
     begin();
@@ -150,8 +151,8 @@ TEST(test_diverge_wheel_below_a_quarter_counts_double) {
     TEST_ASSERT_UINT32_WITHIN(4, 106, below_ms);
 }
 
-/// Below 50 mm/s one rpm is too coarse to tell that a wheel is gone.
-TEST(test_diverge_slow_command_counts_once) {
+/// Below 50 mm/s one rpm is too coarse to detect a wheel that does not turn.
+TEST(test_diverge_command_below_50_mm_s_counts_once) {
     settle((speeds_t){49, 49});
     (void)go_on((speeds_t){49, 49}, (speeds_t){49, 0}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -161,14 +162,14 @@ TEST(test_diverge_slow_command_counts_once) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
 }
 
-TEST(test_diverge_wheel_that_runs_on_ramps) {
+TEST(test_diverge_wheel_that_is_too_fast_is_away) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){500, 500}, (speeds_t){500, 1000}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-TEST(test_diverge_wheel_that_turns_uncommanded_ramps_either_way) {
+TEST(test_diverge_uncommanded_wheel_is_away_in_both_directions) {
     (void)go_on((speeds_t){0, 0}, (speeds_t){0, -300}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
@@ -178,7 +179,7 @@ TEST(test_diverge_wheel_that_turns_uncommanded_ramps_either_way) {
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
 }
 
-TEST(test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary) {
+TEST(test_diverge_droop_and_resolution_are_tolerated) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){943, 1000}, 10000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -188,15 +189,15 @@ TEST(test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary) {
     TEST_ASSERT_INT32_WITHIN(500, 7004, pair.path_um);
 }
 
-TEST(test_diverge_both_wheels_slow_alike_do_not) {
+TEST(test_diverge_both_wheels_equally_slow_have_no_deviation) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 0}, 3000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
     TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
 }
 
-/// What leaks as fast as it comes stays below the limit: 60 mm in 1000 ms.
-TEST(test_diverge_steady_difference_below_its_limit_is_never_too_much) {
+/// A difference that leaks as fast as it grows stays below the limit: 60 mm in 1000 ms.
+TEST(test_diverge_steady_difference_below_the_leak_is_tolerated) {
     settle((speeds_t){500, 500});
     (void)go_on((speeds_t){500, 500}, (speeds_t){500, 595}, 20000U);
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
@@ -205,7 +206,7 @@ TEST(test_diverge_steady_difference_below_its_limit_is_never_too_much) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
 }
 
-TEST(test_diverge_leak_and_limit_are_the_configured_ones) {
+TEST(test_diverge_leak_and_limit_are_configured) {
     config.pair_mm = 100;
     config.pair_leak_ms = 3000;
     settle((speeds_t){500, 500});
@@ -215,7 +216,7 @@ TEST(test_diverge_leak_and_limit_are_the_configured_ones) {
     TEST_ASSERT_INT32_WITHIN(200, 100000, pair.path_um);
 }
 
-TEST(test_diverge_restart_forgets_the_deviation_but_not_the_largest) {
+TEST(test_diverge_restart_resets_the_deviation_not_the_largest) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
     TEST_ASSERT_GREATER_THAN_INT32(30000, pair.path_um);
@@ -227,7 +228,7 @@ TEST(test_diverge_restart_forgets_the_deviation_but_not_the_largest) {
     TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_RIGHT]);
 }
 
-TEST(test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on) {
+TEST(test_diverge_begin_resets_only_for_a_new_drive) {
     iw_diverge_begin(&pair, 5000U);
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
@@ -240,7 +241,7 @@ TEST(test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on) {
     TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
 }
 
-TEST(test_diverge_steps_within_a_millisecond_count_together) {
+TEST(test_diverge_steps_below_the_minimum_count_together) {
     settle((speeds_t){1000, 1000});
     iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US - 1U);
@@ -256,34 +257,34 @@ TEST(test_diverge_long_pause_counts_as_50_ms) {
     TEST_ASSERT_INT32_WITHIN(500, 100000, pair.path_um);
 }
 
-/// Exact figures: each constant of the arithmetic has its share in them.
-TEST(test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand) {
+/// Exact figures, to which each constant of the calculation contributes.
+TEST(test_diverge_one_step_equals_the_hand_calculation) {
     TEST_ASSERT_EQUAL_INT32(20106, pair.um_s_per_rpm);
     pair.applied_mm_s[IW_LEFT] = 1000;
-    (void)iw_diverge_step(&pair, now_us + MS(40)); // Half of the way: 40 / (60 + 20).
+    (void)iw_diverge_step(&pair, now_us + MS(40)); // Half of the way: 40 / (60 + 20)
     TEST_ASSERT_EQUAL_INT32(500000, pair.expected_um_s[IW_LEFT]);
     begin();
     config.wheel_lag_ms = 300;
     pair.applied_mm_s[IW_LEFT] = 1000;
-    (void)iw_diverge_step(&pair, now_us + MS(100)); // Counts as 50 / (300 + 25).
+    (void)iw_diverge_step(&pair, now_us + MS(100)); // Counts as 50 / (300 + 25)
     TEST_ASSERT_EQUAL_INT32(153839, pair.expected_um_s[IW_LEFT]);
     begin();
     config.wheel_lag_ms = 10;
     pair.applied_mm_s[IW_LEFT] = 1000;
-    (void)iw_diverge_step(&pair, now_us + MS(50)); // All of it: 50 is more than 10 + 25.
+    (void)iw_diverge_step(&pair, now_us + MS(50)); // The full way: 50 is more than 10 + 25.
     TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_LEFT]);
 }
 
-TEST(test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm) {
+TEST(test_diverge_tolerance_is_4_percent_and_7_8_of_an_rpm) {
     settle((speeds_t){1000, 1000});
-    iw_diverge_receive(&pair, IW_LEFT, 942); // 58000 um/s less than it should: 408 more than 57592.
+    iw_diverge_receive(&pair, IW_LEFT, 942); // 58000 um/s too slow: 408 more than 57592
     (void)iw_diverge_step(&pair, now_us + MS(50));
     TEST_ASSERT_EQUAL_INT32(20, pair.path_um);
     begin();
     settle((speeds_t){1000, 1000});
     iw_diverge_receive(&pair, IW_LEFT, 0);
     (void)iw_diverge_step(&pair, now_us + MS(50));
-    TEST_ASSERT_EQUAL_INT32(100006, pair.path_um); // Double.
+    TEST_ASSERT_EQUAL_INT32(100006, pair.path_um); // Double
 }
 
 TEST(test_diverge_limit_is_exact) {
@@ -297,7 +298,7 @@ TEST(test_diverge_limit_is_exact) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
-TEST(test_diverge_four_fifths_of_the_expected_speed_are_exact) {
+TEST(test_diverge_limit_of_80_percent_is_exact) {
     settle((speeds_t){10000, 10000});
     pair.path_um = 60000;
     iw_diverge_receive(&pair, IW_LEFT, 7993);
@@ -306,7 +307,7 @@ TEST(test_diverge_four_fifths_of_the_expected_speed_are_exact) {
     TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
 }
 
-TEST(test_diverge_largest_stays_when_the_deviation_leaks_away) {
+TEST(test_diverge_largest_stays_while_the_deviation_leaks) {
     settle((speeds_t){1000, 1000});
     (void)go_on((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
     const int32_t largest_um = pair.largest_um;
@@ -326,11 +327,11 @@ TEST(test_diverge_names_the_wheel_that_differs_more) {
     TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
     begin();
     settle((speeds_t){500, 500});
-    (void)go_on((speeds_t){500, 500}, (speeds_t){400, 600}, 1000U); // Both alike: the right one.
+    (void)go_on((speeds_t){500, 500}, (speeds_t){400, 600}, 1000U); // Equal differences: the right wheel
     TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
 }
 
-TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second) {
+TEST(test_diverge_measured_speed_is_clamped_to_40_m_s) {
     iw_diverge_receive(&pair, IW_LEFT, 40001);
     iw_diverge_receive(&pair, IW_RIGHT, -40001);
     iw_diverge_restart(&pair, now_us);
@@ -341,7 +342,7 @@ TEST(test_diverge_no_measured_speed_counts_beyond_40_metres_a_second) {
     TEST_ASSERT_EQUAL_INT32(39999000, pair.expected_um_s[IW_LEFT]);
 }
 
-TEST(test_diverge_absurd_values_stay_within_bounds) {
+TEST(test_diverge_extreme_values_stay_within_bounds) {
     for (uint32_t i = 0; i < 2000U; i++) {
         now_us += MS(50);
         pair.applied_mm_s[IW_LEFT] = INT16_MIN;
@@ -356,12 +357,12 @@ TEST(test_diverge_absurd_values_stay_within_bounds) {
     TEST_ASSERT_EQUAL_INT32(1000000, pair.largest_um);
 }
 
-TEST(test_diverge_step_of_telemetry_is_that_of_the_rotor) {
+TEST(test_diverge_resolution_is_that_of_the_rotor_if_configured) {
     config.gear_turns = 5;
     config.gear_per = 4;
     iw_diverge_init(&pair, &config);
     TEST_ASSERT_EQUAL_INT32(UM_S_PER_RPM, pair.um_s_per_rpm);
     config.rpm_of_rotor = true;
     iw_diverge_init(&pair, &config);
-    TEST_ASSERT_EQUAL_INT32(16084, pair.um_s_per_rpm); // 20106 x 4 / 5.
+    TEST_ASSERT_EQUAL_INT32(16084, pair.um_s_per_rpm); // 20106 x 4 / 5
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The gate: what may leave, byte by byte, and nothing else.
+// Envelope: which frames may be sent, byte by byte; all others are stopped.
 #include <string.h>
 
 #include "iwheel/private/transmit.h"
@@ -10,10 +10,10 @@
 
 static iw_config_t config;
 static iw_envelope_t envelope;
-/// Most of these tests judge speeds, with a current of 0.
+/// Most of these tests check speeds with a current of 0.
 static bool no_floor;
 
-/// The configuration was changed: a new envelope for it.
+/// Creates a new envelope after a change of the configuration.
 static void restart(void) {
     config.min_current_mA = no_floor ? 300 : config.min_current_mA;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
@@ -32,7 +32,7 @@ void setUp(void) {
     restart();
 }
 
-/// Bytes written by hand, so that an error of the encoder does not hide one of the envelope.
+/// Returns a frame written byte by byte, so that a fault of the encoder does not hide one of the envelope.
 static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     iw_can_frame_t frame;
     const uint32_t speed = (uint32_t)speed_mm_s;
@@ -53,13 +53,13 @@ static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t 
     return iw_envelope_check(&envelope, &frame, now_us);
 }
 
-/// Brings the wheel to a low speed: zero, and long after it the speed.
+/// Brings the wheel to a low speed: sends zero, and the speed a long time after it.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - AGES_US, side, 0, config.max_current_mA));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, config.max_current_mA));
 }
 
-TEST(test_init_forgets_everything) {
+TEST(test_envelope_init_has_no_previous_setpoint) {
     TEST_ASSERT_EQUAL_UINT32(0, envelope.stopped);
     TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_RIGHT]);
@@ -72,7 +72,7 @@ static uint32_t format_of(unsigned bits) {
            (((bits & 4U) != 0) ? IW_CAN_ERROR : 0U) | (((bits & 8U) != 0) ? IW_CAN_FD : 0U);
 }
 
-/// Every length, format and kind with this number; returns how many passed.
+/// Checks every length, format and kind with this number. Returns how many frames passed.
 static uint32_t sweep_number(uint32_t number) {
     uint32_t passed = 0;
     for (unsigned rest = 0; rest < 16U * 16U * 2U; rest++) {
@@ -90,7 +90,7 @@ static uint32_t sweep_number(uint32_t number) {
     return passed;
 }
 
-TEST(test_check_every_id_length_and_format_passes_the_two_setpoints_only) {
+TEST(test_envelope_every_id_and_format_passes_two_setpoints_only) {
     for (uint16_t dlc = 5; dlc <= 8; dlc++) {
         uint32_t passed = 0;
         config.setpoint_dlc = dlc;
@@ -103,7 +103,7 @@ TEST(test_check_every_id_length_and_format_passes_the_two_setpoints_only) {
     }
 }
 
-TEST(test_check_wider_number_with_our_low_bits_is_stopped) {
+TEST(test_envelope_29_bit_id_with_setpoint_bits_is_stopped) {
     for (unsigned bit = 11; bit < 32; bit++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.id |= (uint32_t)1 << bit;
@@ -111,7 +111,7 @@ TEST(test_check_wider_number_with_our_low_bits_is_stopped) {
     }
 }
 
-TEST(test_check_absurd_length_is_stopped) {
+TEST(test_envelope_other_length_is_stopped) {
     for (unsigned dlc = 0; dlc < 256; dlc++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.dlc = (uint8_t)dlc;
@@ -120,7 +120,7 @@ TEST(test_check_absurd_length_is_stopped) {
     }
 }
 
-TEST(test_check_every_type_passes_the_configured_one_only) {
+TEST(test_envelope_every_type_passes_the_configured_one_only) {
     for (unsigned configured = 0; configured < 256; configured++) {
         config.setpoint_type = (uint8_t)configured;
         restart();
@@ -133,7 +133,7 @@ TEST(test_check_every_type_passes_the_configured_one_only) {
     }
 }
 
-TEST(test_check_type_not_configured_stops_every_type_even_at_zero) {
+TEST(test_envelope_unset_type_stops_every_frame) {
     config.setpoint_type_set = false;
     restart();
     for (unsigned type = 0; type < 256; type++) {
@@ -144,7 +144,7 @@ TEST(test_check_type_not_configured_stops_every_type_even_at_zero) {
     TEST_ASSERT_EQUAL_UINT32(256, envelope.stopped);
 }
 
-TEST(test_check_role_not_configured_stops_everything) {
+TEST(test_envelope_unset_role_stops_every_frame) {
     config.current_role = IW_ROLE_UNSET;
     restart();
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, check(START_US, IW_LEFT, 0, 0));
@@ -152,7 +152,7 @@ TEST(test_check_role_not_configured_stops_everything) {
     TEST_ASSERT_EQUAL_UINT32(2, envelope.stopped);
 }
 
-/// A limit has no sign and a floor: a negative one is no current that may leave, nor one below the floor.
+/// A current limit has no sign and a floor: the envelope stops a negative limit and one below the floor.
 static void sweep_currents(int32_t speed_mm_s) {
     const int32_t highest = config.max_current_mA;
     const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? config.min_current_mA : -highest;
@@ -165,7 +165,7 @@ static void sweep_currents(int32_t speed_mm_s) {
     }
 }
 
-TEST(test_check_every_current_passes_within_the_configured_maximum_only) {
+TEST(test_envelope_every_current_passes_within_the_limits_only) {
     static const uint16_t maxima[] = {300, 301, 700, 1234, 1999, 2000};
     static const uint16_t minima[] = {300, 300, 500, 1233, 1999, 300};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
@@ -181,7 +181,7 @@ TEST(test_check_every_current_passes_within_the_configured_maximum_only) {
     }
 }
 
-TEST(test_check_every_speed_passes_within_the_configured_maximum_only) {
+TEST(test_envelope_every_speed_passes_within_the_maximum_only) {
     static const uint16_t maxima[] = {10, 11, 1000, 4999, 5000};
     for (size_t i = 0; i < sizeof maxima / sizeof maxima[0]; i++) {
         config.max_speed_mm_s = maxima[i];
@@ -200,7 +200,7 @@ TEST(test_check_every_speed_passes_within_the_configured_maximum_only) {
     }
 }
 
-TEST(test_check_many_things_wrong_names_the_first_in_the_documented_order) {
+TEST(test_envelope_several_faults_names_the_first_one) {
     iw_can_frame_t frame = setpoint(IW_LEFT, 30000, 30000);
     frame.data[0] = 2;
     frame.id = 267;

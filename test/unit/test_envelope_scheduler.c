@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The envelope and the scheduler know nothing of each other: whatever the scheduler makes of commands and times, the envelope must pass it.
+/// The envelope and the scheduler are independent: the envelope must pass every pair that the scheduler makes of
+/// commands and times.
 #include <string.h>
 
 #include "iwheel/codec.h"
@@ -36,7 +37,7 @@ static iw_command_t any_command(const iw_config_t *config) {
     return command;
 }
 
-/// As the gateway commands it: within the limit of yaw.
+/// Returns a pair as the gateway commands it: within the limit of yaw.
 static iw_pair_t any_pair(const iw_config_t *config, const iw_yaw_t *yaw) {
     iw_pair_t pair = {{any_command(config), any_command(config)}};
     int32_t speeds[IW_SIDES] = {pair.wheel[IW_LEFT].speed_mm_s, pair.wheel[IW_RIGHT].speed_mm_s};
@@ -83,7 +84,7 @@ static void run_once(void) {
     }
 }
 
-TEST(test_gate_whatever_the_scheduler_takes_passes) {
+TEST(test_envelope_every_pair_of_the_scheduler_passes) {
     for (seed = 1; seed < 3000U; seed++) {
         const uint32_t run = seed;
         run_once();

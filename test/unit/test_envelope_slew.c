@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The envelope and time: how far a speed may be from the one before.
+// Envelope and time: the permitted difference between a speed and the previous one.
 #include <string.h>
 
 #include "iwheel/private/transmit.h"
@@ -7,7 +7,7 @@
 
 #define START_US 5000000123ULL
 #define AGES_US  3600000000ULL
-/// A ramp in whole mm/s may be this much ahead of its slope; a verdict is demanded outside this band only.
+/// A ramp in whole mm/s may be ahead of its slope by this value. The tests require a verdict outside this band only.
 #define ROUNDING_MM_S 1
 
 static iw_config_t config;
@@ -16,7 +16,7 @@ static iw_envelope_t envelope;
 static void restart(void) {
     config.min_current_mA = 300;
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    config.min_current_mA = 0; // These tests judge speeds, with a current of 0.
+    config.min_current_mA = 0; // These tests check speeds with a current of 0.
     memset(&envelope, 0, sizeof envelope);
     envelope.config = &config;
 }
@@ -40,7 +40,7 @@ static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t 
     return iw_envelope_check(&envelope, &frame, now_us);
 }
 
-/// Brings the wheel to a speed, as fast as the slope allows.
+/// Brings the wheel to a speed as fast as the slope permits.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     const int32_t step = config.accel_mm_s2 * (int32_t)(IW_ENVELOPE_ELAPSED_MAX_US / 1000U) / 1000;
     const int32_t direction = (speed_mm_s < 0) ? -1 : 1;
@@ -53,7 +53,7 @@ static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, 0));
 }
 
-/// The verdict on going from one speed to another in the given time, with a fresh envelope.
+/// Returns the verdict on a change of speed in the given time, with a new envelope.
 static iw_envelope_verdict_t change(int32_t from_mm_s, int32_t to_mm_s, iw_time_us_t elapsed_us) {
     restart();
     settle(START_US, IW_LEFT, from_mm_s);
@@ -64,7 +64,7 @@ static const iw_time_us_t elapsed_list[] = {0,     1,     999,   1000,   4999,  
                                             20000, 20001, 50000, 100000, 299999, 300000};
 #define ELAPSED (sizeof elapsed_list / sizeof elapsed_list[0])
 
-/// Judges both sides of the boundary of a slope, forward and backward.
+/// Checks both sides of the limit of a slope, forward and in reverse.
 static void check_boundary(int32_t from_mm_s, int32_t direction, uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
     const int32_t allowed = (int32_t)(slope_mm_s2 * elapsed_us / 1000000U);
     const int32_t inside = from_mm_s + direction * allowed;
@@ -75,7 +75,7 @@ static void check_boundary(int32_t from_mm_s, int32_t direction, uint32_t slope_
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-from_mm_s, -outside, elapsed_us));
 }
 
-TEST(test_check_away_from_zero_allows_the_acceleration_and_no_more) {
+TEST(test_envelope_away_from_zero_allows_the_acceleration_only) {
     static const uint16_t slopes[] = {50, 800, 799, 2500};
     config.decel_mm_s2 = 20000;
     config.max_speed_mm_s = 2000;
@@ -85,7 +85,7 @@ TEST(test_check_away_from_zero_allows_the_acceleration_and_no_more) {
     }
 }
 
-TEST(test_check_towards_zero_allows_the_deceleration_and_no_more) {
+TEST(test_envelope_towards_zero_allows_the_deceleration_only) {
     static const uint16_t slopes[] = {100, 1500, 1501, 3333};
     static const uint16_t speeds[] = {70, 1100, 1101, 2500};
     config.accel_mm_s2 = 20000;
@@ -96,13 +96,13 @@ TEST(test_check_towards_zero_allows_the_deceleration_and_no_more) {
     }
 }
 
-TEST(test_check_from_zero_allows_the_acceleration_and_no_more) {
+TEST(test_envelope_from_zero_allows_the_acceleration_only) {
     for (size_t i = 0; i < ELAPSED; i++) {
         check_boundary(0, 1, 800, elapsed_list[i]);
     }
 }
 
-/// A ramp of fractions, cut to whole mm/s at every step, up to full speed and down again, in both directions.
+/// Runs a ramp of fractions, truncated to whole mm/s at each step, to full speed and back, in this direction.
 static void run_ramp(int32_t direction, iw_time_us_t step_us) {
     iw_time_us_t now_us = START_US;
     uint64_t speed_um_s = 0;
@@ -119,7 +119,7 @@ static void run_ramp(int32_t direction, iw_time_us_t step_us) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, 0, 0));
 }
 
-TEST(test_check_ramp_cut_to_whole_numbers_passes) {
+TEST(test_envelope_ramp_truncated_to_whole_mm_s_passes) {
     static const iw_time_us_t steps[] = {5000, 5001, 7777, 19999, 20000, 20013, 33333, 50000};
     config.accel_mm_s2 = 799;
     config.decel_mm_s2 = 1499;
@@ -129,12 +129,12 @@ TEST(test_check_ramp_cut_to_whole_numbers_passes) {
     }
 }
 
-TEST(test_check_same_speed_at_once_passes) {
+TEST(test_envelope_same_speed_without_delay_passes) {
     settle(START_US, IW_LEFT, 321);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 321, 0));
 }
 
-TEST(test_check_sign_change_is_stopped_until_zero_was_sent) {
+TEST(test_envelope_sign_change_is_stopped_until_a_zero) {
     static const int32_t speeds[] = {1, 2, 3, 10, 500, 1000};
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
         const int32_t speed = speeds[i];
@@ -147,13 +147,13 @@ TEST(test_check_sign_change_is_stopped_until_zero_was_sent) {
     }
 }
 
-TEST(test_check_zero_passes_at_once_from_every_speed) {
+TEST(test_envelope_zero_passes_without_delay_from_every_speed) {
     for (int32_t speed = -1000; speed <= 1000; speed++) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(speed, 0, 0));
     }
 }
 
-TEST(test_check_after_a_zero_the_ramp_begins_at_zero) {
+TEST(test_envelope_ramp_after_a_zero_begins_at_zero) {
     settle(START_US, IW_LEFT, 1000);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 0, 2000));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 1000, 0));
@@ -161,7 +161,7 @@ TEST(test_check_after_a_zero_the_ramp_begins_at_zero) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 16, 0));
 }
 
-TEST(test_check_zero_speed_is_a_zero_whatever_the_limit_current) {
+TEST(test_envelope_zero_speed_with_any_current_limit_is_a_zero) {
     static const int32_t currents[] = {0, 1, 1999, 2000};
     for (size_t i = 0; i < sizeof currents / sizeof currents[0]; i++) {
         restart();
@@ -170,7 +170,7 @@ TEST(test_check_zero_speed_is_a_zero_whatever_the_limit_current) {
     }
 }
 
-TEST(test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint) {
+TEST(test_envelope_zero_speed_with_current_setpoint_is_no_zero) {
     config.current_role = IW_ROLE_SETPOINT;
     restart();
     settle(START_US, IW_LEFT, 1000);
@@ -179,7 +179,7 @@ TEST(test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 0, 0));
 }
 
-TEST(test_check_refused_frame_is_not_remembered) {
+TEST(test_envelope_stopped_frame_is_not_stored) {
     static const struct {
         int32_t speed_mm_s;
         int32_t current_mA;
@@ -200,14 +200,14 @@ TEST(test_check_refused_frame_is_not_remembered) {
     }
 }
 
-TEST(test_check_passed_frame_is_remembered_with_its_time) {
+TEST(test_envelope_passed_frame_is_stored_with_its_time) {
     settle(START_US, IW_LEFT, 100);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 10000, IW_LEFT, 108, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
 }
 
-TEST(test_check_wheels_do_not_share_their_memory) {
+TEST(test_envelope_wheels_have_separate_state) {
     settle(START_US, IW_LEFT, 1000);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_RIGHT, 0, 0));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_RIGHT, 1000, 0));
@@ -215,7 +215,7 @@ TEST(test_check_wheels_do_not_share_their_memory) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 1000, 0));
 }
 
-TEST(test_check_silence_is_no_permission_to_jump) {
+TEST(test_envelope_jump_after_silence_is_stopped) {
     static const iw_time_us_t silences[] = {300001, 1000000, AGES_US, (iw_time_us_t)1 << 50, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof silences / sizeof silences[0]; i++) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 240 + ROUNDING_MM_S + 1, silences[i]));
@@ -225,7 +225,7 @@ TEST(test_check_silence_is_no_permission_to_jump) {
     }
 }
 
-TEST(test_check_steepest_slope_over_the_longest_time_does_not_overflow) {
+TEST(test_envelope_steepest_slope_does_not_overflow) {
     config.accel_mm_s2 = 20000;
     config.decel_mm_s2 = 20000;
     config.max_speed_mm_s = 5000;
@@ -235,7 +235,7 @@ TEST(test_check_steepest_slope_over_the_longest_time_does_not_overflow) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 5000, 249000));
 }
 
-TEST(test_check_first_frame_must_start_near_zero) {
+TEST(test_envelope_first_frame_must_be_near_zero) {
     static const iw_time_us_t starts[] = {0, 1000, START_US, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
         restart();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The envelope of a pair: how fast it turns the machine, and how fast that grows; a stop is never held up.
+// Envelope of a pair: the yaw rate of the machine and its growth; a stop always passes.
 #include "fixture.h"
 #include "iwheel/private/transmit.h"
 #include "unit.h"
@@ -28,7 +28,7 @@ void setUp(void) {
     begin();
 }
 
-/// Bytes written by hand. Speeds as on the bus.
+/// Checks a pair written byte by byte. Speeds are as on the bus.
 static iw_envelope_verdict_t check(iw_time_us_t after_us, int32_t left_mm_s, int32_t right_mm_s) {
     const int32_t speeds[IW_SIDES] = {left_mm_s, right_mm_s};
     iw_can_frame_t frames[IW_SIDES];
@@ -42,7 +42,7 @@ static iw_envelope_verdict_t check(iw_time_us_t after_us, int32_t left_mm_s, int
     }
     now_us += after_us;
     const iw_envelope_verdict_t verdict = iw_envelope_check_pair(&envelope, frames, now_us);
-    if (verdict == IW_ENVELOPE_PASS) { // What each wheel alone may do is not judged here.
+    if (verdict == IW_ENVELOPE_PASS) { // The rules of a single wheel are not tested here.
         envelope.last_mm_s[IW_LEFT] = left_mm_s;
         envelope.last_mm_s[IW_RIGHT] = right_mm_s;
         envelope.last_us[IW_LEFT] = envelope.last_us[IW_RIGHT] = now_us;
@@ -50,7 +50,7 @@ static iw_envelope_verdict_t check(iw_time_us_t after_us, int32_t left_mm_s, int
     return verdict;
 }
 
-/// A difference that passes, long after the one before.
+/// Reaches a difference of speeds in steps that pass.
 static void settle(int32_t left_mm_s, int32_t right_mm_s) {
     while (check(300000, left_mm_s, right_mm_s) != IW_ENVELOPE_PASS) {
         const int32_t grown = turn() + 2;
@@ -59,7 +59,7 @@ static void settle(int32_t left_mm_s, int32_t right_mm_s) {
     envelope.stopped = 0;
 }
 
-TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine) {
+TEST(test_envelope_turn_passes_up_to_the_configured_yaw) {
     static const struct {
         uint16_t max_mrad_s, track_mm, radius_mm;
         int32_t most_mm_s;
@@ -82,7 +82,7 @@ TEST(test_envelope_turn_passes_up_to_the_limit_of_the_real_machine) {
     }
 }
 
-TEST(test_envelope_without_a_track_no_turn_passes_and_every_zero_does) {
+TEST(test_envelope_without_a_track_only_zeros_pass) {
     config.track_mm = 0;
     begin();
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
@@ -91,16 +91,16 @@ TEST(test_envelope_without_a_track_no_turn_passes_and_every_zero_does) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(300000, 0, 0));
 }
 
-TEST(test_envelope_turn_grows_no_faster_than_configured) {
+TEST(test_envelope_turn_grows_at_most_as_configured) {
     static const struct {
         uint16_t accel_mrad_s2, track_mm, radius_mm;
         uint32_t after_us;
-        int32_t most_mm_s; ///< With 2 mm/s for the rounding of both speeds.
+        int32_t most_mm_s; ///< With 2 mm/s for the rounding of both speeds
     } cases[] = {{2000, 540, 192, 20000, 23},   {2000, 540, 192, 0, 2},        {2000, 540, 192, 925, 2},
                  {2000, 540, 192, 926, 3},      {2000, 540, 192, 300000, 326}, {2000, 540, 192, 9000000, 326},
                  {2000, 540, 60, 20000, 71},    {2000, 540, 400, 20000, 12},   {100, 200, 400, 20000, 2},
-                 {1001, 333, 192, 300001, 101}, // A microsecond more of what counts would be 102.
-                 {1999, 477, 100, 27311, 51}};  // 52 would be beyond by less than a billionth.
+                 {1001, 333, 192, 300001, 101}, // One microsecond more would permit 102.
+                 {1999, 477, 100, 27311, 51}};  // 52 would exceed the limit by less than a billionth.
     config.max_yaw_mrad_s = 10000;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const int32_t most = cases[i].most_mm_s;
@@ -122,15 +122,15 @@ TEST(test_envelope_turn_grows_no_faster_than_configured) {
     }
 }
 
-TEST(test_envelope_turn_that_does_not_pass_counts_for_nothing) {
+TEST(test_envelope_stopped_turn_is_not_stored) {
     settle(0, 100);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(20000, 0, 500));
     TEST_ASSERT_EQUAL_INT32(100, turn());
-    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(20000, 0, 145)); // From the last that passed, 40 ms ago.
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(20000, 0, 145)); // From the last pair that passed, 40 ms ago
     TEST_ASSERT_EQUAL_UINT32(1, envelope.stopped);
 }
 
-/// A zero may leave for one wheel alone: it does not make the time longer in which the turning may have grown.
+/// A zero may be sent to one wheel alone: it does not extend the time in which the turn may grow.
 TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin();
@@ -141,7 +141,7 @@ TEST(test_envelope_turn_grows_from_the_later_frame_of_both_wheels) {
     }
 }
 
-TEST(test_envelope_turn_that_falls_passes_at_any_pace) {
+TEST(test_envelope_turn_that_decreases_passes_without_delay) {
     static const int32_t lefts[] = {0, -270, 270, 300, 1000};
     for (size_t i = 0; i < sizeof lefts / sizeof lefts[0]; i++) {
         for (int32_t way = -1; way <= 1; way += 2) {
@@ -155,7 +155,7 @@ TEST(test_envelope_turn_that_falls_passes_at_any_pace) {
     }
 }
 
-TEST(test_envelope_turn_is_judged_in_the_frame_of_the_machine) {
+TEST(test_envelope_turn_is_checked_in_the_frame_of_the_machine) {
     for (int left = 0; left < 2; left++) {
         for (int right = 0; right < 2; right++) {
             const int32_t l = (left != 0) ? -1 : 1;
@@ -163,7 +163,7 @@ TEST(test_envelope_turn_is_judged_in_the_frame_of_the_machine) {
             config.invert[IW_LEFT] = left != 0;
             config.invert[IW_RIGHT] = right != 0;
             begin();
-            settle(l * 900, r * 900); // Straight ahead.
+            settle(l * 900, r * 900); // Straight ahead
             TEST_ASSERT_EQUAL_INT32(0, turn());
             TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, check(20000, l * -12, r * 12));
             TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(0, l * -11, r * 12));

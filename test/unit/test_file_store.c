@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The process that keeps what is known from one run to the next: what it reads, writes, sets aside and refuses to touch.
+// Process that stores a file between runs: what it reads, writes and sets aside, and which files and folders it
+// refuses.
 #include "disk/file_store.h"
 #include "sockets/owners.h"
 
@@ -22,7 +23,7 @@ static gw_file_store_t store;
 static const char *heard;
 static int error;
 static char second[128];
-static int fsync_error; ///< Of the disk, for a keeper that is opened after it is set; 0: none.
+static int fsync_error; ///< Error of fsync in a process that is opened after it is set; 0: none
 
 int fsync(int fd) {
     if (fsync_error != 0) {
@@ -58,7 +59,7 @@ static char *in_folder(const char *name) {
     return path;
 }
 
-/// A second name of a file that is there.
+/// Adds a second name to an existing file.
 static void name_again(const char *name, const char *again) {
     (void)strcpy(second, in_folder(again));
     TEST_ASSERT_EQUAL_INT(0, link(in_folder(name), second));
@@ -80,7 +81,7 @@ static void assert_file(const char *name, const char *content) {
     TEST_ASSERT_EQUAL_STRING(content, found);
 }
 
-static void test_keeper_writes_reads_back_and_sets_aside(void) {
+static void test_file_store_writes_reads_back_and_sets_aside(void) {
     open_store(folder, GW_FILE_STORE_ABSENT);
     TEST_ASSERT_TRUE(gw_file_store_write(&store, "one", 3));
     TEST_ASSERT_FALSE_MESSAGE(gw_file_store_write(&store, "two", 3), "one at a time");
@@ -99,7 +100,7 @@ static void test_keeper_writes_reads_back_and_sets_aside(void) {
     gw_file_store_close(&store);
 }
 
-static void test_keeper_without_its_directory_fails_and_recovers_when_it_comes(void) {
+static void test_file_store_without_directory_fails_until_it_exists(void) {
     char missing[64];
     (void)snprintf(missing, sizeof missing, "%s/later", folder);
     open_store(missing, GW_FILE_STORE_FAILED);
@@ -116,7 +117,7 @@ static void test_keeper_without_its_directory_fails_and_recovers_when_it_comes(v
     (void)rmdir(missing);
 }
 
-static void test_keeper_takes_no_link_pipe_or_giant_for_its_file(void) {
+static void test_file_store_refuses_link_pipe_and_too_large_file(void) {
     put_file("other", "precious");
     (void)unlink(in_folder("file"));
     TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file")));
@@ -139,7 +140,7 @@ static void test_keeper_takes_no_link_pipe_or_giant_for_its_file(void) {
     (void)unlink(in_folder("file"));
 }
 
-static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
+static void test_file_store_failed_write_retains_the_old_file(void) {
     put_file("file", "old");
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
     open_store(folder, GW_FILE_STORE_READ);
@@ -150,7 +151,7 @@ static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
     TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
 }
 
-static void test_keeper_reports_a_failed_fsync_and_a_failed_rename(void) {
+static void test_file_store_reports_failed_fsync_and_rename(void) {
     put_file("file", "old");
     fsync_error = EIO;
     open_store(folder, GW_FILE_STORE_READ);
@@ -172,7 +173,7 @@ static void test_keeper_reports_a_failed_fsync_and_a_failed_rename(void) {
     put_file("file", "old");
 }
 
-static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
+static void test_file_store_never_writes_into_an_existing_file(void) {
     put_file("other", "precious");
     name_again("other", "file.new");
     open_store(folder, GW_FILE_STORE_READ);
@@ -193,7 +194,7 @@ static void assert_not_read(int why) {
     gw_file_store_close(&store);
 }
 
-static void test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger(void) {
+static void test_file_store_refuses_file_with_second_name_or_other_owner(void) {
     put_file("file", "old");
     name_again("file", "again");
     assert_not_read(SOCK_FOLDER_FILE);
@@ -216,7 +217,7 @@ static void assert_no_folder(const char *path, int why) {
     gw_file_store_close(&store);
 }
 
-static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
+static void test_file_store_refuses_folder_writable_by_others(void) {
     static const mode_t modes[] = {0777, 01777, 0775, 0757};
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
@@ -237,7 +238,7 @@ static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
     TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
 }
 
-static void test_keeper_that_died_is_noticed_and_nothing_waits_for_it(void) {
+static void test_file_store_ended_process_is_reported_once(void) {
     TEST_ASSERT_EQUAL_INT(0, gw_file_store_open(&store, folder, "file"));
     (void)next_news();
     (void)shutdown(store.child.fd, SHUT_RDWR);
@@ -253,15 +254,15 @@ int main(void) {
     if (mkdtemp(folder) == NULL) {
         return 1;
     }
-    RUN_TEST(test_keeper_writes_reads_back_and_sets_aside);
-    RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);
-    RUN_TEST(test_keeper_takes_no_link_pipe_or_giant_for_its_file);
-    RUN_TEST(test_keeper_that_cannot_write_keeps_the_old_file);
-    RUN_TEST(test_keeper_reports_a_failed_fsync_and_a_failed_rename);
-    RUN_TEST(test_keeper_never_writes_into_a_file_that_is_there_already);
-    RUN_TEST(test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger);
-    RUN_TEST(test_keeper_uses_no_folder_in_which_others_can_put_things);
-    RUN_TEST(test_keeper_that_died_is_noticed_and_nothing_waits_for_it);
+    RUN_TEST(test_file_store_writes_reads_back_and_sets_aside);
+    RUN_TEST(test_file_store_without_directory_fails_until_it_exists);
+    RUN_TEST(test_file_store_refuses_link_pipe_and_too_large_file);
+    RUN_TEST(test_file_store_failed_write_retains_the_old_file);
+    RUN_TEST(test_file_store_reports_failed_fsync_and_rename);
+    RUN_TEST(test_file_store_never_writes_into_an_existing_file);
+    RUN_TEST(test_file_store_refuses_file_with_second_name_or_other_owner);
+    RUN_TEST(test_file_store_refuses_folder_writable_by_others);
+    RUN_TEST(test_file_store_ended_process_is_reported_once);
     (void)unlink(in_folder("file"));
     (void)unlink(in_folder("file.new"));
     (void)unlink(in_folder("file.damaged"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Does a wheel do what it is told? Each verdict with its threshold, its time and what starts the time anew.
+// Following error of a wheel: each verdict with its threshold, its time, and what restarts the time.
 #include "fixture.h"
 #include "iwheel/private/follow.h"
 #include "unit.h"
@@ -27,7 +27,7 @@ static iw_follow_verdict_t step(iw_time_us_t after_us, speeds_t speeds) {
     return iw_follow_step(&watch, FIXTURE_START_US + after_us, speeds.applied_mm_s, speeds.measured_mm_s);
 }
 
-/// The verdict comes at `for_us` exactly, and not a microsecond sooner.
+/// Checks that the verdict occurs at exactly `for_us`, not a microsecond before.
 static void assert_verdict_after(iw_follow_verdict_t expected, iw_time_us_t for_us, speeds_t speeds) {
     begin();
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OK, step(0, speeds));
@@ -44,7 +44,7 @@ static void assert_never(speeds_t speeds) {
     }
 }
 
-TEST(test_follow_opposite_sign_is_told_after_300_ms) {
+TEST(test_follow_opposite_sign_is_reported_after_300_ms) {
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){101, -101});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){-101, 101});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){1000, -150});
@@ -60,7 +60,7 @@ TEST(test_follow_sign_needs_both_above_100) {
     }
 }
 
-TEST(test_follow_overspeed_is_told_after_follow_ms) {
+TEST(test_follow_overspeed_is_reported_after_follow_ms) {
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, 301});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, -301});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){500, 801});
@@ -83,7 +83,7 @@ TEST(test_follow_slower_than_the_margin_is_no_overspeed) {
     assert_never((speeds_t){-500, -799});
 }
 
-TEST(test_follow_blocked_is_told_after_blocked_ms) {
+TEST(test_follow_blocked_is_reported_after_blocked_ms) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){100, 19});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){-100, -19});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){1000, 199});
@@ -91,7 +91,7 @@ TEST(test_follow_blocked_is_told_after_blocked_ms) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){5000, 999});
 }
 
-TEST(test_follow_creeping_backwards_is_blocked) {
+TEST(test_follow_slow_opposite_speed_is_blocked) {
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){400, -90});
     assert_verdict_after(IW_FOLLOW_BLOCKED, MS(1000), (speeds_t){-400, 90});
 }
@@ -108,7 +108,7 @@ TEST(test_follow_twenty_percent_or_a_small_command_is_not_blocked) {
     }
 }
 
-TEST(test_follow_a_break_starts_the_time_anew) {
+TEST(test_follow_interruption_restarts_the_time) {
     static const struct {
         speeds_t bad;
         iw_follow_verdict_t verdict;
@@ -130,7 +130,7 @@ TEST(test_follow_a_break_starts_the_time_anew) {
     }
 }
 
-TEST(test_follow_restart_starts_every_time_anew) {
+TEST(test_follow_restart_restarts_every_time) {
     static const speeds_t bad[] = {{200, -200}, {200, 600}, {200, 0}};
     static const uint32_t for_ms[] = {300, 500, 1000};
     for (size_t i = 0; i < 3; i++) {
@@ -143,7 +143,7 @@ TEST(test_follow_restart_starts_every_time_anew) {
     }
 }
 
-TEST(test_follow_the_gravest_verdict_comes_first) {
+TEST(test_follow_most_severe_verdict_precedes) {
     config.follow_ms = 300;
     config.blocked_ms = 300;
     (void)step(0, (speeds_t){200, -600});
@@ -156,7 +156,7 @@ TEST(test_follow_the_gravest_verdict_comes_first) {
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OVERSPEED, step(MS(300), (speeds_t){100, -160}));
 }
 
-TEST(test_follow_times_run_side_by_side) {
+TEST(test_follow_times_run_independently) {
     (void)step(0, (speeds_t){200, -90});
     (void)step(MS(800), (speeds_t){200, -600});
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OK, step(MS(1000) - 1U, (speeds_t){200, -600}));
@@ -164,7 +164,7 @@ TEST(test_follow_times_run_side_by_side) {
     TEST_ASSERT_EQUAL_INT(IW_FOLLOW_SIGN, step(MS(1100), (speeds_t){200, -600}));
 }
 
-TEST(test_follow_survives_extremes) {
+TEST(test_follow_extreme_values_do_not_overflow) {
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, INT32_MAX});
     assert_verdict_after(IW_FOLLOW_OVERSPEED, MS(500), (speeds_t){0, -INT32_MAX});
     assert_verdict_after(IW_FOLLOW_SIGN, MS(300), (speeds_t){5000, -INT32_MAX});
@@ -184,7 +184,7 @@ TEST(test_follow_sign_is_confirmed_after_300_ms_of_agreement) {
     }
 }
 
-TEST(test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement) {
+TEST(test_follow_sign_is_not_confirmed_by_weak_agreement) {
     static const speeds_t weak[] = {{100, 101}, {101, 100}, {-100, -101}, {-101, -100}, {0, 0}, {200, -200}};
     for (size_t i = 0; i < sizeof weak / sizeof weak[0]; i++) {
         begin();
@@ -202,7 +202,7 @@ TEST(test_follow_sign_is_not_confirmed_by_weak_or_broken_agreement) {
     TEST_ASSERT_FALSE(iw_follow_sign_confirmed(&watch, FIXTURE_START_US + MS(501)));
 }
 
-TEST(test_follow_time_standing_still_tells_nothing) {
+TEST(test_follow_without_elapsed_time_has_no_verdict) {
     for (uint32_t n = 0; n < 1000; n++) {
         TEST_ASSERT_EQUAL_INT(IW_FOLLOW_OK, step(0, (speeds_t){1000, -1000}));
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which offset is in force, where it comes from, and whether the net force means anything.
+// Force offset: which offset is in force, its provenance, and the validity of the net force.
 #include "force_rig.h"
 #include "unit.h"
 
@@ -18,7 +18,7 @@ static void assert_offset(iw_offset_provenance_t provenance, int32_t offset_mN) 
     TEST_ASSERT_EQUAL_INT32(offset_mN, rig.force.offset_mN);
 }
 
-TEST(test_force_late_join_takes_the_wheels_offset_at_once) {
+TEST(test_force_late_join_uses_the_offset_of_the_wheel) {
     force_rig_hear(&rig, 1000, true);
     force_rig_offset(&rig, 100);
     assert_offset(IW_OFFSET_WHEEL, 10000);
@@ -26,13 +26,13 @@ TEST(test_force_late_join_takes_the_wheels_offset_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-TEST(test_force_late_join_without_offset_frames_lives_on_its_estimate) {
+TEST(test_force_late_join_without_offset_frames_uses_an_estimate) {
     force_rig_quiet(&rig, 400, 500);
     assert_offset(IW_OFFSET_ESTIMATED, 5000);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-TEST(test_force_wheels_offset_replaces_the_estimate) {
+TEST(test_force_offset_of_the_wheel_replaces_the_estimate) {
     force_rig_quiet(&rig, 40, 1010);
     assert_offset(IW_OFFSET_ESTIMATED, 10100);
     force_rig_offset(&rig, 100);
@@ -41,14 +41,14 @@ TEST(test_force_wheels_offset_replaces_the_estimate) {
     assert_offset(IW_OFFSET_WHEEL, 10100);
 }
 
-TEST(test_force_estimate_does_not_replace_the_wheels_offset) {
+TEST(test_force_estimate_does_not_replace_offset_of_the_wheel) {
     force_rig_offset(&rig, 100);
     force_rig_quiet(&rig, 40, 1010);
     assert_offset(IW_OFFSET_WHEEL, 10000);
     TEST_ASSERT_EQUAL_INT32(10100, rig.force.quality.mean_mN);
 }
 
-TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken) {
+TEST(test_force_offset_of_a_loaded_start_is_never_used) {
     begin(IW_LEFT, true);
     force_rig_quiet(&rig, 20, 100);
     force_rig_offset(&rig, 100);
@@ -63,7 +63,7 @@ TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
 }
 
-TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known) {
+TEST(test_force_offset_of_a_good_start_is_used_after_the_window) {
     begin(IW_LEFT, true);
     force_rig_quiet(&rig, 39, 1000);
     force_rig_offset(&rig, 100);
@@ -72,7 +72,7 @@ TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known) {
     assert_offset(IW_OFFSET_WHEEL, 10000);
 }
 
-TEST(test_force_restore_fills_nothing_but_a_void) {
+TEST(test_force_restore_does_not_replace_an_offset_of_this_run) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, -1234);
     assert_offset(IW_OFFSET_STORED, -1234);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
@@ -92,7 +92,7 @@ TEST(test_force_restore_fills_nothing_but_a_void) {
     assert_offset(IW_OFFSET_OPERATOR, 100);
 }
 
-TEST(test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next) {
+TEST(test_force_restored_tare_is_replaced_by_the_next_tare_only) {
     iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
     assert_offset(IW_OFFSET_OPERATOR, 5000);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
@@ -107,13 +107,13 @@ TEST(test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next) {
     assert_offset(IW_OFFSET_OPERATOR, 6000);
 }
 
-TEST(test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found) {
+TEST(test_force_restored_tare_replaces_the_offset_of_the_wheel) {
     force_rig_offset(&rig, 60);
     iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
     assert_offset(IW_OFFSET_OPERATOR, 5000);
 }
 
-TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators) {
+TEST(test_force_reboot_makes_offsets_stored_except_the_operators) {
     force_rig_quiet(&rig, 40, 10);
     iw_force_reopen(&rig.force, true);
     assert_offset(IW_OFFSET_STORED, 100);
@@ -132,7 +132,7 @@ TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.force.quality.window);
 }
 
-TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset) {
+TEST(test_force_reboot_under_load_is_detected_by_operators_offset) {
     force_rig_quiet(&rig, 40, 10);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
     iw_force_reopen(&rig.force, true);
@@ -142,7 +142,7 @@ TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset) {
     assert_offset(IW_OFFSET_OPERATOR, 100);
 }
 
-TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset) {
+TEST(test_force_reboot_resets_observation_and_offset_of_the_wheel) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.observation);
@@ -155,7 +155,7 @@ TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset) {
     assert_offset(IW_OFFSET_ESTIMATED, 9000);
 }
 
-TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds) {
+TEST(test_force_tare_uses_the_mean_of_the_last_two_seconds) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_quiet(&rig, 39, 200);
     force_rig_quiet(&rig, 1, 240);
@@ -164,14 +164,14 @@ TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
 }
 
-TEST(test_force_tare_after_long_rest_is_accepted) {
+TEST(test_force_tare_after_long_standstill_is_accepted) {
     for (uint32_t n = 0; n < 300; n++) {
         force_rig_quiet(&rig, 1, 100);
         TEST_ASSERT_EQUAL_INT((n < 39) ? IW_TARE_NO_FORCE : IW_TARE_OK, force_rig_tare(&rig));
     }
 }
 
-TEST(test_force_tare_outlives_what_the_wheel_says) {
+TEST(test_force_tare_is_not_replaced_by_offset_of_the_wheel) {
     force_rig_quiet(&rig, 40, 200);
     (void)force_rig_tare(&rig);
     force_rig_offset(&rig, 99);
@@ -198,7 +198,7 @@ TEST(test_force_tare_without_two_fresh_seconds_is_refused) {
     assert_tare_refused(IW_TARE_NO_FORCE);
 }
 
-TEST(test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused) {
+TEST(test_force_tare_with_unsuitable_window_is_refused) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_hear(&rig, 100, false);
     force_rig_quiet(&rig, 39, 100);
@@ -225,7 +225,7 @@ TEST(test_force_tare_under_load_is_refused) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
 }
 
-TEST(test_force_tare_without_any_offset_cannot_know_of_a_load) {
+TEST(test_force_tare_without_an_offset_does_not_check_the_load) {
     force_rig_alternate(&rig, 0, 3000);
     force_rig_quiet(&rig, 40, 9000);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.force.provenance);
@@ -233,7 +233,7 @@ TEST(test_force_tare_without_any_offset_cannot_know_of_a_load) {
     assert_offset(IW_OFFSET_OPERATOR, 90000);
 }
 
-TEST(test_force_tare_settles_a_doubted_offset) {
+TEST(test_force_tare_replaces_a_doubted_offset) {
     force_rig_quiet(&rig, 40, 9000);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
@@ -242,7 +242,7 @@ TEST(test_force_tare_settles_a_doubted_offset) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
-TEST(test_force_tare_against_a_doubted_offset_does_not_judge_the_load) {
+TEST(test_force_tare_with_doubted_offset_does_not_check_the_load) {
     force_rig_quiet(&rig, 40, 9000);
     force_rig_offset(&rig, 100);
     force_rig_quiet(&rig, 40, 4000);
@@ -251,7 +251,7 @@ TEST(test_force_tare_against_a_doubted_offset_does_not_judge_the_load) {
     assert_offset(IW_OFFSET_OPERATOR, 40000);
 }
 
-TEST(test_force_tare_a_millinewton_beyond_20_N_is_a_load) {
+TEST(test_force_tare_with_1_mN_beyond_20_N_is_a_load) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, -1);
     force_rig_quiet(&rig, 40, 2000);
     TEST_ASSERT_EQUAL_INT(IW_TARE_LOADED, force_rig_tare(&rig));
@@ -282,7 +282,7 @@ TEST(test_force_removed_offset_is_invalid) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_REMOVED, force_rig_validity(&rig));
 }
 
-TEST(test_force_removed_offset_is_cured_by_a_tare) {
+TEST(test_force_removed_offset_is_valid_after_a_tare) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_offset(&rig, 500);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_force_tare(&rig.force, rig.now_us));
@@ -298,7 +298,7 @@ TEST(test_force_is_stale_after_five_periods) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
 }
 
-TEST(test_force_saturated_sample_is_invalid_only_while_it_lasts) {
+TEST(test_force_is_invalid_only_during_saturated_samples) {
     force_rig_quiet(&rig, 40, 0);
     force_rig_hear(&rig, 32767, true);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Where the zero of a force comes from, with simulated wheels: late join, loaded start, reboot, restart of the gateway, tare.
+// Provenance of the force offset with simulated wheels: late join, loaded start, reboot, restart of the gateway, tare.
 #include "world_rig.h"
 
 #include "unit.h"
 
 #define SECOND 1000U
-/// The simulated sensors' zeros, as the wheels tell them.
+/// Zeros of the simulated sensors, as the wheels send them.
 #define LEFT_ZERO_mN  12300
 #define RIGHT_ZERO_mN 9800
 
@@ -54,7 +54,7 @@ static void assert_tare(iw_tare_t expected, iw_side_t side) {
     }
 }
 
-TEST(test_wheels_that_start_unloaded_give_their_own_zero) {
+TEST(test_force_offset_of_an_unloaded_start_is_used) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 4U * SECOND);
     assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
@@ -66,7 +66,7 @@ TEST(test_wheels_that_start_unloaded_give_their_own_zero) {
     TEST_ASSERT_INT32_WITHIN(3500, 50000, iw_force_net_mN(force(IW_RIGHT)));
 }
 
-TEST(test_joining_late_without_offset_frames_takes_two_quiet_seconds) {
+TEST(test_force_late_join_without_offset_estimates_in_two_seconds) {
     world_rig_begin(&rig, 100000000U);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, validity(IW_LEFT));
     world_rig_run(&rig, 2U * SECOND);
@@ -76,7 +76,7 @@ TEST(test_joining_late_without_offset_frames_takes_two_quiet_seconds) {
     assert_zero(IW_LEFT, IW_OFFSET_ESTIMATED, LEFT_ZERO_mN);
 }
 
-TEST(test_joining_late_under_load_gives_no_zero_until_a_tare) {
+TEST(test_force_late_join_under_load_has_no_offset_until_tare) {
     world_rig_begin(&rig, 100000000U);
     load_both(80000);
     world_rig_restart(&rig);
@@ -93,23 +93,23 @@ TEST(test_joining_late_under_load_gives_no_zero_until_a_tare) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
 }
 
-/// The listener was there first, saw the wheels start, and the person who leaned on them.
+/// The gateway is online first: it receives the start of the wheels while a person leans on them.
 static void start_loaded_in_sight(void) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 4U * SECOND);
     sim_world_power(&rig.world, rig.now_us, false);
     world_rig_run(&rig, 2U * SECOND);
-    world_rig_restart(&rig); // Knows nothing of before.
+    world_rig_restart(&rig); // The new gateway has no state of before.
     world_rig_run(&rig, 2U * SECOND);
     load_both(100000);
     sim_world_power(&rig.world, rig.now_us, true);
     world_rig_run(&rig, 4U * SECOND);
 }
 
-TEST(test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours) {
+TEST(test_force_observed_loaded_start_has_no_offset_until_tare) {
     start_loaded_in_sight();
     TEST_ASSERT_TRUE(force(IW_LEFT)->boot_seen && force(IW_LEFT)->wheel_offset_heard);
-    TEST_ASSERT_INT32_WITHIN(120, 1123, force(IW_LEFT)->wheel_offset_dN); // It has taken the person for its zero.
+    TEST_ASSERT_INT32_WITHIN(120, 1123, force(IW_LEFT)->wheel_offset_dN); // It includes the weight of the person.
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, force(IW_LEFT)->provenance);
     load_both(0);
     world_rig_run(&rig, 90U * SECOND);
@@ -118,7 +118,7 @@ TEST(test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours) {
     assert_zero(IW_LEFT, IW_OFFSET_OPERATOR, LEFT_ZERO_mN);
 }
 
-TEST(test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone) {
+TEST(test_force_unobserved_loaded_start_is_doubted_without_load) {
     world_rig_begin(&rig, 0);
     load_both(50000);
     sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
@@ -132,7 +132,7 @@ TEST(test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
 }
 
-TEST(test_reboot_makes_the_zero_stored_and_then_the_wheels_again) {
+TEST(test_force_offset_after_reboot_is_stored_then_of_the_wheel) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 90U * SECOND);
     sim_world_power(&rig.world, rig.now_us, false);
@@ -145,12 +145,12 @@ TEST(test_reboot_makes_the_zero_stored_and_then_the_wheels_again) {
     assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
 }
 
-TEST(test_reboot_under_load_keeps_the_zero_of_before) {
+TEST(test_force_reboot_under_load_retains_the_previous_offset) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 90U * SECOND);
     sim_world_power(&rig.world, rig.now_us, false);
     world_rig_run(&rig, 2U * SECOND);
-    load_both(10000); // Quiet enough to pass for a zero, if there were none to compare it with.
+    load_both(10000); // Quiet enough for a zero, if there were no earlier offset.
     sim_world_power(&rig.world, rig.now_us, true);
     world_rig_run(&rig, 20U * SECOND);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_LOADED, force(IW_LEFT)->quality.window);
@@ -158,7 +158,7 @@ TEST(test_reboot_under_load_keeps_the_zero_of_before) {
     TEST_ASSERT_INT32_WITHIN(1000, 10000, iw_force_net_mN(force(IW_LEFT)));
 }
 
-TEST(test_tare_survives_reboot_and_restart) {
+TEST(test_force_tare_is_retained_after_reboot_and_restart) {
     world_rig_begin(&rig, 0);
     world_rig_run(&rig, 4U * SECOND);
     assert_tare(IW_TARE_OK, IW_LEFT);
@@ -174,15 +174,15 @@ TEST(test_tare_survives_reboot_and_restart) {
     TEST_ASSERT_EQUAL_INT32(tared_mN, force(IW_LEFT)->offset_mN);
 }
 
-TEST(test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent) {
+TEST(test_force_tare_is_refused_in_each_unsuitable_condition) {
     world_rig_begin(&rig, 0);
     assert_tare(IW_TARE_NO_FORCE, IW_LEFT);
     world_rig_run(&rig, 4U * SECOND);
-    load_both(50000); // A person sways.
+    load_both(50000); // The load of a person varies.
     world_rig_run(&rig, 3U * SECOND);
     assert_tare(IW_TARE_NOISY, IW_LEFT);
     load_both(0);
-    sensor(IW_LEFT)->sensor_zero_mN += 25000; // A quiet weight.
+    sensor(IW_LEFT)->sensor_zero_mN += 25000; // Constant weight
     world_rig_run(&rig, 3U * SECOND);
     assert_tare(IW_TARE_LOADED, IW_LEFT);
     assert_tare(IW_TARE_OK, IW_RIGHT);
@@ -202,7 +202,7 @@ TEST(test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, validity(IW_LEFT));
 }
 
-TEST(test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it) {
+TEST(test_force_offset_removed_by_wheel_is_detected_until_tare) {
     world_rig_begin(&rig, 0);
     sensor(IW_LEFT)->zero_removed = true;
     world_rig_restart(&rig);

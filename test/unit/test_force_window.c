@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The two seconds in which the offset is estimated: what contaminates them, and what they say about the unit.
+// Window of two seconds for the estimate of the offset: what contaminates it, and what it shows about the unit.
 #include "force_rig.h"
 #include "unit.h"
 
@@ -18,7 +18,7 @@ static void assert_window(iw_window_t expected) {
     TEST_ASSERT_EQUAL_INT((expected == IW_WINDOW_GOOD) ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
 }
 
-TEST(test_force_begins_open_and_knows_nothing) {
+TEST(test_force_init_has_an_open_window_and_no_offset) {
     assert_window(IW_WINDOW_OPEN);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, force_rig_validity(&rig));
     TEST_ASSERT_EQUAL_INT32(0, rig.force.offset_mN);
@@ -26,7 +26,7 @@ TEST(test_force_begins_open_and_knows_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
 }
 
-TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample) {
+TEST(test_force_quiet_window_estimates_offset_at_its_last_sample) {
     force_rig_quiet(&rig, 39, 1234);
     assert_window(IW_WINDOW_OPEN);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
@@ -42,7 +42,7 @@ TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample) {
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
 }
 
-TEST(test_force_is_measured_of_the_wheel_that_is_asked_for) {
+TEST(test_force_measure_uses_the_requested_wheel) {
     force_rig_t other;
     force_rig_init(&other);
     force_rig_quiet(&other, 40, -77);
@@ -92,13 +92,13 @@ TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy) {
     assert_window(IW_WINDOW_NOISY);
 }
 
-TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun) {
+TEST(test_force_without_telemetry_is_invalid_at_time_zero) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 0));
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_TELEMETRY, iw_force_validity(&rig.force, 1000));
 }
 
-/// 30 of 40 samples are 2 cN off the mean: the root of 3 cN2 is 17.3 mN.
-TEST(test_force_deviation_is_told_to_a_millinewton) {
+/// 30 of 40 samples differ by 2 cN from the mean: the root of 3 cN2 is 17.3 mN.
+TEST(test_force_deviation_has_a_resolution_of_1_mN) {
     for (uint32_t n = 0; n < 40; n++) {
         force_rig_hear(&rig, (int16_t)((n % 4U == 3U) ? 100 : ((n % 8U < 4U) == (n % 2U == 0U)) ? 102 : 98), true);
     }
@@ -106,7 +106,7 @@ TEST(test_force_deviation_is_told_to_a_millinewton) {
     TEST_ASSERT_EQUAL_UINT32(17, rig.force.quality.deviation_mN);
 }
 
-/// Pairs of samples that far above and below zero.
+/// Adds pairs of samples this far above and below zero.
 static void hear_pairs(uint32_t pairs, int16_t by) {
     for (uint32_t pair = 0; pair < pairs; pair++) {
         force_rig_hear(&rig, by, true);
@@ -114,13 +114,13 @@ static void hear_pairs(uint32_t pairs, int16_t by) {
     }
 }
 
-TEST(test_force_wide_deviation_is_told_exactly) {
+TEST(test_force_large_deviation_is_exact) {
     begin(IW_RIGHT, false);
     force_rig_alternate(&rig, 0, 800);
     TEST_ASSERT_EQUAL_UINT32(40000, rig.force.quality.deviation_mN);
 }
 
-TEST(test_force_deviation_is_told_finer_up_to_a_variance_of_400000) {
+TEST(test_force_deviation_is_finer_up_to_a_variance_of_400000) {
     hear_pairs(2, 2000);
     hear_pairs(18, 0);
     TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN); // The root of 400 000 is 632.4.
@@ -128,7 +128,7 @@ TEST(test_force_deviation_is_told_finer_up_to_a_variance_of_400000) {
     hear_pairs(2, 2000);
     hear_pairs(1, 2);
     hear_pairs(17, 1);
-    TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN); // Of 400 001.
+    TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN); // 400 001
 }
 
 TEST(test_force_deviation_is_rounded_down) {
@@ -137,19 +137,19 @@ TEST(test_force_deviation_is_rounded_down) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.force.quality.deviation_mN);
 }
 
-TEST(test_force_noise_a_millinewton_beyond_1_N_is_noisy) {
+TEST(test_force_noise_1_mN_beyond_1_N_is_noisy) {
     hear_pairs(2, 102);
     hear_pairs(18, 100);
     TEST_ASSERT_EQUAL_UINT32(1001, rig.force.quality.deviation_mN);
     assert_window(IW_WINDOW_NOISY);
 }
 
-TEST(test_force_wildest_noise_does_not_overflow) {
+TEST(test_force_extreme_noise_does_not_overflow) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 32766, -32767);
         assert_window(IW_WINDOW_NOISY);
-        TEST_ASSERT_EQUAL_UINT32((side == IW_LEFT) ? 81910 : 819100, rig.force.quality.deviation_mN); // Capped.
+        TEST_ASSERT_EQUAL_UINT32((side == IW_LEFT) ? 81910 : 819100, rig.force.quality.deviation_mN); // Limited
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 0, 1400);
         assert_window(IW_WINDOW_NOISY);
@@ -157,7 +157,7 @@ TEST(test_force_wildest_noise_does_not_overflow) {
     }
 }
 
-/// First second at one value, the next second at another.
+/// One value in the first second, another in the next one.
 static void step_at_half(int16_t first, int16_t second) {
     force_rig_quiet(&rig, 20, first);
     force_rig_quiet(&rig, 20, second);
@@ -167,7 +167,7 @@ TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift) {
     step_at_half(1000, 1100);
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.drift_mN);
-    TEST_ASSERT_EQUAL_UINT32(500, rig.force.quality.deviation_mN); // From the mean of the whole window.
+    TEST_ASSERT_EQUAL_UINT32(500, rig.force.quality.deviation_mN); // From the mean of the full window
     begin(IW_LEFT, false);
     step_at_half(1000, 1101);
     assert_window(IW_WINDOW_DRIFT);
@@ -180,7 +180,7 @@ TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift) {
     TEST_ASSERT_EQUAL_INT32(-1010, rig.force.quality.drift_mN);
 }
 
-TEST(test_force_drift_a_millinewton_beyond_1_N_is_drift) {
+TEST(test_force_drift_1_mN_beyond_1_N_is_drift) {
     force_rig_quiet(&rig, 20, 0);
     force_rig_quiet(&rig, 18, 100);
     force_rig_quiet(&rig, 2, 101);
@@ -188,7 +188,7 @@ TEST(test_force_drift_a_millinewton_beyond_1_N_is_drift) {
     assert_window(IW_WINDOW_DRIFT);
 }
 
-TEST(test_force_moving_at_any_sample_contaminates) {
+TEST(test_force_motion_at_any_sample_contaminates_the_window) {
     static const uint32_t moments[] = {0, 1, 20, 38, 39};
     for (size_t i = 0; i < 5; i++) {
         begin(IW_LEFT, false);
@@ -200,7 +200,7 @@ TEST(test_force_moving_at_any_sample_contaminates) {
     }
 }
 
-TEST(test_force_saturated_sample_contaminates) {
+TEST(test_force_saturated_sample_contaminates_the_window) {
     static const int16_t limits[] = {32767, -32768};
     for (size_t i = 0; i < 2; i++) {
         begin(IW_LEFT, false);
@@ -216,7 +216,7 @@ TEST(test_force_saturated_sample_contaminates) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
 }
 
-TEST(test_force_far_from_an_offset_trusted_before_is_a_load) {
+TEST(test_force_5_N_from_a_stored_offset_is_a_load) {
     static const int32_t stored_mN[] = {-5000, 5000, -5001, 5001};
     for (size_t i = 0; i < 4; i++) {
         begin(IW_LEFT, false);
@@ -229,19 +229,19 @@ TEST(test_force_far_from_an_offset_trusted_before_is_a_load) {
     }
 }
 
-TEST(test_force_noise_far_from_a_trusted_offset_is_told_as_noise) {
+TEST(test_force_noise_far_from_a_stored_offset_is_noise) {
     iw_force_restore(&rig.force, IW_OFFSET_STORED, 90000);
     force_rig_alternate(&rig, 0, 2000);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_NOISY, rig.force.quality.window);
 }
 
-TEST(test_force_ring_counts_no_more_than_it_holds) {
+TEST(test_force_ring_counts_at_most_its_samples) {
     force_rig_quiet(&rig, 3U * IW_FORCE_WINDOW_SAMPLES, 100);
     TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.count);
     TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.still);
 }
 
-TEST(test_force_gap_starts_the_window_anew) {
+TEST(test_force_gap_restarts_the_window) {
     force_rig_quiet(&rig, 39, 100);
     rig.now_us += MS(200) - 1U;
     force_rig_hear(&rig, 100, true);
@@ -258,7 +258,7 @@ TEST(test_force_gap_starts_the_window_anew) {
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.offset_mN);
 }
 
-TEST(test_force_contaminated_window_stays_so_until_a_reboot) {
+TEST(test_force_contaminated_window_stays_until_a_reboot) {
     force_rig_alternate(&rig, 0, 30000);
     force_rig_quiet(&rig, 200, 100);
     assert_window(IW_WINDOW_NOISY);
@@ -284,7 +284,7 @@ static iw_unit_observation_t evidence_of(iw_side_t side, int16_t raw, int16_t of
     return rig.force.observation;
 }
 
-TEST(test_force_unit_is_told_from_raw_over_offset) {
+TEST(test_force_unit_follows_from_raw_over_offset) {
     static const int16_t offsets_dN[] = {20, 100, 1000, -20, -100, -1000};
     for (int side = 0; side < IW_SIDES; side++) {
         for (size_t i = 0; i < 6; i++) {
@@ -305,7 +305,7 @@ TEST(test_force_unit_is_told_from_raw_over_offset) {
     }
 }
 
-TEST(test_force_unit_evidence_has_fifteen_percent) {
+TEST(test_force_unit_observation_tolerates_15_percent) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 8500, 1000));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 8499, 1000));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 11500, 1000));
@@ -320,7 +320,7 @@ TEST(test_force_unit_evidence_has_fifteen_percent) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -301, 1000));
 }
 
-TEST(test_force_small_offset_is_no_evidence_unless_it_is_far_off) {
+TEST(test_force_small_offset_is_unknown_unless_far_off) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 190, 19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 0, -19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2000, 0));
@@ -339,7 +339,7 @@ TEST(test_force_small_offset_is_far_off_beyond_20_N) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.observation);
 }
 
-TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order) {
+TEST(test_force_unit_observation_requires_window_and_offset) {
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);
     force_rig_quiet(&rig, 39, 1000);
@@ -348,7 +348,7 @@ TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.observation);
 }
 
-TEST(test_force_contaminated_window_is_no_evidence) {
+TEST(test_force_contaminated_window_gives_no_unit_observation) {
     force_rig_alternate(&rig, 0, 2000);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.observation);

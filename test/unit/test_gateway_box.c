@@ -27,7 +27,7 @@ static gw_box_t box;
 static char folder[64];
 static bool open_box;
 
-/// Works, and leaves an errno, as any call may.
+/// Succeeds and sets errno, as any call may do.
 int fsync(int fd) {
     errno = (fd >= 0) ? ENOSPC : EBADF;
     return (fd >= 0) ? 0 : -1;
@@ -53,7 +53,7 @@ void tearDown(void) {
     TEST_ASSERT_EQUAL(0, system(command));
 }
 
-/// As from a terminal, whatever started this program.
+/// Opens the box as from a terminal, independent of the parent process.
 static void start(void) {
     (void)signal(SIGINT, SIG_DFL);
     const gw_box_config_t wanted = {.blackbox_s = config.record.blackbox_s,
@@ -72,7 +72,7 @@ static gw_child_news_t wait_news(void) {
     return gw_box_take(&box);
 }
 
-/// Ten frames and ten steps in the last second, then a stop that is over.
+/// Adds ten frames and ten steps of the last second, and returns the order of a stop that has ended.
 static gw_box_order_t stopped(const char *cause) {
     const iw_time_us_t now_us = iwl_clock_now_us();
     const iw_time_us_t stop_us = now_us - GW_BOX_AFTER_US;
@@ -107,14 +107,14 @@ static void record(const char *cause, int error) {
     record_order(&order, error);
 }
 
-/// A stop while the wheels were commanded.
+/// Records a stop while the wheels were commanded.
 static void record_in_motion(const char *cause, int error) {
     gw_box_order_t order = stopped(cause);
     order.note.stop.applied.wheel[IW_RIGHT].speed_mm_s = -400;
     record_order(&order, error);
 }
 
-/// A stop with both wheels at standstill, whatever becomes of its recording.
+/// Records a stop with both wheels at standstill; the recording may fail.
 static void record_harmless(const char *cause) {
     gw_box_order_t order = stopped(cause);
     const blackbox_entry_t rest = {
@@ -151,7 +151,7 @@ static void read_file(const char *name, char *out, size_t size) {
     (void)fclose(file);
 }
 
-TEST(test_stop_is_written_as_frames_events_and_configuration) {
+TEST(test_recording_has_frames_events_and_configuration) {
     char text[8192];
     start();
     record("estop_line", 0);
@@ -171,7 +171,7 @@ TEST(test_stop_is_written_as_frames_events_and_configuration) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
-TEST(test_what_happens_after_the_stop_is_written_too) {
+TEST(test_recording_contains_entries_after_the_stop) {
     char text[8192];
     start();
     const gw_box_order_t order = stopped("estop_line");
@@ -197,7 +197,7 @@ TEST(test_what_happens_after_the_stop_is_written_too) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_right_mm_s\":-34"), told);
 }
 
-TEST(test_what_is_older_than_blackbox_s_is_left_out) {
+TEST(test_recording_excludes_entries_older_than_blackbox_s) {
     start();
     const blackbox_entry_t old = {.at_us = 1, .kind = BLACKBOX_FRAME, .number = 0x7FF};
     blackbox_ring_put(box.ring, &old);
@@ -205,7 +205,7 @@ TEST(test_what_is_older_than_blackbox_s_is_left_out) {
     TEST_ASSERT_EQUAL(10, box.last.frames);
 }
 
-TEST(test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start) {
+TEST(test_recording_of_an_overwritten_ring_is_not_from_start) {
     static char text[8192];
     start();
     record("estop_line", 0);
@@ -220,8 +220,8 @@ TEST(test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_s
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":false"), text);
 }
 
-/// Standard streams and its end of the socket.
-TEST(test_writer_keeps_no_file_open) {
+/// The standard streams and its end of the socket.
+TEST(test_writer_has_no_open_file_after_a_recording) {
     char path[64];
     unsigned count = 0;
     start();
@@ -236,7 +236,7 @@ TEST(test_writer_keeps_no_file_open) {
     TEST_ASSERT_EQUAL_UINT(4U, count);
 }
 
-TEST(test_next_recording_has_the_next_number_also_after_a_restart) {
+TEST(test_recording_number_continues_after_a_restart) {
     start();
     record("wheel_lost", 0);
     gw_box_close(&box);
@@ -245,7 +245,7 @@ TEST(test_next_recording_has_the_next_number_also_after_a_restart) {
     TEST_ASSERT_NOT_NULL(strstr(box.last.path, "stop-000002-bus_down.log"));
 }
 
-TEST(test_many_stops_keep_the_newest_and_touch_nothing_else) {
+TEST(test_many_stops_retain_the_newest_and_other_files) {
     char path[192];
     start();
     record("estop_line", 0);
@@ -262,7 +262,7 @@ TEST(test_many_stops_keep_the_newest_and_touch_nothing_else) {
     TEST_ASSERT_TRUE(is_there("stop-000004-estop_line.log"));
 }
 
-TEST(test_harmless_stops_keep_recordings_of_motion) {
+TEST(test_harmless_stops_do_not_replace_recordings_of_motion) {
     start();
     record_in_motion("wheel_lost", 0);
     for (unsigned i = 0; i < 40U; i++) {
@@ -273,15 +273,15 @@ TEST(test_harmless_stops_keep_recordings_of_motion) {
     for (unsigned i = 0; i < config.record.keep_stops; i++) {
         record_in_motion("bus_down", 0);
     }
-    TEST_ASSERT_FALSE(is_there("stop-000001-wheel_lost.log")); // Among its kind it is the oldest.
-    record_harmless("estop_software");                         // The newest stays, and costs none of them.
+    TEST_ASSERT_FALSE(is_there("stop-000001-wheel_lost.log")); // It is the oldest of its kind.
+    record_harmless("estop_software");                         // The newest stays and replaces none of them.
     record_harmless("estop_software");
     TEST_ASSERT_FALSE(is_there("stop-000050-estop_software.log"));
     TEST_ASSERT_TRUE(is_there("stop-000051-estop_software.log"));
     TEST_ASSERT_EQUAL(3U * (config.record.keep_stops + 1U), count_files());
 }
 
-TEST(test_wheel_that_turns_without_command_is_motion) {
+TEST(test_recording_of_an_uncommanded_turning_wheel_is_motion) {
     char text[8192];
     start();
     gw_box_order_t order = stopped("estop_line");
@@ -298,7 +298,7 @@ TEST(test_wheel_that_turns_without_command_is_motion) {
     TEST_ASSERT_FALSE(gw_box_line_is_harmless(text));
 }
 
-TEST(test_recordings_of_earlier_versions_are_judged_by_command) {
+TEST(test_recording_of_an_old_version_is_judged_by_its_command) {
     const char *head = "{\"type\":\"blackbox\"}\n{\"type\":\"why\",";
     char lines[256];
     const struct {
@@ -317,7 +317,7 @@ TEST(test_recordings_of_earlier_versions_are_judged_by_command) {
     TEST_ASSERT_FALSE(gw_box_line_is_harmless(""));
 }
 
-/// Recordings `first` to `last` of a stop with that speed, without the process that writes them.
+/// Writes the recordings `first` to `last` of a stop with this speed, without the writer process.
 static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
     for (unsigned number = first; number <= last; number++) {
         char path[256];
@@ -330,8 +330,8 @@ static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
     }
 }
 
-/// The second number of recordings needs more than one pass over the directory.
-TEST(test_rotation_of_ten_thousand_recordings_keeps_motion) {
+/// This number of recordings requires more than one pass over the directory.
+TEST(test_rotation_of_10000_recordings_retains_motion) {
     const int directory = gw_box_files_open(config.record.directory);
     make_recordings(1, 3, 500);
     make_recordings(4, 10000, 0);
@@ -352,7 +352,7 @@ TEST(test_recording_of_a_single_file_can_be_dropped) {
     (void)close(directory);
 }
 
-TEST(test_reserve_that_cannot_be_allocated_leaves_no_file) {
+TEST(test_reserve_that_cannot_be_allocated_is_removed) {
     struct rlimit before;
     const int directory = gw_box_files_open(config.record.directory);
     TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &before));
@@ -367,13 +367,13 @@ TEST(test_reserve_that_cannot_be_allocated_leaves_no_file) {
     (void)close(directory);
 }
 
-/// Needs the right to mount.
+/// Mounts a small disk. Requires the right to mount.
 static bool mount_small_disk(void) {
     (void)mkdir(config.record.directory, 0755);
     return mount("none", config.record.directory, "tmpfs", 0, "size=1536k,mode=0755") == 0;
 }
 
-/// Fills the disk to its last byte, as any local user can.
+/// Fills the disk to its last byte, as any local user can do.
 static void fill_disk(const char *name) {
     static const char block[4096];
     char path[256];
@@ -385,7 +385,7 @@ static void fill_disk(const char *name) {
     (void)fclose(file);
 }
 
-TEST(test_full_disk_costs_harmless_recordings_first) {
+TEST(test_full_disk_drops_harmless_recordings_first) {
     if (!mount_small_disk()) {
         TEST_IGNORE_MESSAGE("mounting a tmpfs is not permitted");
     }
@@ -396,7 +396,7 @@ TEST(test_full_disk_costs_harmless_recordings_first) {
     }
     TEST_ASSERT_TRUE(is_there("reserve"));
     fill_disk("strangers");
-    record_in_motion("bus_down", 0); // The reserve has room for it.
+    record_in_motion("bus_down", 0); // The reserve has the space.
     TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.jsonl"));
     fill_disk("strangers2");
     record_in_motion("echo_lost", 0);
@@ -404,7 +404,7 @@ TEST(test_full_disk_costs_harmless_recordings_first) {
     TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.log"));
     TEST_ASSERT_TRUE(is_there("stop-000007-echo_lost.log"));
     fill_disk("strangers3");
-    while (box.last.error == 0) { // Harmless ones replace each other, and then fail: they cost no other.
+    while (box.last.error == 0) { // Harmless ones replace each other, then fail: no other is replaced.
         fill_disk("strangers4");
         record_harmless("estop_software");
         TEST_ASSERT_TRUE(is_there("stop-000007-echo_lost.log"));
@@ -414,7 +414,7 @@ TEST(test_full_disk_costs_harmless_recordings_first) {
     TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.log"));
 }
 
-TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop) {
+TEST(test_missing_directory_is_reported_at_start_and_each_stop) {
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
     TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
@@ -423,7 +423,7 @@ TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop) {
     record("estop_line", ENOENT);
 }
 
-/// What is told of the next result, into `text`.
+/// Writes the log lines of the next result to `text`.
 static void told(const char *cause, char *text, size_t size) {
     FILE *file = tmpfile();
     sock_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = SOCK_LOG_INFO};
@@ -439,7 +439,7 @@ static void told(const char *cause, char *text, size_t size) {
     (void)fclose(file);
 }
 
-TEST(test_what_became_of_a_recording_is_told_in_words) {
+TEST(test_result_of_a_recording_is_logged) {
     char text[1024];
     start();
     told("estop_line", text, sizeof text);
@@ -464,7 +464,7 @@ TEST(test_directory_that_appears_later_is_used) {
     record("estop_line", 0);
 }
 
-TEST(test_oldest_is_dropped_only_below_the_number) {
+TEST(test_oldest_recording_is_dropped_only_below_the_number) {
     start();
     record("a", 0);
     record("b", 0);
@@ -493,29 +493,29 @@ TEST(test_frozen_writer_never_blocks_the_gateway) {
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
 }
 
-TEST(test_writer_outlives_what_a_terminal_or_a_service_sends_to_all) {
+TEST(test_writer_ignores_signals_of_terminal_and_service) {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     start();
-    record("estop_line", 0); // It has begun.
+    record("estop_line", 0); // The writer has started.
     for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
         TEST_ASSERT_EQUAL(0, kill(box.writer.pid, signals[i]));
         record("estop_line", 0);
     }
 }
 
-TEST(test_killed_writer_is_noticed_and_started_again_later) {
+TEST(test_killed_writer_is_detected_and_started_again) {
     start();
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
     TEST_ASSERT_EQUAL(GW_CHILD_ENDED, wait_news());
     TEST_ASSERT_EQUAL(-1, box.writer.fd);
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
     const gw_box_order_t order = stopped("estop_line");
-    TEST_ASSERT_FALSE(gw_box_write(&box, &order)); // Too soon.
+    TEST_ASSERT_FALSE(gw_box_write(&box, &order)); // Too early
     box.writer.started_us -= 10000000U;
     record("estop_line", 0);
 }
 
-TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not) {
+TEST(test_kill_of_the_gateway_is_recorded_only_while_sending) {
     char text[8192];
     for (int sending = 0; sending < 2; sending++) {
         start();
@@ -528,7 +528,7 @@ TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not
                                            .as = {.data = {1, 1, 0x2C, 7, 0xD0}}};
         blackbox_ring_put(box.ring, &setpoint);
         atomic_store(&box.ring->sending, sending != 0);
-        (void)close(box.writer.fd); // As a kill would.
+        (void)close(box.writer.fd); // Same effect as a kill
         box.writer.fd = -1;
         gw_box_close(&box);
         open_box = false;
@@ -542,7 +542,7 @@ TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not
     TEST_ASSERT_NOT_NULL(strstr(text, "the last ones left 300 mm/s and right 0 mm/s"));
 }
 
-/// Of a machine that rolls away: no stop, so that the recording of the last stop stays the last stop's.
+/// Recording of a rolling machine: it is no stop, so `box.stop` still refers to the last stop.
 TEST(test_rolling_is_recorded_and_is_no_stop) {
     static char text[16384];
     static const iw_codec_wheel_t told;
@@ -565,7 +565,7 @@ TEST(test_rolling_is_recorded_and_is_no_stop) {
     sock_log_close(&log);
 }
 
-TEST(test_without_seconds_there_is_no_writer_but_a_small_ring) {
+TEST(test_zero_blackbox_s_has_a_ring_and_no_writer) {
     config.record.blackbox_s = 0;
     start();
     TEST_ASSERT_EQUAL(-1, box.writer.fd);

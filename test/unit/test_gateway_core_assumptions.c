@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the core does with the assumption ledger: who may arm, whether a force means anything, what a frame's length tells.
+// Core and assumption store: the right to arm, the validity of a force, and the length of frames.
 #include "gateway_rig.h"
 #include "message.h"
 
@@ -21,7 +21,7 @@ static iw_force_validity_t force_validity(iw_side_t side) {
     return iw_snapshot_force_validity(&seen, side);
 }
 
-TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused) {
+TEST(test_arm_with_contradicted_guard_of_motion_is_refused) {
     static const iw_assumption_item_t guards[] = {IW_ASSUMPTION_SETPOINT_TYPE,      IW_ASSUMPTION_CURRENT_ROLE,
                                                   IW_ASSUMPTION_FEEDBACK_SIGN_LEFT, IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT,
                                                   IW_ASSUMPTION_MOUNT_SIGN_LEFT,    IW_ASSUMPTION_MOUNT_SIGN_RIGHT};
@@ -37,7 +37,7 @@ TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused)
     gateway_rig_arm(&rig);
 }
 
-TEST(test_arm_with_any_other_assumption_contradicted_is_granted) {
+TEST(test_arm_with_other_contradicted_assumptions_is_granted) {
     unsigned others = 0;
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {
         if (!iw_assumption_guards_motion((iw_assumption_item_t)item)) {
@@ -51,13 +51,13 @@ TEST(test_arm_with_any_other_assumption_contradicted_is_granted) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-TEST(test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption) {
+TEST(test_arm_of_latched_gateway_is_refused_as_latched) {
     iw_assumption_contradict(assumptions(), IW_ASSUMPTION_SETPOINT_TYPE, IW_SOURCE_OPERATOR, 0);
     iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-TEST(test_takeover_while_an_assumption_is_contradicted_is_refused) {
+TEST(test_takeover_with_contradicted_assumption_is_refused) {
     gateway_rig_arm(&rig);
     iw_assumption_contradict(assumptions(), IW_ASSUMPTION_MOUNT_SIGN_RIGHT, IW_SOURCE_OPERATOR, 0);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER + 1U, true));
@@ -76,7 +76,7 @@ static void assert_known(iw_assumption_state_t state, iw_source_t source, int32_
     TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
 }
 
-TEST(test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown) {
+TEST(test_assumption_set_by_the_caller_guards_motion) {
     know(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
     assert_known(IW_CONTRADICTED, IW_SOURCE_OPERATOR, -3);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -87,7 +87,7 @@ TEST(test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown) 
     gateway_rig_arm(&rig);
 }
 
-/// The left wheel's force in a state of its own: what the sensor shows, what the ledger says of unit and offset.
+/// State of the force of the left wheel: provenance, observation, and the assumptions of unit and offset.
 typedef struct {
     iw_offset_provenance_t provenance;
     iw_unit_observation_t source;
@@ -103,7 +103,7 @@ typedef struct {
 #define SETTLED                                                                                                        \
     { IW_CONFIRMED, IW_SOURCE_OPERATOR, 0 }
 
-TEST(test_force_validity_follows_sensor_and_ledger) {
+TEST(test_force_validity_follows_sensor_and_assumptions) {
     static const force_case_t cases[] = {
         {IW_OFFSET_WHEEL, IW_UNIT_CN, ASSUMED, ASSUMED, IW_FORCE_VALID},
         {IW_OFFSET_WHEEL, IW_UNIT_DN, ASSUMED, ASSUMED, IW_FORCE_UNIT_CONTRADICTED},
@@ -135,7 +135,7 @@ TEST(test_force_validity_follows_sensor_and_ledger) {
     }
 }
 
-TEST(test_force_validity_of_the_right_wheel_asks_for_its_own_unit) {
+TEST(test_force_validity_of_the_right_wheel_uses_its_own_unit) {
     iw_force_t *const force = &rig.gateway.force[IW_RIGHT];
     force->raw_us = rig.now_us;
     force->provenance = IW_OFFSET_WHEEL;
@@ -150,7 +150,7 @@ static void hear_empty(uint32_t id, uint8_t length) {
     gateway_rig_step(&rig);
 }
 
-TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it) {
+TEST(test_length_other_than_in_the_table_contradicts_the_dlc) {
     for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         if (row->kind == IW_CODEC_SETPOINT) {
@@ -168,7 +168,7 @@ TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it) {
     }
 }
 
-TEST(test_length_once_contradicted_is_told_once) {
+TEST(test_length_contradiction_is_recorded_once) {
     hear_empty(IW_ID_LEFT_FORCE, 5);
     const uint32_t changes = assumptions()->changes;
     hear_empty(IW_ID_LEFT_FORCE, 6);
@@ -178,7 +178,7 @@ TEST(test_length_once_contradicted_is_told_once) {
     TEST_ASSERT_EQUAL_INT32(5, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->figure);
 }
 
-TEST(test_length_of_frames_that_are_no_telemetry_says_nothing) {
+TEST(test_length_of_other_frames_does_not_change_the_dlc) {
     hear_empty(IW_ID_LEFT_SPEED | IW_CAN_REMOTE, 0);
     hear_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
     hear_empty(300, 1);
@@ -186,7 +186,7 @@ TEST(test_length_of_frames_that_are_no_telemetry_says_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
-TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing) {
+TEST(test_length_of_status_alone_confirms_the_dlc) {
     gateway_rig_init(&rig);
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -198,7 +198,7 @@ TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_DLC)->state);
 }
 
-TEST(test_what_is_only_assumed_elsewhere_says_nothing) {
+TEST(test_assumption_set_as_assumed_changes_nothing) {
     static const iw_assumption_entry_t assumed = {IW_ASSUMED, IW_SOURCE_OPERATOR, 0};
     const uint32_t changes = assumptions()->changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_CURRENT_ROLE, &assumed);
@@ -206,7 +206,7 @@ TEST(test_what_is_only_assumed_elsewhere_says_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_ASSUMED, iw_assumption_entry(assumptions(), IW_ASSUMPTION_CURRENT_ROLE)->state);
 }
 
-TEST(test_is_sending_from_arm_until_the_zeros_have_been_held) {
+TEST(test_is_sending_from_arm_until_the_zeros_end) {
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
     TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rules that only a mutant of the core pointed out: each test here has killed one that lived.
+// Details of the rules of the core. Each test kills a mutant that no other test kills.
 #include "gateway_rig.h"
 #include "message.h"
 #include "unit.h"
@@ -14,7 +14,7 @@ void tearDown(void) {
     TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
 }
 
-TEST(test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused) {
+TEST(test_gateway_arm_with_two_pending_on_the_right_is_refused) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     rig.bus.send_result[IW_LEFT] = 0;
@@ -26,13 +26,13 @@ TEST(test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused) {
     TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
 }
 
-TEST(test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side) {
+TEST(test_gateway_arm_with_an_excused_wheel_is_refused_as_lost) {
     for (int side = 0; side < IW_SIDES; side++) {
         gateway_rig_init(&rig);
         gateway_rig_run(&rig, MS(1000));
         rig.wheel[side].mute = true;
         gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80));
-        rig.now_us += MS(5); // Long enough for the other one to be heard.
+        rig.now_us += MS(5); // Long enough for telemetry of the other wheel
         gateway_rig_step(&rig);
         TEST_ASSERT_FALSE((rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
@@ -45,7 +45,7 @@ TEST(test_gateway_setpoints_are_no_telemetry) {
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(100));
     const uint32_t received = rig.gateway.counters.received;
-    for (unsigned i = 0; i < 30; i++) { // For longer than a second: silence of the wheels all the same.
+    for (unsigned i = 0; i < 30; i++) { // Longer than a second: the wheels count as offline anyway.
         gateway_rig_foreign(&rig, IW_ID_LEFT_SETPOINT);
         gateway_rig_foreign(&rig, IW_ID_RIGHT_SETPOINT);
         gateway_rig_run(&rig, MS(40));
@@ -70,7 +70,7 @@ TEST(test_gateway_echo_is_no_telemetry) {
     TEST_ASSERT_EQUAL_UINT32(received, rig.gateway.counters.received);
 }
 
-TEST(test_gateway_each_odd_frame_is_counted_once_under_one_name) {
+TEST(test_gateway_each_invalid_frame_is_counted_once) {
     gateway_rig_run(&rig, MS(1000));
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -93,7 +93,7 @@ TEST(test_gateway_each_odd_frame_is_counted_once_under_one_name) {
     TEST_ASSERT_EQUAL_UINT32(before.unknown + 4U, rig.gateway.counters.unknown);
 }
 
-TEST(test_gateway_sign_fault_is_evidence_from_the_bus) {
+TEST(test_gateway_sign_fault_contradicts_with_source_bus) {
     gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
@@ -101,7 +101,7 @@ TEST(test_gateway_sign_fault_is_evidence_from_the_bus) {
     rig.wheel[IW_LEFT].rpm = -6;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
-    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // And nothing else.
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // No other cause
     const iw_assumption_entry_t *const entry =
         iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FEEDBACK_SIGN_LEFT);
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, entry->state);
@@ -117,7 +117,7 @@ TEST(test_gateway_software_estop_names_no_wheel) {
     gateway_rig_step(&rig);
 }
 
-TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair) {
+TEST(test_gateway_arm_repeated_by_the_holder_shifts_no_pair) {
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(7));
     const iw_time_us_t next_us = iw_setpoint_next_us(&rig.gateway.setpoint);
@@ -125,7 +125,7 @@ TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair) {
     TEST_ASSERT_EQUAL_UINT64(next_us, iw_setpoint_next_us(&rig.gateway.setpoint));
 }
 
-TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move) {
+TEST(test_gateway_currents_without_flag_are_no_stale_command) {
     const iw_drive_t drive = {{0, 0}, {500, 500}, false};
     iw_applied_t applied;
     rig.config.current_role = IW_ROLE_SETPOINT;
@@ -147,7 +147,7 @@ TEST(test_gateway_lowest_current_is_the_documented_one) {
     }
 }
 
-TEST(test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right) {
+TEST(test_gateway_pair_refused_on_the_left_is_not_sent_right) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     gateway_rig_run(&rig, MS(5));
@@ -163,7 +163,7 @@ TEST(test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right) {
     TEST_ASSERT_TRUE(rig.bus.last_us[IW_RIGHT] > right_us);
 }
 
-/// Two seconds and a bit of force frames of the left wheel, turning at that speed.
+/// Sends force frames of the left wheel for a little more than two seconds, turning at this speed.
 static void hear_force(int16_t raw, int16_t rpm) {
     const message_t message = {IW_CODEC_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
     iw_can_frame_t frame;
@@ -177,7 +177,7 @@ static void hear_force(int16_t raw, int16_t rpm) {
     gateway_rig_run(&rig, MS(10));
 }
 
-TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm) {
+TEST(test_gateway_force_is_measured_up_to_rest_rpm) {
     const int16_t rest_rpm = (int16_t)rig.config.rest_rpm;
     hear_force(100, rest_rpm);
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
@@ -186,7 +186,7 @@ TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_MOVING, rig.gateway.force[IW_LEFT].quality.window);
 }
 
-TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator) {
+TEST(test_gateway_old_force_observation_does_not_replace_operator) {
     const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
     const iw_assumption_entry_t *const entry =
         iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_FORCE_UNIT_LEFT);
@@ -201,7 +201,7 @@ TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator)
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, entry->state);
 }
 
-TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting) {
+TEST(test_gateway_wheel_online_after_a_second_is_seen_booting) {
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(2000));
     rig.wheel[IW_LEFT].mute = false;
@@ -210,7 +210,7 @@ TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starti
     TEST_ASSERT_FALSE(rig.gateway.force[IW_RIGHT].boot_seen);
 }
 
-TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed) {
+TEST(test_gateway_offline_wheel_is_not_judged_by_its_old_speed) {
     gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
@@ -218,7 +218,7 @@ TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed) {
     rig.wheel[IW_LEFT].rpm = -6;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(100));
     rig.wheel[IW_LEFT].mute = true;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80)); // Excuses the wheel for a moment.
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80)); // Excuses the wheel for a short time.
     (void)gateway_rig_cruise(&rig, 120, 120, MS(40));
     rig.wheel[IW_LEFT].mute = false;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(280));
@@ -227,7 +227,7 @@ TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
 }
 
-/// One step just before that time, one at it.
+/// Steps just before this time and at it.
 static void step_around(iw_time_us_t at_us, const bool *flag) {
     gateway_rig_run(&rig, at_us - 1U - rig.now_us);
     gateway_rig_step(&rig);
@@ -237,7 +237,7 @@ static void step_around(iw_time_us_t at_us, const bool *flag) {
     TEST_ASSERT_TRUE(*flag);
 }
 
-TEST(test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond) {
+TEST(test_gateway_at_rest_and_settled_are_exact_to_1_us) {
     gateway_rig_run(&rig, MS(100));
     const iw_time_us_t left_us = rig.gateway.wheel[IW_LEFT].rest_since_us;
     const iw_time_us_t right_us = rig.gateway.wheel[IW_RIGHT].rest_since_us;

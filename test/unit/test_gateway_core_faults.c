@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What goes wrong while wheels move: button, second master, silent or strange wheels, our own lateness.
+// Faults while the wheels move: e-stop button, second master, offline or faulty wheels, late steps of the gateway.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -35,7 +35,7 @@ static void assert_latched(iw_cause_t cause) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-/// One wheel offline: from 400 mm/s the common ramp takes 267 ms.
+/// One wheel is offline: from 400 mm/s the common ramp takes 267 ms.
 static void assert_latched_with_a_ramp(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
@@ -57,7 +57,7 @@ static void assert_no_motion_until_armed_anew(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase) {
+TEST(test_gateway_estop_in_motion_sends_zeros_in_the_same_step) {
     for (uint32_t phase_us = 0; phase_us <= 20000; phase_us += 500) {
         setUp();
         drive_on();
@@ -73,7 +73,7 @@ TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase) {
     }
 }
 
-TEST(test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing) {
+TEST(test_gateway_estop_after_an_unechoed_pair_does_not_wait) {
     drive_on();
     rig.bus.echo_delay_us = MS(15);
     gateway_rig_run(&rig, MS(20));
@@ -96,7 +96,7 @@ TEST(test_gateway_estop_edge_alone_latches) {
     assert_no_motion_until_armed_anew();
 }
 
-TEST(test_gateway_estop_contacts_that_disagree_latch_until_they_agree) {
+TEST(test_gateway_estop_disagreement_latches_until_they_agree) {
     drive_on();
     rig.bus.estop_level = IW_ESTOP_DISAGREES;
     gateway_rig_step(&rig);
@@ -110,7 +110,7 @@ TEST(test_gateway_estop_contacts_that_disagree_latch_until_they_agree) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
 }
 
-TEST(test_gateway_estop_contacts_that_disagree_after_a_press_are_told_beside_it) {
+TEST(test_gateway_estop_disagreement_after_press_is_present) {
     drive_on();
     gateway_rig_press(&rig, true);
     gateway_rig_step(&rig);
@@ -135,7 +135,7 @@ TEST(test_gateway_estop_unreadable_latches_in_every_state) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
 }
 
-TEST(test_gateway_estop_held_stays_latched_whoever_asks) {
+TEST(test_gateway_estop_held_refuses_every_request) {
     drive_on();
     gateway_rig_press(&rig, true);
     gateway_rig_run(&rig, MS(3000));
@@ -148,7 +148,7 @@ TEST(test_gateway_estop_held_stays_latched_whoever_asks) {
     TEST_ASSERT_EQUAL_UINT32(1, stop()->number);
 }
 
-TEST(test_gateway_software_estop_latches_from_anybody) {
+TEST(test_gateway_software_estop_latches_from_any_client) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_step(&rig);
@@ -158,7 +158,7 @@ TEST(test_gateway_software_estop_latches_from_anybody) {
     assert_no_motion_until_armed_anew();
 }
 
-TEST(test_gateway_reset_while_a_client_still_drives_is_stale) {
+TEST(test_gateway_reset_while_a_client_drives_is_stale) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
@@ -182,7 +182,7 @@ TEST(test_gateway_second_master_latches_armed_and_stopping) {
     }
 }
 
-TEST(test_gateway_second_master_while_listening_is_counted_and_refuses_arm) {
+TEST(test_gateway_second_master_while_listening_refuses_arm) {
     gateway_rig_run(&rig, MS(1000));
     gateway_rig_foreign(&rig, 266);
     fake_bus_put_empty(&rig.bus, 298, 0);
@@ -207,7 +207,7 @@ TEST(test_gateway_second_master_while_arming_ends_it) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SECOND_MASTER, iw_gateway_arm_refusal(&rig.gateway));
 }
 
-TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period) {
+TEST(test_gateway_offline_wheel_latches_within_limit_and_period) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -226,7 +226,7 @@ TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period) {
     }
 }
 
-TEST(test_gateway_both_wheels_silent_are_both_named) {
+TEST(test_gateway_both_wheels_offline_are_both_named) {
     drive_on();
     rig.wheel[IW_LEFT].mute = true;
     rig.wheel[IW_RIGHT].mute = true;
@@ -235,8 +235,9 @@ TEST(test_gateway_both_wheels_silent_are_both_named) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop()->sides);
 }
 
-/// Its last frames showed standstill. Zeros that ended after `zero_hold_ms` would rely on frames that no longer come.
-TEST(test_gateway_wheel_offline_at_standstill_is_not_at_rest) {
+/// The last frames showed standstill. If the zeros ended after `zero_hold_ms`, they would rely on frames that no longer
+/// arrive.
+TEST(test_gateway_wheel_offline_is_not_at_standstill) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         gateway_rig_arm(&rig);
@@ -254,7 +255,7 @@ TEST(test_gateway_wheel_offline_at_standstill_is_not_at_rest) {
     }
 }
 
-TEST(test_gateway_never_heard_wheels_refuse_arm) {
+TEST(test_gateway_arm_with_a_wheel_never_online_is_refused) {
     rig.wheel[IW_RIGHT].mute = true;
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -316,7 +317,7 @@ TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch) {
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_pushed_wheel_is_no_fault_while_listening) {
+TEST(test_gateway_pushed_wheel_while_listening_is_no_fault) {
     rig.wheel[IW_LEFT].rpm_fixed = true;
     rig.wheel[IW_LEFT].rpm = 60;
     gateway_rig_run(&rig, MS(3000));
@@ -324,7 +325,7 @@ TEST(test_gateway_pushed_wheel_is_no_fault_while_listening) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-/// A step that much later than the gateway asked to be called, while driving.
+/// Makes a step while driving that is this much later than the gateway requested.
 static void stall_in_motion(iw_time_us_t late_us) {
     setUp();
     drive_on();
@@ -340,7 +341,7 @@ TEST(test_gateway_late_step_is_counted_above_20_ms) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_late_by_100_ms_stops_without_ramp_or_tail) {
+TEST(test_gateway_late_by_100_ms_stops_without_a_ramp) {
     stall_in_motion(MS(100) - 1U);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     stall_in_motion(MS(100));
@@ -363,7 +364,7 @@ TEST(test_gateway_late_by_more_than_500_ms_latches) {
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX / 1000U, stop()->detail);
 }
 
-TEST(test_gateway_late_step_in_mid_ramp_leaves_no_tail) {
+TEST(test_gateway_late_step_during_the_ramp_sends_zero) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(60));
@@ -372,7 +373,7 @@ TEST(test_gateway_late_step_in_mid_ramp_leaves_no_tail) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_late_step_neither_fails_nor_refreshes_a_wheel) {
+TEST(test_gateway_late_step_does_not_change_the_loss_of_a_wheel) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.wheel[IW_LEFT].mute = true;
@@ -384,7 +385,7 @@ TEST(test_gateway_late_step_neither_fails_nor_refreshes_a_wheel) {
     assert_latched_with_a_ramp();
 }
 
-TEST(test_gateway_backlog_after_a_late_step_is_still_of_unknown_age) {
+TEST(test_gateway_backlog_after_a_late_step_has_unknown_age) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     rig.bus.flood = 900;
@@ -400,7 +401,7 @@ TEST(test_gateway_backlog_after_a_late_step_is_still_of_unknown_age) {
     TEST_ASSERT_TRUE(iw_wheel_online(&rig.gateway.wheel[IW_LEFT], rig.now_us));
 }
 
-TEST(test_gateway_what_the_gate_stops_is_an_internal_fault) {
+TEST(test_gateway_frame_stopped_by_the_envelope_is_internal) {
     drive_on();
     rig.gateway.config.max_speed_mm_s = 100;
     gateway_rig_run(&rig, MS(20));

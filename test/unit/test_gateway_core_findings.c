@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the gateway finds out about the wheels without moving them: units, offsets, lengths, pose, reboots.
+// Observations of the wheels without motion: units, offsets, lengths, pose, reboots.
 #include "gateway_rig.h"
 #include "message.h"
 #include "unit.h"
@@ -34,7 +34,7 @@ static void put_offset(iw_side_t side, int16_t offset_dN) {
     put(&message);
 }
 
-/// Force frames of that value every 50 ms for that long.
+/// Sends force frames of this value every 50 ms for this time.
 static void press_for(iw_side_t side, int16_t raw, iw_time_us_t for_us) {
     const message_t message = {IW_CODEC_FORCE, side, {.force = {.force_raw = raw}}};
     const iw_time_us_t until_us = rig.now_us + for_us;
@@ -44,7 +44,7 @@ static void press_for(iw_side_t side, int16_t raw, iw_time_us_t for_us) {
     }
 }
 
-/// A quiet start with that raw value, and an offset of 10 N from the wheel.
+/// Makes a quiet start with this raw value, then an offset of 10 N from the wheel.
 static void start_with(iw_side_t side, int16_t raw) {
     gateway_rig_run(&rig, MS(20));
     press_for(side, raw, MS(2100));
@@ -52,7 +52,7 @@ static void start_with(iw_side_t side, int16_t raw) {
     gateway_rig_step(&rig);
 }
 
-TEST(test_gateway_ledger_begins_with_where_assumptions_come_from) {
+TEST(test_gateway_init_sets_the_sources_of_the_assumptions) {
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
     assert_entry(IW_ASSUMPTION_TRACK, IW_ASSUMED, IW_SOURCE_CONFIGURATION);
@@ -102,7 +102,7 @@ TEST(test_gateway_removed_offset_is_contradicted) {
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_RIGHT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
 }
 
-TEST(test_gateway_unclear_evidence_changes_no_entry) {
+TEST(test_gateway_unclear_unit_changes_no_assumption) {
     start_with(IW_LEFT, 500);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.gateway.force[IW_LEFT].observation);
     assert_entry(IW_ASSUMPTION_FORCE_UNIT_LEFT, IW_ASSUMED, IW_SOURCE_DOCUMENT);
@@ -119,13 +119,13 @@ TEST(test_gateway_turning_wheel_contaminates_its_own_window_only) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_RIGHT].quality.window);
 }
 
-TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still) {
+TEST(test_gateway_force_without_speed_frames_counts_as_standstill) {
     rig.wheel[IW_LEFT].mute = true;
     press_for(IW_LEFT, 1000, MS(2100));
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
 }
 
-TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels) {
+TEST(test_gateway_stall_does_not_contaminate_the_force_window) {
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 1000, MS(1000));
     gateway_rig_stall(&rig, MS(90));
@@ -141,7 +141,7 @@ static iw_tare_t tare(iw_side_t side) {
     return result;
 }
 
-TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all) {
+TEST(test_gateway_tare_of_both_refused_for_one_changes_neither) {
     iw_side_t refused = IW_LEFT;
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 700, MS(2100));
@@ -153,7 +153,7 @@ TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_LEFT], sizeof before);
 }
 
-TEST(test_gateway_tare_makes_the_present_force_zero) {
+TEST(test_gateway_tare_sets_the_present_force_to_zero) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, tare(IW_RIGHT));
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
@@ -164,7 +164,7 @@ TEST(test_gateway_tare_makes_the_present_force_zero) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
 }
 
-TEST(test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why) {
+TEST(test_gateway_tare_of_both_names_the_refusing_left_wheel) {
     iw_side_t refused = IW_RIGHT;
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
@@ -177,7 +177,7 @@ TEST(test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why) {
     TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_RIGHT], sizeof before);
 }
 
-TEST(test_gateway_tare_of_the_left_wheel_makes_its_force_zero) {
+TEST(test_gateway_tare_of_the_left_wheel_sets_its_offset) {
     gateway_rig_run(&rig, MS(20));
     press_for(IW_LEFT, 700, MS(2100));
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, tare(IW_LEFT));
@@ -185,14 +185,14 @@ TEST(test_gateway_tare_of_the_left_wheel_makes_its_force_zero) {
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_LEFT].provenance);
 }
 
-TEST(test_gateway_restored_offset_is_in_force_for_its_wheel) {
+TEST(test_gateway_restored_offset_applies_to_its_wheel_only) {
     iw_gateway_restore_offset(&rig.gateway, IW_RIGHT, IW_OFFSET_STORED, -1234);
     TEST_ASSERT_EQUAL_INT32(-1234, rig.gateway.force[IW_RIGHT].offset_mN);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, rig.gateway.force[IW_RIGHT].provenance);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
 }
 
-TEST(test_gateway_rebooted_wheel_opens_its_window_anew) {
+TEST(test_gateway_rebooted_wheel_reopens_its_force_window) {
     start_with(IW_LEFT, 1000);
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(1500));
@@ -207,7 +207,7 @@ TEST(test_gateway_rebooted_wheel_opens_its_window_anew) {
     TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, iw_permit_present(&rig.gateway.permit, rig.now_us));
 }
 
-TEST(test_gateway_status_length_is_noted) {
+TEST(test_gateway_status_length_sets_the_dlc_assumption) {
     assert_entry(IW_ASSUMPTION_DLC, IW_ASSUMED, IW_SOURCE_NONE);
     gateway_rig_run(&rig, MS(50));
     assert_entry(IW_ASSUMPTION_DLC, IW_CONFIRMED, IW_SOURCE_BUS);
@@ -218,11 +218,11 @@ TEST(test_gateway_status_length_is_noted) {
     TEST_ASSERT_EQUAL_INT32(8, entry(IW_ASSUMPTION_DLC)->figure);
 }
 
-TEST(test_gateway_pose_is_kept_with_its_time) {
+TEST(test_gateway_pose_is_stored_with_its_time) {
     const message_t message = {IW_CODEC_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
-    gateway_rig_run(&rig, MS(100)); // Speeds and states are no poses.
+    gateway_rig_run(&rig, MS(100)); // Speed and status frames are no poses.
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.pose_us);
-    rig.now_us += 1; // When nothing else is heard.
+    rig.now_us += 1; // At a time without other frames
     put(&message);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.pose_us);
@@ -239,9 +239,9 @@ TEST(test_gateway_driving_confirms_the_feedback_sign_once) {
     assert_entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT, IW_CONFIRMED, IW_SOURCE_BUS);
     assert_entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT, IW_ASSUMED, entry(IW_ASSUMPTION_MOUNT_SIGN_LEFT)->source);
     TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_ASSUMPTION_FEEDBACK_SIGN_LEFT)->figure);
-    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT)->figure); // As at a positive command.
+    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT)->figure); // As with a positive command
     const uint32_t changes = rig.gateway.assumptions.changes;
-    (void)gateway_rig_cruise(&rig, 250, -250, MS(1500)); // Faster, and still slower than a machine may turn.
+    (void)gateway_rig_cruise(&rig, 250, -250, MS(1500)); // Faster, and still slower than the yaw limit permits
     TEST_ASSERT_EQUAL_INT32(241, rig.gateway.diverge.measured_mm_s[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.assumptions.changes);
 }
@@ -257,7 +257,7 @@ TEST(test_gateway_current_that_must_be_clamped_is_counted) {
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
 }
 
-TEST(test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back) {
+TEST(test_gateway_right_frame_stopped_by_envelope_stops_left_too) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 100, 400, MS(1000));
     rig.gateway.config.max_speed_mm_s = 200;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a late step leaves as it was, and arming while the last zero is still on its way.
+// State that a late step does not change, and arm while the last zero is not yet echoed.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -21,7 +21,7 @@ static void stall_by(iw_time_us_t late_us) {
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
 }
 
-TEST(test_gateway_late_step_leaves_a_lost_wheel_lost) {
+TEST(test_gateway_late_step_does_not_end_the_loss_of_a_wheel) {
     gateway_rig_run(&rig, MS(500));
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_run(&rig, MS(200));
@@ -34,7 +34,7 @@ TEST(test_gateway_late_step_leaves_a_lost_wheel_lost) {
     }
 }
 
-TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone) {
+TEST(test_gateway_late_step_does_not_lose_an_online_wheel) {
     gateway_rig_run(&rig, MS(500));
     for (uint32_t i = 0; i < 5U; i++) {
         stall_by(MS(60));
@@ -51,21 +51,21 @@ static void run_until_a_pair_is_on_its_way(void) {
     TEST_ASSERT_TRUE(rig.gateway.sender.confirmation.pending[IW_LEFT] > 0U);
 }
 
-TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused) {
+TEST(test_gateway_arm_after_an_unechoed_zero_is_not_refused) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     run_until_a_pair_is_on_its_way();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_run(&rig, MS(1100));
     run_until_a_pair_is_on_its_way();
-    gateway_rig_step(&rig); // The zero is not echoed yet, and the gateway has looked.
+    gateway_rig_step(&rig); // The zero is not echoed yet, and the gateway has polled.
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_reset(&rig.gateway, rig.now_us));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
     gateway_rig_run(&rig, MS(30));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
-/// Steps that are each 30 ms late, while the holder goes on commanding.
+/// Makes steps that are each 30 ms late, while the holder continues to command.
 static void crawl_for(iw_time_us_t for_us) {
     const iw_time_us_t until_us = rig.now_us + for_us;
     const iw_drive_t drive = {{300, 300}, {0, 0}, false};
@@ -76,7 +76,7 @@ static void crawl_for(iw_time_us_t for_us) {
     }
 }
 
-TEST(test_gateway_late_step_after_step_stops_like_one_long_stall) {
+TEST(test_gateway_repeated_late_steps_stop_like_one_long_stall) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     crawl_for(MS(60));
@@ -87,7 +87,7 @@ TEST(test_gateway_late_step_after_step_stops_like_one_long_stall) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero) {
+TEST(test_gateway_suspended_in_motion_latches_and_sends_zero) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(5000));
@@ -111,7 +111,7 @@ TEST(test_gateway_suspended_for_200_ms_stops) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_suspended_for_less_than_100_ms_drives_on) {
+TEST(test_gateway_suspended_below_100_ms_continues_to_drive) {
     static const struct {
         uint32_t for_us;
         uint32_t late_steps;
@@ -120,17 +120,17 @@ TEST(test_gateway_suspended_for_less_than_100_ms_drives_on) {
         gateway_rig_init(&rig);
         gateway_rig_arm(&rig);
         (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
-        TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // The clock says that nothing is late.
+        TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // By the clock the step is not late.
         iw_gateway_suspended(&rig.gateway, cases[i].for_us);
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_UINT32(cases[i].late_steps, rig.gateway.counters.late_steps);
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-        gateway_rig_run(&rig, MS(5)); // One step on time, and the time without judgement is over.
+        gateway_rig_run(&rig, MS(5)); // One step on time ends the time without judgement.
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
     }
 }
 
-TEST(test_gateway_suspended_again_right_after_a_late_step_stops) {
+TEST(test_gateway_suspended_again_after_a_late_step_stops) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     iw_gateway_suspended(&rig.gateway, MS(30));
@@ -142,7 +142,7 @@ TEST(test_gateway_suspended_again_right_after_a_late_step_stops) {
     TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
 }
 
-TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came) {
+TEST(test_gateway_backlog_after_a_punctual_step_has_known_age) {
     gateway_rig_run(&rig, MS(500));
     rig.bus.flood = IW_GATEWAY_DRAIN_MAX + 10U;
     gateway_rig_step(&rig);
@@ -152,7 +152,7 @@ TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
 }
 
-TEST(test_gateway_backlog_of_a_late_step_is_no_second_late_step) {
+TEST(test_gateway_backlog_of_a_late_step_counts_one_late_step) {
     gateway_rig_run(&rig, MS(500));
     rig.bus.flood = 2U * IW_GATEWAY_DRAIN_MAX;
     stall_by(MS(60));
@@ -166,7 +166,7 @@ static void expect_no_side(iw_cause_t cause) {
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
 }
 
-TEST(test_gateway_causes_that_are_not_a_wheels_name_none) {
+TEST(test_gateway_causes_without_a_wheel_name_no_wheel) {
     gateway_rig_arm(&rig);
     gateway_rig_press(&rig, true);
     gateway_rig_step(&rig);
@@ -187,14 +187,14 @@ TEST(test_gateway_causes_that_are_not_a_wheels_name_none) {
     expect_no_side(IW_CAUSE_LOOP_HUNG);
 }
 
-/// What HOLDER sent at that time and the gateway sees only now.
+/// Sends a drive of HOLDER that was sent at this time and arrives now.
 static iw_refusal_t drive_sent(iw_time_us_t sent_us) {
     const iw_drive_t drive = {{300, 300}, {0, 0}, false};
     iw_applied_t applied;
     return iw_gateway_drive(&rig.gateway, sent_us, HOLDER, &drive, &applied);
 }
 
-TEST(test_gateway_drive_from_before_arm_is_stale) {
+TEST(test_gateway_drive_older_than_arm_is_stale) {
     gateway_rig_arm(&rig);
     const iw_time_us_t armed_us = rig.gateway.permit.armed_us;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, drive_sent(armed_us - 1U));
@@ -202,7 +202,7 @@ TEST(test_gateway_drive_from_before_arm_is_stale) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(armed_us));
 }
 
-TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent) {
+TEST(test_gateway_drive_that_waited_renews_from_its_send_time) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     const iw_time_us_t sent_us = rig.now_us - MS(150);
@@ -214,8 +214,8 @@ TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
 }
 
-/// HOLDER's lease of arm still lasts, and a zero pair leaves in this moment; HOLDER's nonzero command comes now, but was
-/// sent longer ago than any command keeps arm from being granted.
+/// The lease of arm of HOLDER still lasts, and a zero pair is sent at this time. The nonzero command of HOLDER arrives
+/// now, but it is too old to prevent arm.
 static void drive_that_waited_too_long(void) {
     gateway_rig_arm(&rig);
     const iw_time_us_t sent_us = rig.now_us;
@@ -241,15 +241,15 @@ TEST(test_gateway_takeover_does_not_inherit_a_command) {
     assert_armed_and_still();
 }
 
-TEST(test_gateway_stop_and_arm_in_one_moment_forget_the_command_before) {
+TEST(test_gateway_stop_and_arm_at_one_time_drop_the_command) {
     drive_that_waited_too_long();
     iw_gateway_stop(&rig.gateway, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
-    gateway_rig_stall(&rig, MS(2)); // Both echoes are in one step.
+    gateway_rig_stall(&rig, MS(2)); // Both echoes arrive in one step.
     assert_armed_and_still();
 }
 
-TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one) {
+TEST(test_gateway_drive_that_waited_does_not_set_stale_time_back) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     const iw_time_us_t last_us = rig.gateway.permit.stale_us;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Limits to the microsecond and accounts to the frame.
+// Limits to the microsecond, and counters to the frame.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -23,7 +23,7 @@ static void drive_on(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-/// Runs until the next pair leaves.
+/// Runs until the next pair is sent.
 static void run_to_next_pair(void) {
     const iw_time_us_t last_us = rig.bus.last_us[IW_LEFT];
     while (rig.bus.last_us[IW_LEFT] == last_us) {
@@ -38,7 +38,7 @@ static void turn(int16_t rpm) {
     }
 }
 
-TEST(test_gateway_counts_what_it_sent_and_what_it_could_not) {
+TEST(test_gateway_counts_sent_and_refused_pairs) {
     gateway_rig_arm(&rig);
     const iw_sender_t *const sender = &rig.gateway.sender;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
@@ -61,7 +61,7 @@ TEST(test_gateway_counts_telemetry) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
 }
 
-TEST(test_gateway_gap_is_measured_anew_after_silence) {
+TEST(test_gateway_gap_restarts_after_silence) {
     gateway_rig_run(&rig, MS(1000));
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.sent.gap_us);
@@ -90,7 +90,7 @@ TEST(test_gateway_echo_is_overdue_at_its_limit_exactly) {
     TEST_ASSERT_EQUAL_UINT32(50, rig.gateway.permit.stop.detail);
 }
 
-TEST(test_gateway_zero_held_back_leaves_with_the_first_echo) {
+TEST(test_gateway_delayed_zero_is_sent_with_the_first_echo) {
     drive_on();
     rig.bus.echo_delay_us = MS(45);
     run_to_next_pair();
@@ -103,7 +103,7 @@ TEST(test_gateway_zero_held_back_leaves_with_the_first_echo) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_zero_to_one_wheel_keeps_the_period) {
+TEST(test_gateway_zero_to_one_wheel_does_not_count_as_a_pair) {
     drive_on();
     gateway_rig_run(&rig, MS(1));
     rig.bus.acknowledged = false;
@@ -117,7 +117,7 @@ TEST(test_gateway_zero_to_one_wheel_keeps_the_period) {
     TEST_ASSERT_EQUAL_UINT32(pairs, rig.gateway.sender.sent.pairs);
 }
 
-TEST(test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once) {
+TEST(test_gateway_arm_in_the_zero_hold_sends_a_pair_immediately) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(1200));
@@ -130,7 +130,7 @@ TEST(test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_rest_counts_after_its_time_only) {
+TEST(test_gateway_standstill_counts_after_rest_ms_only) {
     turn(30);
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -141,7 +141,7 @@ TEST(test_gateway_rest_counts_after_its_time_only) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-TEST(test_gateway_one_moving_wheel_is_enough_to_refuse) {
+TEST(test_gateway_arm_with_one_moving_wheel_is_refused) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         setUp();
         rig.wheel[side].rpm_fixed = true;
@@ -152,7 +152,7 @@ TEST(test_gateway_one_moving_wheel_is_enough_to_refuse) {
     }
 }
 
-TEST(test_gateway_hold_lasts_until_half_a_second_of_rest) {
+TEST(test_gateway_hold_lasts_until_500_ms_of_standstill) {
     drive_on();
     gateway_rig_stop(&rig);
     turn(5);
@@ -181,21 +181,21 @@ TEST(test_gateway_hold_ends_after_a_minute_with_a_rolling_wheel) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
 }
 
-TEST(test_gateway_late_step_starts_the_comparison_of_speeds_anew) {
+TEST(test_gateway_late_step_restarts_the_comparison_of_speeds) {
     gateway_rig_begin_apart(&rig);
     drive_on();
     (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     rig.wheel[IW_RIGHT].rpm_fixed = true;
     rig.wheel[IW_RIGHT].rpm = -6;
     (void)gateway_rig_cruise(&rig, 120, 120, MS(250));
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(21)); // Still heard: nothing else restarts it.
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(21)); // The wheel is still online.
     (void)gateway_rig_cruise(&rig, 120, 120, MS(280));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 120, 120, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
 }
 
-TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet) {
+TEST(test_gateway_wheel_excused_by_a_late_step_is_not_online) {
     gateway_rig_run(&rig, MS(1000));
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
     rig.wheel[IW_RIGHT].mute = true;
@@ -205,7 +205,7 @@ TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-TEST(test_gateway_takes_no_more_than_its_share_in_one_step) {
+TEST(test_gateway_step_drains_at_most_its_limit_of_frames) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         rig.wheel[side].mute = true;
     }
@@ -223,7 +223,7 @@ TEST(test_gateway_takes_no_more_than_its_share_in_one_step) {
     TEST_ASSERT_EQUAL_UINT32(2U * IW_GATEWAY_DRAIN_MAX + 2U, rig.gateway.counters.unknown);
 }
 
-TEST(test_gateway_time_standing_still_sends_nothing_twice) {
+TEST(test_gateway_steps_without_elapsed_time_send_nothing) {
     drive_on();
     run_to_next_pair();
     const uint32_t sent = rig.bus.sent;

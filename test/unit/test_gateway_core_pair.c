@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The pair in the whole gateway: what is compared and when, which wheel is named, ramp or zero at once, who is refused.
+// The pair in the whole gateway: what is compared and when, which wheel is named, ramp or immediate zero, which request
+// is refused.
 #include "gateway_rig.h"
 
 #include "unit.h"
@@ -43,7 +44,7 @@ static void assert_diverged(iw_side_t side, bool at_once) {
     TEST_ASSERT_EQUAL_INT(at_once, gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_one_wheel_blocked_stops_both_at_once) {
+TEST(test_gateway_one_wheel_blocked_sends_zero_to_both) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -61,7 +62,7 @@ TEST(test_gateway_one_wheel_too_fast_ramps_both) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
-        turn((iw_side_t)side, 36); // 724 mm/s.
+        turn((iw_side_t)side, 36); // 724 mm/s
         (void)gateway_rig_cruise(&rig, 400, 400, MS(240));
         assert_diverged((iw_side_t)side, false);
         TEST_ASSERT_EQUAL_INT(rig.bus.commanded_mm_s[IW_LEFT], rig.bus.commanded_mm_s[IW_RIGHT]);
@@ -69,7 +70,7 @@ TEST(test_gateway_one_wheel_too_fast_ramps_both) {
     }
 }
 
-TEST(test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge) {
+TEST(test_gateway_pair_in_a_curve_as_commanded_does_not_diverge) {
     gateway_rig_arm(&rig);
     for (unsigned i = 0; i < 10U; i++) {
         (void)gateway_rig_cruise(&rig, 400, 100, MS(1000));
@@ -91,7 +92,7 @@ TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it) {
+TEST(test_gateway_too_fast_wheel_in_a_ramp_does_not_end_it) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     turn(IW_LEFT, 49);
@@ -101,7 +102,7 @@ TEST(test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] != IW_NEVER);
 }
 
-TEST(test_gateway_pair_pushed_by_hand_while_listening_is_not_compared) {
+TEST(test_gateway_pair_pushed_while_listening_is_not_compared) {
     gateway_rig_run(&rig, MS(500));
     turn(IW_LEFT, 40);
     gateway_rig_run(&rig, MS(2000));
@@ -110,7 +111,7 @@ TEST(test_gateway_pair_pushed_by_hand_while_listening_is_not_compared) {
     TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
 }
 
-TEST(test_gateway_pair_pushed_by_hand_while_armed_stops) {
+TEST(test_gateway_pair_pushed_while_armed_stops) {
     gateway_rig_arm(&rig);
     turn(IW_RIGHT, -10);
     (void)gateway_rig_cruise(&rig, 0, 0, MS(500));
@@ -119,8 +120,8 @@ TEST(test_gateway_pair_pushed_by_hand_while_armed_stops) {
     TEST_ASSERT_FALSE(stop()->at_once);
 }
 
-/// While zero at once is sent both wheels brake as they can: that is no deviation.
-TEST(test_gateway_pair_sent_zero_at_once_is_not_compared) {
+/// During an immediate zero both wheels brake as they can: this is no deviation.
+TEST(test_gateway_pair_with_immediate_zero_is_not_compared) {
     drive_on();
     turn(IW_LEFT, 10);
     gateway_rig_press(&rig, true);
@@ -129,7 +130,7 @@ TEST(test_gateway_pair_sent_zero_at_once_is_not_compared) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
 
-TEST(test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard) {
+TEST(test_gateway_deviation_is_reset_while_a_wheel_is_not_online) {
     rig.config.wheel_silent_ms = 200;
     gateway_rig_begin(&rig, false);
     drive_on();
@@ -137,7 +138,7 @@ TEST(test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
     TEST_ASSERT_GREATER_THAN_INT32(20000, rig.gateway.diverge.path_um);
     rig.wheel[IW_LEFT].mute = true;
-    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90)); // Excused for a while, and not heard.
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90)); // Excused for a short time, and not online
     TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
 }
 
@@ -154,7 +155,7 @@ TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
 
-/// In STOPPING too: a late loop stops without a ramp, and wheels then brake as they can.
+/// Also in STOPPING: a late loop stops without a ramp, and the wheels brake as they can.
 TEST(test_gateway_pair_after_a_late_loop_is_not_compared) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
@@ -166,8 +167,8 @@ TEST(test_gateway_pair_after_a_late_loop_is_not_compared) {
     TEST_ASSERT_INT32_WITHIN(1000, 301000, rig.gateway.diverge.expected_um_s[IW_LEFT]);
 }
 
-/// Somebody pushes the machine while zeros are held: nothing is left to stop, and the next arm begins from zero.
-TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared) {
+/// A person pushes the machine while zeros are held: there is nothing to stop, and the next arm begins at zero.
+TEST(test_gateway_pair_pushed_during_the_hold_is_not_compared) {
     drive_on();
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(600));
@@ -179,8 +180,8 @@ TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared) {
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
 }
 
-/// A pair that could not leave whole is followed by zero at once, though the client goes on.
-TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave) {
+/// After a pair that could not be sent as a whole, zero follows immediately, although the client continues.
+TEST(test_gateway_deviation_is_reset_after_an_unsent_pair) {
     drive_on();
     turn(IW_LEFT, 10);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(40));
@@ -192,7 +193,7 @@ TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine) {
+TEST(test_gateway_measured_speeds_are_mm_s_in_machine_frame) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     turn(IW_LEFT, 50);
@@ -202,7 +203,7 @@ TEST(test_gateway_compares_what_is_measured_in_whole_mm_s_of_the_machine) {
     TEST_ASSERT_EQUAL_INT32(-1005, rig.gateway.diverge.measured_mm_s[IW_RIGHT]);
 }
 
-TEST(test_gateway_compares_whole_millimetres_and_tells_them) {
+TEST(test_gateway_deviation_is_reported_in_whole_millimetres) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_LEFT]);
@@ -220,7 +221,7 @@ TEST(test_gateway_compares_whole_millimetres_and_tells_them) {
     TEST_ASSERT_EQUAL_UINT32(61, stop()->detail);
 }
 
-TEST(test_gateway_deviation_begins_anew_with_each_drive) {
+TEST(test_gateway_deviation_restarts_with_each_drive) {
     drive_on();
     turn(IW_LEFT, 0);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
@@ -249,7 +250,7 @@ TEST(test_gateway_third_divergence_within_a_minute_latches) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
 }
 
-TEST(test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first) {
+TEST(test_gateway_second_offline_wheel_ends_the_ramp) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
     rig.wheel[IW_LEFT].mute = true;
@@ -263,7 +264,7 @@ TEST(test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_pair_is_compared_in_the_machines_frame) {
+TEST(test_gateway_pair_is_compared_in_the_machine_frame) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     drive_on();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What clients ask for, and what odd frames on the bus do not do.
+// Requests of clients, and invalid frames on the bus that have no effect.
 #include "gateway_rig.h"
 #include "unit.h"
 #include <string.h>
@@ -18,7 +18,7 @@ static iw_state_t state(void) {
     return iw_gateway_state(&rig.gateway);
 }
 
-/// Asks without a step; `*out_applied` is poisoned before.
+/// Requests a drive without a step; `*out_applied` contains poison before.
 static iw_refusal_t ask(const iw_drive_t *request, iw_applied_t *out_applied) {
     memset(out_applied, FIXTURE_POISON, sizeof *out_applied);
     const iw_refusal_t refusal = iw_gateway_drive(&rig.gateway, rig.now_us, HOLDER, request, out_applied);
@@ -41,7 +41,7 @@ static void assert_refused(const iw_drive_t *request, iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_MEMORY(&target, &rig.gateway.setpoint.target, sizeof target);
 }
 
-TEST(test_gateway_drive_out_of_range_is_refused_whole) {
+TEST(test_gateway_drive_out_of_range_is_refused_completely) {
     static const iw_drive_t requests[] = {{{32768, 0}, {0, 0}, false},        {{0, -32769}, {0, 0}, false},
                                           {{100, INT32_MAX}, {0, 0}, false},  {{INT32_MIN, 100}, {0, 0}, false},
                                           {{100, 100}, {2001, 0}, true},      {{100, 100}, {0, 2001}, true},
@@ -54,7 +54,7 @@ TEST(test_gateway_drive_out_of_range_is_refused_whole) {
     }
 }
 
-TEST(test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale) {
+TEST(test_gateway_drive_out_of_range_counts_as_stale_command) {
     gateway_rig_run(&rig, MS(1000));
     (void)gateway_rig_drive(&rig, OTHER, 99999, 0);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -65,7 +65,7 @@ TEST(test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-TEST(test_gateway_drive_without_current_needs_the_role_limit) {
+TEST(test_gateway_drive_without_current_requires_the_role_limit) {
     const iw_drive_t request = {{100, -50}, {0, 0}, false};
     iw_applied_t applied;
     rig.config.max_current_mA = 1234;
@@ -85,7 +85,7 @@ TEST(test_gateway_drive_without_current_needs_the_role_limit) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.gateway.permit.stale_client);
 }
 
-TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint) {
+TEST(test_gateway_negative_current_requires_the_role_setpoint) {
     const iw_drive_t request = {{100, 100}, {-2000, 2000}, true};
     iw_applied_t applied;
     rig.config.current_role = IW_ROLE_SETPOINT;
@@ -96,7 +96,7 @@ TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint) {
     TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
 }
 
-TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor) {
+TEST(test_gateway_drive_above_the_maximum_scales_both_wheels) {
     static const struct {
         iw_drive_t request;
         iw_command_t left;
@@ -112,7 +112,7 @@ TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor) {
     };
     rig.config.max_current_mA = 1000;
     rig.config.asymmetric_current = true;
-    rig.config.max_yaw_mrad_s = 10000; // Only the maximum speed is judged here.
+    rig.config.max_yaw_mrad_s = 10000; // This test checks the maximum speed only.
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -126,7 +126,7 @@ TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor) {
     }
 }
 
-/// 0 mA on the left and 2000 mA on the right were applied at speed: the right wheel turned the machine around the left one.
+/// Regression: 0 mA on the left and 2000 mA on the right at speed turned the machine around the left wheel.
 TEST(test_gateway_unequal_limits_become_the_larger_one) {
     const iw_drive_t request = {{600, 600}, {0, 2000}, true};
     const iw_drive_t low = {{600, 600}, {0, 299}, true};
@@ -151,8 +151,8 @@ TEST(test_gateway_unequal_limits_become_the_larger_one) {
     TEST_ASSERT_TRUE(applied.limited);
 }
 
-/// Around a wheel that stands: still a command of motion, with the client's own limit.
-TEST(test_gateway_limit_holds_while_one_wheel_is_commanded_zero) {
+/// A turn around a wheel at standstill is a command of motion, with the limit of the client.
+TEST(test_gateway_limit_applies_while_one_wheel_has_speed_zero) {
     static const iw_drive_t requests[] = {{{300, 0}, {500, 500}, true}, {{0, 300}, {500, 500}, true}};
     iw_applied_t applied;
     gateway_rig_arm(&rig);
@@ -164,7 +164,7 @@ TEST(test_gateway_limit_holds_while_one_wheel_is_commanded_zero) {
     }
 }
 
-/// A current that is a setpoint is the client's own: below any floor, unequal, of either sign.
+/// A current setpoint is not changed: it may be below any floor, unequal, and of either sign.
 TEST(test_gateway_current_setpoints_have_no_floor) {
     const iw_drive_t request = {{100, -100}, {5, -400}, true};
     iw_applied_t applied;
@@ -177,7 +177,7 @@ TEST(test_gateway_current_setpoints_have_no_floor) {
     TEST_ASSERT_FALSE(applied.limited);
 }
 
-/// On the bus: never unequal, never below the floor, and the ramp to zero has the maximum.
+/// On the bus the limits are never unequal or below the floor, and the ramp to zero has the maximum.
 TEST(test_gateway_limit_of_the_client_ends_with_the_stop) {
     const iw_drive_t request = {{600, 600}, {500, 500}, true};
     iw_applied_t applied;
@@ -194,7 +194,7 @@ TEST(test_gateway_limit_of_the_client_ends_with_the_stop) {
     TEST_ASSERT_TRUE(fake_bus_command(&rig.bus.last[IW_RIGHT]).speed_mm_s > 0);
 }
 
-TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only) {
+TEST(test_gateway_current_alone_is_a_command_as_setpoint_only) {
     const iw_drive_t left = {{0, 0}, {5, 0}, true};
     const iw_drive_t right = {{0, 0}, {0, 5}, true};
     const iw_drive_t neither = {{0, 0}, {0, 0}, true};
@@ -212,7 +212,7 @@ TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.permit.stale_us);
 }
 
-TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once) {
+TEST(test_gateway_lost_lease_and_disconnect_ramp) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     gateway_rig_run(&rig, MS(160));
@@ -227,7 +227,7 @@ TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once) {
     TEST_ASSERT_TRUE(rig.bus.commanded_mm_s[IW_LEFT] < 400 && rig.bus.commanded_mm_s[IW_LEFT] > 250);
 }
 
-TEST(test_gateway_takeover_happens_at_rest_only) {
+TEST(test_gateway_takeover_is_granted_at_standstill_only) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, gateway_rig_request_arm(&rig, OTHER, false));
@@ -251,7 +251,7 @@ TEST(test_gateway_contradicted_timing_refuses_arm) {
     TEST_ASSERT_TRUE(rig.gateway.facts.echo_proven);
 }
 
-TEST(test_gateway_arm_in_the_zero_hold_goes_on_without_silence) {
+TEST(test_gateway_arm_in_the_zero_hold_continues_without_gap) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 200, 200, MS(500));
     gateway_rig_stop(&rig);
@@ -263,7 +263,7 @@ TEST(test_gateway_arm_in_the_zero_hold_goes_on_without_silence) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing) {
+TEST(test_gateway_frames_of_bad_format_refresh_nothing) {
     static const uint32_t flags[] = {IW_CAN_REMOTE, IW_CAN_EXTENDED, IW_CAN_ERROR, IW_CAN_FD};
     gateway_rig_arm(&rig);
     rig.wheel[IW_LEFT].mute = true;
@@ -277,7 +277,7 @@ TEST(test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_no
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
 }
 
-TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do) {
+TEST(test_gateway_short_frames_refresh_nothing_long_ones_do) {
     gateway_rig_arm(&rig);
     rig.wheel[IW_LEFT].mute = true;
     for (uint32_t n = 0; n < 50; n++) {
@@ -294,7 +294,7 @@ TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do) {
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
 }
 
-TEST(test_gateway_unknown_ids_are_counted_and_do_nothing) {
+TEST(test_gateway_unknown_ids_are_counted_without_effect) {
     gateway_rig_arm(&rig);
     const uint32_t received = rig.gateway.counters.received;
     fake_bus_put_empty(&rig.bus, 0x266, 5);
@@ -307,7 +307,7 @@ TEST(test_gateway_unknown_ids_are_counted_and_do_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing) {
+TEST(test_gateway_stray_echo_does_not_confirm_arm) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
@@ -322,7 +322,7 @@ TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
 }
 
-TEST(test_gateway_refused_arm_does_not_hasten_the_arming_of_another) {
+TEST(test_gateway_refused_arm_does_not_change_the_pending_arm) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// A machine that rolls although nothing is sent to it: seen, and nothing else follows from it.
+// A machine that rolls without setpoints: the gateway detects it, without another effect.
 #include "gateway_rig.h"
 #include "unit.h"
 
 static gateway_rig_t rig;
 
-/// 120.6 mm/s and 100.5 mm/s, and the rpm below. With one millimetre of radius more the middle one is 101 mm/s.
+/// 120.6 mm/s and 100.5 mm/s, and the rpm below. With one more millimetre of radius the second speed is 101 mm/s.
 #define FAST_RPM  6
 #define LEAST_RPM 5
 #define SLOW_RPM  4
@@ -31,7 +31,7 @@ static bool is_fault(void) {
     return gateway_rig_look(&rig).rolling_fault;
 }
 
-TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen) {
+TEST(test_gateway_rolling_while_listening_is_detected) {
     gateway_rig_run(&rig, MS(1000));
     const uint32_t frames = rig.judge.frames;
     turn(IW_LEFT, 75);
@@ -49,7 +49,7 @@ TEST(test_gateway_machine_that_rolls_away_while_listening_is_seen) {
     TEST_ASSERT_FALSE(rolls());
 }
 
-TEST(test_gateway_one_wheel_of_either_sign_is_enough) {
+TEST(test_gateway_rolling_of_one_wheel_in_either_direction_counts) {
     static const int16_t rpm[] = {FAST_RPM, -FAST_RPM, LEAST_RPM, SLOW_RPM, -SLOW_RPM};
     for (size_t i = 0; i < 10U; i++) {
         gateway_rig_init(&rig);
@@ -59,7 +59,7 @@ TEST(test_gateway_one_wheel_of_either_sign_is_enough) {
     }
 }
 
-TEST(test_gateway_wheel_faster_than_100_mm_s_turns) {
+TEST(test_gateway_rolling_counts_above_100_mm_s) {
     rig.config.radius_mm = 193;
     gateway_rig_begin(&rig, false);
     turn(IW_RIGHT, LEAST_RPM);
@@ -68,7 +68,7 @@ TEST(test_gateway_wheel_faster_than_100_mm_s_turns) {
     TEST_ASSERT_TRUE(rolls());
 }
 
-TEST(test_gateway_rolling_of_a_board_just_powered_is_no_fault) {
+TEST(test_gateway_rolling_after_power_on_is_no_fault) {
     gateway_rig_power_on(&rig);
     turn(IW_LEFT, FAST_RPM);
     gateway_rig_run(&rig, MS(400));
@@ -76,7 +76,7 @@ TEST(test_gateway_rolling_of_a_board_just_powered_is_no_fault) {
     TEST_ASSERT_FALSE(is_fault());
 }
 
-/// What is driven does not roll, nor what is told to stand.
+/// A driven wheel does not roll, nor a wheel that is commanded zero.
 TEST(test_gateway_rolling_is_not_judged_while_setpoints_are_sent) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
@@ -108,7 +108,7 @@ TEST(test_gateway_rolling_soon_after_the_zeros_is_a_fault) {
     TEST_ASSERT_FALSE(is_fault());
 }
 
-TEST(test_gateway_wheel_that_is_not_heard_does_not_roll) {
+TEST(test_gateway_offline_wheel_does_not_roll) {
     turn(IW_LEFT, FAST_RPM);
     gateway_rig_run(&rig, MS(400));
     TEST_ASSERT_TRUE(rolls());
@@ -117,7 +117,7 @@ TEST(test_gateway_wheel_that_is_not_heard_does_not_roll) {
     TEST_ASSERT_FALSE(rolls());
 }
 
-/// What a late step hears has no known time: it neither begins nor ends anything.
+/// Frames of a late step have no known time: they neither begin nor end anything.
 TEST(test_gateway_late_step_does_not_judge_rolling) {
     gateway_rig_run(&rig, MS(100));
     turn(IW_LEFT, FAST_RPM);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What leaves, when, and what happens if it cannot.
+// Setpoints: what is sent and when, and the effect if it cannot be sent.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -17,7 +17,7 @@ static iw_state_t state(void) {
     return iw_gateway_state(&rig.gateway);
 }
 
-/// Armed and driving straight on at 400 mm/s.
+/// Arms and drives straight ahead with 400 mm/s.
 static void drive_on(void) {
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
@@ -34,7 +34,7 @@ TEST(test_gateway_armed_sends_zero_pairs_until_the_first_drive) {
     TEST_ASSERT_UINT32_WITHIN(4, 2 * 46, rig.bus.sent);
 }
 
-TEST(test_gateway_period_is_exact_and_both_frames_leave_together) {
+TEST(test_gateway_period_is_exact_and_both_frames_sent_together) {
     drive_on();
     iw_time_us_t last_us = rig.bus.last_us[IW_LEFT];
     for (uint32_t n = 0; n < 40; n++) {
@@ -50,7 +50,7 @@ TEST(test_gateway_period_is_exact_and_both_frames_leave_together) {
     TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.sent.gap_max_us);
 }
 
-TEST(test_gateway_changed_command_leaves_in_the_same_step) {
+TEST(test_gateway_changed_command_is_sent_in_the_same_step) {
     drive_on();
     (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
     gateway_rig_run(&rig, rig.bus.last_us[IW_LEFT] + MS(27) - rig.now_us);
@@ -74,7 +74,7 @@ TEST(test_gateway_pair_waits_for_the_echoes_of_both_wheels) {
     TEST_ASSERT_EQUAL_UINT64(sent_us + MS(8) + FAKE_BUS_FRAME_US, rig.bus.last_us[IW_RIGHT]);
 }
 
-TEST(test_gateway_zeros_leave_to_whichever_wheel_can_have_one) {
+TEST(test_gateway_zeros_are_sent_to_each_wheel_that_accepts) {
     drive_on();
     rig.bus.echo_delay_us = MS(30);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
@@ -92,7 +92,7 @@ TEST(test_gateway_zeros_leave_to_whichever_wheel_can_have_one) {
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-TEST(test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one) {
+TEST(test_gateway_zero_for_right_does_not_wait_for_left) {
     drive_on();
     gateway_rig_run(&rig, MS(1));
     rig.bus.acknowledged = false;
@@ -108,7 +108,7 @@ TEST(test_gateway_zero_for_the_right_wheel_does_not_wait_for_the_left_one) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_inverted_wheel_is_told_the_negated_speed) {
+TEST(test_gateway_inverted_wheel_receives_the_negated_speed) {
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
     gateway_rig_arm(&rig);
@@ -119,7 +119,7 @@ TEST(test_gateway_inverted_wheel_is_told_the_negated_speed) {
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
 
-TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current) {
+TEST(test_gateway_inverted_wheel_receives_the_negated_current) {
     rig.config.invert[IW_LEFT] = true;
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
@@ -130,7 +130,7 @@ TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_curre
     TEST_ASSERT_EQUAL_INT(150, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
 }
 
-TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros) {
+TEST(test_gateway_pair_refused_for_one_wheel_is_followed_by_zeros) {
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
@@ -151,12 +151,12 @@ TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros) {
     }
 }
 
-TEST(test_gateway_drives_again_after_a_port_that_took_nothing_until_silence) {
+TEST(test_gateway_drives_again_after_a_port_refused_every_send) {
     drive_on();
     rig.bus.send_result[IW_LEFT] = 0;
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
-    gateway_rig_run(&rig, MS(62000)); // Longer than the longest hold.
+    gateway_rig_run(&rig, MS(62000)); // Longer than the longest hold
     TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT);
     rig.bus.send_result[IW_LEFT] = 1;
     rig.bus.send_result[IW_RIGHT] = 1;
@@ -166,7 +166,7 @@ TEST(test_gateway_drives_again_after_a_port_that_took_nothing_until_silence) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send) {
+TEST(test_gateway_pair_that_is_never_sent_is_a_stalled_send) {
     drive_on();
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
@@ -175,7 +175,7 @@ TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send) {
     TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.last[IW_LEFT]).speed_mm_s);
 }
 
-TEST(test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop) {
+TEST(test_gateway_late_echo_within_the_limit_does_not_stop) {
     rig.bus.echo_delay_us = MS(30);
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(60));
@@ -185,7 +185,7 @@ TEST(test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.envelope.stopped);
 }
 
-TEST(test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first) {
+TEST(test_gateway_bus_down_in_motion_latches_and_sends_zero_first) {
     static const iw_bus_state_t states[] = {IW_BUS_DOWN, IW_BUS_OFF};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -209,13 +209,13 @@ TEST(test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first) {
     }
 }
 
-TEST(test_gateway_error_passive_bus_still_carries_motion) {
+TEST(test_gateway_error_passive_bus_allows_motion) {
     rig.bus.state = IW_BUS_PASSIVE;
     drive_on();
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, rig.gateway.bus);
 }
 
-TEST(test_gateway_stop_ramps_holds_zeros_and_falls_silent) {
+TEST(test_gateway_stop_ramps_then_holds_zeros_then_is_silent) {
     drive_on();
     gateway_rig_stop(&rig);
     const iw_time_us_t stop_us = rig.now_us;

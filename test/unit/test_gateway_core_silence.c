@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Silence is silent: what is still in a controller when the zeros end is taken back, or told.
+// Silence after the zeros: setpoints that are still in a controller are taken back, or reported.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -17,7 +17,7 @@ static iw_state_t state(void) {
     return iw_gateway_state(&rig.gateway);
 }
 
-/// Of both wheels: without it they neither acknowledge nor send.
+/// Switches both wheels: without power they neither acknowledge nor send.
 static void set_power(bool on) {
     rig.bus.acknowledged = on;
     rig.wheel[IW_LEFT].mute = !on;
@@ -31,7 +31,7 @@ static void drive_on(void) {
     gateway_rig_run(&rig, MS(1));
 }
 
-/// To the step that ends the zeros of a stop.
+/// Runs to the step that ends the zeros of a stop.
 static void run_to_silence(void) {
     for (unsigned n = 0; n < 70000U && (rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
          n++) {
@@ -40,7 +40,7 @@ static void run_to_silence(void) {
     TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
 }
 
-/// Power is cut in motion; ends when the zeros do.
+/// Cuts the power in motion. Ends with the zeros.
 static void cut_power_in_motion(int purge_result) {
     drive_on();
     rig.bus.purge_result = purge_result;
@@ -50,7 +50,7 @@ static void cut_power_in_motion(int purge_result) {
     run_to_silence();
 }
 
-/// Nobody acknowledges, so the zeros of an arm stay behind; ends when the arm is given up.
+/// Without acknowledgement the zeros of an arm stay in the controller. Ends when the arm is given up.
 static void arm_in_vain(int purge_result) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.purge_result = purge_result;
@@ -63,7 +63,7 @@ static void arm_in_vain(int purge_result) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
 }
 
-/// Power comes back, and nothing of what was sent before comes with it.
+/// Restores the power: nothing that was sent before may reach the wheels.
 static void expect_silence_with_power(void) {
     const iw_time_us_t told_us[IW_SIDES] = {rig.bus.told_us[IW_LEFT], rig.bus.told_us[IW_RIGHT]};
     const uint32_t sent = rig.bus.sent;
@@ -74,7 +74,7 @@ static void expect_silence_with_power(void) {
     TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
 }
 
-TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge) {
+TEST(test_gateway_missing_echo_latches_and_purges) {
     drive_on();
     const uint32_t sent = rig.bus.sent;
     rig.bus.acknowledged = false;
@@ -96,7 +96,7 @@ TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_purged_frames_never_come_out) {
+TEST(test_gateway_purged_frames_are_never_sent) {
     drive_on();
     rig.bus.acknowledged = false;
     rig.bus.purge_result = 1;
@@ -114,7 +114,7 @@ TEST(test_gateway_purged_frames_never_come_out) {
     TEST_ASSERT_EQUAL_INT(0, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-TEST(test_gateway_zeros_without_power_are_taken_back_when_they_end) {
+TEST(test_gateway_zeros_without_power_are_purged_at_their_end) {
     cut_power_in_motion(1);
     TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.flights);
@@ -127,7 +127,7 @@ TEST(test_gateway_zeros_without_power_are_taken_back_when_they_end) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once) {
+TEST(test_gateway_zeros_of_a_failed_arm_are_purged) {
     arm_in_vain(1);
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(0, rig.bus.flights);
@@ -136,7 +136,7 @@ TEST(test_gateway_zeros_of_an_arm_in_vain_are_taken_back_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
 }
 
-TEST(test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end) {
+TEST(test_gateway_zeros_after_a_crash_are_purged_at_their_end) {
     gateway_rig_begin(&rig, true);
     rig.bus.purge_result = 1;
     set_power(false);
@@ -147,7 +147,7 @@ TEST(test_gateway_zeros_for_a_dead_process_are_taken_back_when_they_end) {
     expect_silence_with_power();
 }
 
-TEST(test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they_last) {
+TEST(test_gateway_zeros_after_a_crash_are_purged_once_before_end) {
     gateway_rig_begin(&rig, true);
     set_power(false);
     gateway_rig_run(&rig, MS(1400));
@@ -155,7 +155,7 @@ TEST(test_gateway_zeros_for_a_dead_process_are_asked_back_once_while_they_last) 
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed) {
+TEST(test_gateway_reset_during_zeros_purges_unechoed_frames) {
     drive_on();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_run(&rig, MS(1100));
@@ -171,7 +171,7 @@ TEST(test_gateway_reset_in_the_zeros_takes_back_what_is_not_echoed) {
     expect_silence_with_power();
 }
 
-TEST(test_gateway_ordinary_stop_asks_nothing_back) {
+TEST(test_gateway_ordinary_stop_does_not_purge) {
     for (unsigned n = 0; n < 20U; n++) {
         setUp();
         rig.bus.echo_delay_us = MS(n);
@@ -187,7 +187,7 @@ TEST(test_gateway_ordinary_stop_asks_nothing_back) {
     }
 }
 
-/// The zeros of an arm that is given up as soon as they were handed over.
+/// Sends the zeros of an arm that is given up immediately after them.
 static iw_time_us_t leave_young_zeros(void) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.acknowledged = false;
@@ -199,7 +199,7 @@ static iw_time_us_t leave_young_zeros(void) {
     return sent_us + MS(rig.config.echo_ms);
 }
 
-TEST(test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_microsecond) {
+TEST(test_gateway_setpoint_is_purged_exactly_after_echo_ms) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_run(&rig, overdue_us - 1U - rig.now_us);
     gateway_rig_step(&rig);
@@ -209,7 +209,7 @@ TEST(test_gateway_young_setpoint_is_given_the_time_of_an_echo_to_the_microsecond
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back) {
+TEST(test_gateway_setpoint_is_not_purged_during_a_backlog) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_run(&rig, overdue_us - 1U - rig.now_us);
     rig.now_us = overdue_us;
@@ -220,13 +220,13 @@ TEST(test_gateway_echo_that_may_stand_in_a_backlog_is_not_asked_back) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_setpoint_is_asked_back_in_a_late_step_too) {
+TEST(test_gateway_setpoint_is_purged_in_a_late_step) {
     const iw_time_us_t overdue_us = leave_young_zeros();
     gateway_rig_stall(&rig, overdue_us + MS(50) - rig.now_us);
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_heard_or_not) {
+TEST(test_gateway_purge_without_result_is_repeated_every_second) {
     for (unsigned n = 0; n < 4U; n++) {
         setUp();
         arm_in_vain(0);
@@ -249,7 +249,7 @@ TEST(test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_h
     }
 }
 
-TEST(test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once) {
+TEST(test_gateway_failed_purge_is_reported_immediately) {
     arm_in_vain(-1);
     TEST_ASSERT_TRUE(rig.gateway.left_behind);
     gateway_rig_run(&rig, MS(10000));
@@ -258,7 +258,7 @@ TEST(test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.purges);
 }
 
-TEST(test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_for_again) {
+TEST(test_gateway_purge_without_result_is_reported_at_repetition) {
     arm_in_vain(0);
     const iw_time_us_t again_us = rig.gateway.purged_us + IW_GATEWAY_LOST_ECHO_US;
     gateway_rig_run(&rig, again_us - 1U - rig.now_us);
@@ -270,7 +270,7 @@ TEST(test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_f
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.left_behind);
 }
 
-TEST(test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left) {
+TEST(test_gateway_purge_that_succeeds_later_is_not_reported) {
     arm_in_vain(0);
     rig.bus.purge_result = 1;
     gateway_rig_run(&rig, MS(3000));
@@ -278,7 +278,7 @@ TEST(test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.left_behind);
 }
 
-TEST(test_gateway_silence_after_a_stop_is_asked_once_too) {
+TEST(test_gateway_failed_arm_after_a_stop_is_purged_once) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
     run_to_silence();
@@ -287,7 +287,7 @@ TEST(test_gateway_silence_after_a_stop_is_asked_once_too) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_setpoint_is_asked_back_within_the_first_second_of_time) {
+TEST(test_gateway_setpoint_is_purged_in_the_first_second) {
     const iw_hal_t hal = fake_bus_hal(&rig.bus);
     rig.now_us = rig.wake_us = rig.wheel[IW_LEFT].speed_us = rig.wheel[IW_RIGHT].speed_us = 1;
     rig.wheel[IW_LEFT].status_us = rig.wheel[IW_RIGHT].status_us = 1;
@@ -302,7 +302,7 @@ TEST(test_gateway_setpoint_is_asked_back_within_the_first_second_of_time) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
 }
 
-TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port) {
+TEST(test_gateway_left_behind_ends_by_echo_bus_loss_or_purge) {
     for (unsigned n = 0; n < 3U; n++) {
         setUp();
         arm_in_vain(-1);
@@ -310,7 +310,7 @@ TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the
         if (n == 0U) {
             rig.bus.acknowledged = true;
         } else if (n == 1U) {
-            fake_bus_break(&rig.bus, IW_BUS_ACTIVE); // Down and up again.
+            fake_bus_break(&rig.bus, IW_BUS_ACTIVE); // Bus down and up again
         } else {
             rig.bus.purge_result = 1;
         }
@@ -333,8 +333,8 @@ TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the
     }
 }
 
-/// Each silence begins anew: what was asked in the last one, or in the zeros, is no answer for this one.
-TEST(test_gateway_next_silence_is_given_its_own_second) {
+/// Each silence is separate: a purge of the last silence or of the zeros does not count for this one.
+TEST(test_gateway_purge_of_the_next_silence_is_separate) {
     arm_in_vain(0);
     rig.bus.acknowledged = true;
     gateway_rig_run(&rig, MS(100));
@@ -346,7 +346,7 @@ TEST(test_gateway_next_silence_is_given_its_own_second) {
     TEST_ASSERT_FALSE(rig.gateway.left_behind);
 }
 
-TEST(test_gateway_what_was_only_refused_is_not_asked_back) {
+TEST(test_gateway_refused_setpoints_are_not_purged) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.send_result[IW_LEFT] = rig.bus.send_result[IW_RIGHT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));

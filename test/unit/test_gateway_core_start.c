@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From init to ARMED: silence, the arming pair and its echo, listen-only, the beginning after a crash.
+// From init to ARMED: silence, the pair of arm and its echo, listen-only, start after a crash.
 #include "gateway_rig.h"
 #include "unit.h"
 #include <string.h>
@@ -18,7 +18,7 @@ static iw_state_t state(void) {
     return iw_gateway_state(&rig.gateway);
 }
 
-/// Armed and driving straight on at 400 mm/s.
+/// Arms and drives straight ahead with 400 mm/s.
 static void drive_on(void) {
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
@@ -27,7 +27,7 @@ static void drive_on(void) {
     TEST_ASSERT_EQUAL_INT(400, rig.bus.commanded_mm_s[IW_RIGHT]);
 }
 
-TEST(test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched) {
+TEST(test_gateway_init_refuses_bad_configuration_without_change) {
     static uint8_t poison[sizeof(iw_gateway_t)];
     const iw_hal_t hal = fake_bus_hal(&rig.bus);
     memset(&rig.gateway, FIXTURE_POISON, sizeof rig.gateway);
@@ -50,7 +50,7 @@ TEST(test_gateway_copies_its_configuration) {
     drive_on();
 }
 
-TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo) {
+TEST(test_gateway_arm_sends_a_zero_pair_and_waits_for_its_echo) {
     gateway_rig_run(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
@@ -67,7 +67,7 @@ TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_arm_needs_both_echoes) {
+TEST(test_gateway_arm_requires_both_echoes) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.send_result[IW_RIGHT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -77,7 +77,7 @@ TEST(test_gateway_arm_needs_both_echoes) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
 }
 
-TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again) {
+TEST(test_gateway_arm_without_echo_is_send_stalled_then_silent) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
@@ -94,7 +94,7 @@ TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
-TEST(test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused) {
+TEST(test_gateway_arm_with_two_pending_on_the_left_is_refused) {
     gateway_rig_run(&rig, MS(1000));
     rig.bus.acknowledged = false;
     rig.bus.send_result[IW_RIGHT] = 0;
@@ -135,7 +135,7 @@ TEST(test_gateway_restarted_sends_zeros_then_listens) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
 }
 
-TEST(test_gateway_restarted_without_a_track_sends_zeros_while_the_wheels_turn_and_never_arms) {
+TEST(test_gateway_restarted_without_track_sends_zeros_never_arms) {
     rig.config.track_mm = 0;
     gateway_rig_begin(&rig, true);
     rig.wheel[IW_LEFT].rpm_fixed = true;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A gateway in the hands of chance: clients, buttons, faults and delays at random, and the invariants judged after each step.
+// Random walk: clients, buttons, faults and delays at random; the invariants are checked after each step.
 #include "gateway_rig.h"
 #include "unit.h"
 
 static gateway_rig_t rig;
 static fixture_random_t chance;
 
-/// What happened at all: a walk in which nothing happens proves nothing.
+/// Counts the events: a walk without events proves nothing.
 typedef struct {
     uint32_t armed;
     uint32_t latched;
@@ -82,7 +82,7 @@ static void hurt(void) {
 static void random_request(void) {
     const int32_t choice = fixture_random_in(&chance, 0, 99);
     if (choice < 30) {
-        const iw_client_t client = any_client(); // One after the other: the order of arguments is the compiler's.
+        const iw_client_t client = any_client(); // Arguments have no defined order of evaluation.
         (void)gateway_rig_request_arm(&rig, client, fixture_random_in(&chance, 0, 3) == 0);
     } else if (choice < 50) {
         (void)gateway_rig_reset(&rig);
@@ -99,7 +99,7 @@ static void random_request(void) {
     }
 }
 
-/// One client drives on for a while, as clients do.
+/// One client drives for a while.
 static void random_drive(void) {
     const int32_t left_mm_s = any_speed();
     const int32_t right_mm_s = any_speed();
@@ -115,7 +115,7 @@ static void random_delay(void) {
     gateway_rig_stall(&rig, delay_us);
 }
 
-/// What a patient operator does: mend everything, wait, reset, arm.
+/// Actions of a patient operator: repair all faults, wait, reset, arm.
 static void recover(void) {
     heal();
     gateway_rig_run(&rig, (iw_time_us_t)fixture_random_in(&chance, 500000, 1300000));
@@ -171,17 +171,17 @@ static void walk(uint32_t seed, uint32_t steps) {
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, rig.gateway.sender.envelope.stopped, "the gate had to stop a frame");
 }
 
-TEST(test_gateway_walk_with_current_limit_keeps_the_invariants) {
+TEST(test_gateway_walk_with_current_limit_meets_invariants) {
     walk(1, 250000);
 }
 
-TEST(test_gateway_walk_with_current_setpoint_keeps_the_invariants) {
+TEST(test_gateway_walk_with_current_setpoint_meets_invariants) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     gateway_rig_begin(&rig, false);
     walk(2, 250000);
 }
 
-TEST(test_gateway_walk_with_odd_configurations_keeps_the_invariants) {
+TEST(test_gateway_walk_with_odd_configurations_meets_invariants) {
     rig.config.invert[IW_LEFT] = true;
     rig.config.invert[IW_RIGHT] = true;
     rig.config.period_ms = 7;

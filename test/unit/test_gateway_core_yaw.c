@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Yaw in the whole gateway: what a client is answered, what leaves, and that no stop out of a turn is held up.
+// Yaw in the whole gateway: the reply to a client, the sent setpoints, and stops out of a turn, which are never
+// delayed.
 #include "gateway_rig.h"
 
 #include "unit.h"
@@ -35,7 +36,7 @@ TEST(test_gateway_turn_is_limited_first_by_yaw_then_by_speed) {
     assert_applied(-270, 270, true, &applied);
     applied = ask(0, 1000);
     assert_applied(0, 540, true, &applied);
-    applied = ask(3000, 4000); // By yaw 1620 and 2160; then by speed.
+    applied = ask(3000, 4000); // By yaw 1620 and 2160, then by speed
     assert_applied(750, 1000, true, &applied);
     applied = ask(2000, 2000);
     assert_applied(1000, 1000, true, &applied);
@@ -43,11 +44,11 @@ TEST(test_gateway_turn_is_limited_first_by_yaw_then_by_speed) {
     assert_applied(269, -270, true, &applied);
 }
 
-TEST(test_gateway_yaw_of_another_radius_is_that_of_the_machine) {
+TEST(test_gateway_yaw_limit_depends_on_the_radius) {
     static const struct {
         uint16_t radius_mm;
         int16_t most_mm_s;
-    } cases[] = {{60, 864}, {192, 270}, {400, 129}}; // 1 rad/s on 540 mm, each wheel half of it, x 192 / radius.
+    } cases[] = {{60, 864}, {192, 270}, {400, 129}}; // 1 rad/s on 540 mm, half for each wheel, x 192 / radius
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         setUp();
         rig.config.radius_mm = cases[i].radius_mm;
@@ -59,7 +60,7 @@ TEST(test_gateway_yaw_of_another_radius_is_that_of_the_machine) {
     }
 }
 
-/// The sharpest pivot: both wheels as fast against each other as yaw allows.
+/// Drives the fastest pivot: both wheels in opposite directions, as fast as yaw permits.
 static void pivot(bool mirrored, iw_time_us_t for_us) {
     setUp();
     rig.config.invert[IW_RIGHT] = mirrored;
@@ -75,28 +76,28 @@ static void assert_stands_without_internal(void) {
     TEST_ASSERT_EQUAL_UINT32(0, seen.stopped);
 }
 
-/// At every phase: of the ramp into the pivot, within the period, and once it is reached.
-TEST(test_gateway_stop_out_of_the_sharpest_pivot_is_no_internal) {
+/// At every phase: during the ramp into the pivot, within the period, and in the constant pivot.
+TEST(test_gateway_stop_in_the_fastest_pivot_is_no_internal_fault) {
     for (uint32_t ms = 100; ms <= 900U; ms += 50U) {
         for (uint32_t phase_us = 0; phase_us < 20000U; phase_us += 1700U) {
             pivot((ms / 50U) % 2U == 0U, MS(ms));
             gateway_rig_run(&rig, phase_us);
             gateway_rig_stop(&rig);
-            gateway_rig_run(&rig, MS(20) + 270000U * 1000U / 1500U); // One period, and the ramp by decel_mm_s2 alone.
+            gateway_rig_run(&rig, MS(20) + 270000U * 1000U / 1500U); // One period, and the ramp by decel_mm_s2 alone
             assert_stands_without_internal();
             tearDown();
         }
     }
 }
 
-TEST(test_gateway_zero_command_in_a_pivot_takes_the_ramp_alone) {
+TEST(test_gateway_zero_command_in_a_pivot_needs_the_ramp_only) {
     pivot(true, MS(900));
     TEST_ASSERT_EQUAL_INT(-270, gateway_rig_look(&rig).applied.wheel[IW_LEFT].speed_mm_s);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 0, 0, MS(250)));
     assert_stands_without_internal();
 }
 
-TEST(test_gateway_pivot_turned_round_passes_the_envelope) {
+TEST(test_gateway_pivot_in_reverse_passes_the_envelope) {
     pivot(false, MS(900));
     for (unsigned i = 0; i < 8U; i++) {
         const int32_t speed = (i % 2U == 0U) ? 1000 : -1000;
@@ -107,8 +108,8 @@ TEST(test_gateway_pivot_turned_round_passes_the_envelope) {
     TEST_ASSERT_EQUAL_UINT32(0, gateway_rig_look(&rig).stopped);
 }
 
-/// Scheduler and envelope disagree: what the scheduler forgets the envelope stops, with zeros in the same step.
-TEST(test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope) {
+/// The scheduler and the envelope disagree: the envelope stops what the scheduler misses, with zeros in the same step.
+TEST(test_gateway_yaw_too_fast_is_stopped_by_the_envelope) {
     gateway_rig_arm(&rig);
     rig.gateway.setpoint.yaw.most_mm_s = 2000;
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1080;
@@ -119,7 +120,7 @@ TEST(test_gateway_pair_that_turns_too_fast_is_stopped_by_the_envelope) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
-TEST(test_gateway_yaw_that_grows_too_soon_is_stopped_by_the_envelope) {
+TEST(test_gateway_yaw_growth_too_fast_is_stopped_by_the_envelope) {
     gateway_rig_arm(&rig);
     rig.gateway.setpoint.yaw.growth_mm_s2 = 1600;
     (void)gateway_rig_cruise(&rig, -200, 200, MS(100));

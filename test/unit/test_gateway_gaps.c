@@ -18,20 +18,20 @@ static void pair_after(uint32_t gap_us) {
     gw_gaps_note(&gaps, &sent);
 }
 
-TEST(test_first_pair_after_silence_is_no_gap) {
+TEST(test_gaps_first_pair_after_silence_is_not_counted) {
     pair_after(0U);
     TEST_ASSERT_EACH_EQUAL_UINT32(0U, gaps.count, GW_GAP_BUCKETS);
     TEST_ASSERT_EQUAL_UINT32(0U, gaps.worst_us);
 }
 
-TEST(test_step_that_sends_nothing_counts_nothing_twice) {
+TEST(test_gaps_step_without_a_pair_is_not_counted) {
     pair_after(20000U);
     gw_gaps_note(&gaps, &sent);
     gw_gaps_note(&gaps, &sent);
     TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[3]);
 }
 
-TEST(test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass) {
+TEST(test_gaps_are_counted_in_the_bucket_up_to_its_limit) {
     pair_after(1U);
     pair_after(5000U);
     pair_after(5001U);
@@ -43,14 +43,14 @@ TEST(test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass) {
     TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[GW_GAP_BUCKETS - 1U]);
 }
 
-TEST(test_worst_is_kept_over_silence) {
+TEST(test_gaps_worst_is_retained_over_silence) {
     pair_after(61000U);
     pair_after(0U);
     pair_after(20000U);
     TEST_ASSERT_EQUAL_UINT32(61000U, gaps.worst_us);
 }
 
-TEST(test_written_as_limits_counts_and_worst) {
+TEST(test_gaps_are_written_as_limits_counts_and_worst) {
     char line[256];
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is said and asked for when a setpoint was left in the controller.
+// A setpoint that was left in the controller: the sentence for the operator, and the request for a restart of the bus.
 #include "bus/bus_facts.h"
 
 #include "unity.h"
@@ -38,7 +38,7 @@ static void expect_untouched(void) {
     TEST_ASSERT_EQUAL_STRING("untouched", text);
 }
 
-/// As a unit with PathChanged= sees it: a file was closed after it was written.
+/// Counts events as a unit with PathChanged= receives them: a file was closed after writing.
 static unsigned writings_seen(int watch) {
     char events[4096] __attribute__((aligned(__alignof__(struct inotify_event))));
     unsigned seen = 0;
@@ -52,7 +52,7 @@ static unsigned writings_seen(int watch) {
     return seen;
 }
 
-static void test_left_each_request_is_seen_by_who_waits_for_it(void) {
+static void test_left_each_request_is_a_new_event(void) {
     const int watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
     TEST_ASSERT_TRUE(inotify_add_watch(watch, folder, IN_CLOSE_WRITE) >= 0);
     TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
@@ -62,7 +62,7 @@ static void test_left_each_request_is_seen_by_who_waits_for_it(void) {
     (void)close(watch);
 }
 
-static void test_left_nothing_is_written_through_a_link(void) {
+static void test_left_request_is_not_written_through_a_link(void) {
     struct stat what;
     TEST_ASSERT_EQUAL_INT(0, symlink(victim, path));
     TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
@@ -75,7 +75,7 @@ static void test_left_nothing_is_written_through_a_link(void) {
     expect_untouched();
 }
 
-static void test_left_nobody_can_be_asked_without_the_directory(void) {
+static void test_left_request_without_directory_fails(void) {
     char nowhere[300];
     memset(nowhere, 'x', sizeof nowhere);
     nowhere[sizeof nowhere - 1U] = '\0';
@@ -83,7 +83,7 @@ static void test_left_nobody_can_be_asked_without_the_directory(void) {
     TEST_ASSERT_FALSE(gw_bus_left_ask(nowhere, "can0"));
 }
 
-static void test_left_sentence_names_the_cure_of_each_kind_of_bus(void) {
+static void test_left_sentence_names_the_fix_for_each_kind_of_bus(void) {
     char sentence[400];
     iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true};
     gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
@@ -102,10 +102,10 @@ int main(void) {
         return EXIT_FAILURE;
     }
     UNITY_BEGIN();
-    RUN_TEST(test_left_each_request_is_seen_by_who_waits_for_it);
-    RUN_TEST(test_left_nothing_is_written_through_a_link);
-    RUN_TEST(test_left_nobody_can_be_asked_without_the_directory);
-    RUN_TEST(test_left_sentence_names_the_cure_of_each_kind_of_bus);
+    RUN_TEST(test_left_each_request_is_a_new_event);
+    RUN_TEST(test_left_request_is_not_written_through_a_link);
+    RUN_TEST(test_left_request_without_directory_fails);
+    RUN_TEST(test_left_sentence_names_the_fix_for_each_kind_of_bus);
     const int result = UNITY_END();
     (void)rmdir(folder);
     return result;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The northbound socket: in which folders it is made, what it replaces, and what it has touched afterwards.
+// Northbound socket: permitted folders, which files it replaces, and which files it does not change.
 #include "sockets/listener.h"
 
 #include "config/gateway_config.h"
@@ -22,7 +22,7 @@
 
 static gateway_config_t config;
 static sock_listener_t listener;
-static sock_log_t people; ///< What is written for them.
+static sock_log_t people; ///< Log for the operator
 static char folder[64];
 static char said[1024];
 
@@ -95,13 +95,13 @@ static bool is_root(void) {
     return geteuid() == 0;
 }
 
-TEST(test_folder_of_our_own_is_used_without_a_word) {
+TEST(test_socket_own_folder_is_used_without_a_message) {
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_STRING("", said);
 }
 
-TEST(test_folder_that_others_may_write_to_is_refused_with_the_cure) {
+TEST(test_socket_folder_writable_by_others_is_refused_with_fix) {
     static const mode_t modes[] = {0777, 0775, 0757, 0770};
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
@@ -109,7 +109,7 @@ TEST(test_folder_that_others_may_write_to_is_refused_with_the_cure) {
     }
 }
 
-TEST(test_folder_like_tmp_is_used_with_a_warning) {
+TEST(test_socket_sticky_folder_is_used_with_a_warning) {
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
     TEST_ASSERT_EQUAL_INT(0, prepare());
     assert_said("warning");
@@ -117,7 +117,7 @@ TEST(test_folder_like_tmp_is_used_with_a_warning) {
     TEST_ASSERT_EQUAL_INT(0, make());
 }
 
-TEST(test_folder_of_another_user_is_refused_with_the_cure) {
+TEST(test_socket_folder_of_another_user_is_refused_with_the_fix) {
     if (!is_root()) {
         return;
     }
@@ -129,7 +129,7 @@ TEST(test_folder_of_another_user_is_refused_with_the_cure) {
     }
 }
 
-TEST(test_folder_behind_a_symbolic_link_is_refused) {
+TEST(test_socket_folder_behind_a_symbolic_link_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, symlink(".", in_folder("link")));
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/link/gateway.sock", folder);
     refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
@@ -137,7 +137,7 @@ TEST(test_folder_behind_a_symbolic_link_is_refused) {
     refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
 }
 
-TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing) {
+TEST(test_socket_folder_replaced_after_the_check_is_not_used) {
     char aside[80];
     struct stat status;
     (void)snprintf(aside, sizeof aside, "%s/kept", folder);
@@ -154,7 +154,7 @@ TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing) {
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
 }
 
-TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood) {
+TEST(test_socket_has_its_mode_and_group_same_working_directory) {
     char before[256];
     char after[256];
     struct stat status;
@@ -175,14 +175,14 @@ TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood) {
     assert_logged("");
 }
 
-TEST(test_group_that_cannot_have_the_socket_is_told_with_the_reason) {
+TEST(test_socket_unknown_group_is_logged_with_the_reason) {
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "no-such-group");
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
     assert_logged("there is no group no-such-group;");
 }
 
-/// Somebody's socket at our place; `fd` is -1 if nobody answers on it any more.
+/// Creates a socket of another program at the path. Returns -1 if no program answers on it.
 static int put_socket(bool answers) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
@@ -192,7 +192,7 @@ static int put_socket(bool answers) {
     return answers ? fd : -1;
 }
 
-TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not) {
+TEST(test_socket_is_replaced_only_if_no_program_answers) {
     (void)put_socket(false);
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
@@ -204,7 +204,7 @@ TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not) {
     (void)close(fd);
 }
 
-TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers) {
+TEST(test_socket_of_another_user_does_not_prevent_start_of_root) {
     if (!is_root()) {
         return;
     }
@@ -216,7 +216,7 @@ TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answ
     (void)close(fd);
 }
 
-TEST(test_link_and_plain_file_at_its_place_are_left_alone) {
+TEST(test_socket_link_or_plain_file_at_its_path_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, symlink("elsewhere", in_folder("gateway.sock")));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
@@ -230,7 +230,7 @@ TEST(test_link_and_plain_file_at_its_place_are_left_alone) {
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
 }
 
-TEST(test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end) {
+TEST(test_socket_of_another_program_is_not_removed_at_close) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, make());
     TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(said, folder), "/moved")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the gateway writes for people.
+// Log of the gateway
 #include "config/gateway_config.h"
 #include "sockets/log.h"
 #include "start/start_report.h"
@@ -68,8 +68,9 @@ TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
                 "both under [wheels]\n");
 }
 
-/// A narrower track turns further; a slow machine does not brake but settles, and its quarter may not even be noticed.
-TEST(test_log_at_start_reckons_angles_with_track_and_speed) {
+/// A narrower track turns further. A slow machine coasts instead of braking, and a quarter of its speed may not be
+/// detected.
+TEST(test_log_at_start_calculates_angles_from_track_and_speed) {
     config.core.track_mm = 270;
     gw_report_start(&config, false, false, &people);
     assert_line("running on 212.2 degrees a second;");
@@ -82,7 +83,7 @@ TEST(test_log_at_start_reckons_angles_with_track_and_speed) {
     assert_line("ramp: a wheel coasting 0.0 degrees");
 }
 
-/// Nothing is reckoned with a track that nobody told.
+/// Without a configured track nothing is calculated.
 TEST(test_log_at_start_without_a_track_warns_and_has_no_angle) {
     config.core.track_mm = 0;
     gw_report_start(&config, false, false, &people);
@@ -91,7 +92,7 @@ TEST(test_log_at_start_without_a_track_warns_and_has_no_angle) {
     TEST_ASSERT_NULL(strstr(written(), "angle"));
 }
 
-TEST(test_log_at_start_is_silent_of_what_is_not) {
+TEST(test_log_at_start_omits_absent_watchers_and_warnings) {
     config.core.setpoint_type_set = true;
     config.core.current_role = IW_ROLE_LIMIT;
     config.core.listen_only = true;
@@ -102,18 +103,18 @@ TEST(test_log_at_start_is_silent_of_what_is_not) {
     TEST_ASSERT_NULL(strstr(written(), "warning"));
 }
 
-TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped) {
+TEST(test_log_accepts_a_burst_and_counts_dropped_lines) {
     for (unsigned i = 0; i < 45U; i++) {
         sock_log(&people, SOCK_LOG_WARNING, "line %u", i);
     }
-    people.credit_us -= 200000U; // Time for one line.
+    people.credit_us -= 200000U; // Time for one line
     sock_log(&people, SOCK_LOG_ERROR, "last");
     assert_line("warning: line 39\n");
     TEST_ASSERT_NULL(strstr(written(), "line 40"));
     assert_line("iwheel-gateway: error: (5 lines dropped before this one) last\n");
 }
 
-TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain) {
+TEST(test_log_omits_lower_levels_and_control_characters) {
     sock_log(&people, SOCK_LOG_DEBUG, "below");
     sock_log(&people, SOCK_LOG_INFO, "two\nlines \033[1m");
     TEST_ASSERT_NULL(strstr(written(), "below"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Wheels of another radius than the 192 mm that their firmware assumes: setpoints pass unchanged, and what is measured is compared
-// with them in their own unit. The simulator's wheels turn as the firmware commands; their real radius follows the configuration.
+// Wheels of another radius than the 192 mm that their firmware assumes: setpoints pass unchanged, and measured speeds
+// are compared with them in the unit of setpoints. The wheels of the simulator turn as the firmware commands; their
+// real radius follows the configuration.
 #include "unit.h"
 #include "world_rig.h"
 
@@ -16,7 +17,7 @@ static void begin(uint16_t radius_mm) {
     fixture_config(&rig.config);
     rig.config.radius_mm = radius_mm;
     rig.config.rest_rpm = iw_config_rest(&rig.config).standard;
-    rig.config.max_yaw_mrad_s = 10000; // These wheels are compared with what they were told, in a turn too.
+    rig.config.max_yaw_mrad_s = 10000; // These wheels are compared with their setpoints in a turn, too.
     world_rig_begin(&rig, 0);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         rig.world.pair.wheel[side].motion.config.radius_mm = radius_mm;
@@ -29,7 +30,7 @@ static void assert_armed(uint16_t radius_mm) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(IW_STATE_ARMED, iw_gateway_state(&rig.gateway), what);
 }
 
-TEST(test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence) {
+TEST(test_gateway_radius_full_speed_is_no_fault) {
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
         world_rig_drive(&rig, 1000, 1000, 5000);
@@ -51,8 +52,8 @@ TEST(test_gateway_radius_setpoint_type_is_confirmed_by_any_wheel) {
     }
 }
 
-/// A limit of 60 mm in the unit of setpoints is reached after the same time, whatever the radius.
-TEST(test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel) {
+/// A limit of 60 mm in the unit of setpoints is reached after the same time for every radius.
+TEST(test_gateway_radius_does_not_change_time_of_divergence) {
     iw_time_us_t took_us[RADII];
     for (size_t i = 0; i < RADII; i++) {
         begin(radii[i]);
@@ -71,8 +72,8 @@ TEST(test_gateway_radius_blocked_wheel_stops_the_pair_as_soon_with_any_wheel) {
     }
 }
 
-/// One rpm is 42 mm/s at 400 mm, and 6 at 60: rest is by rpm, and arm waits for the same real speed.
-TEST(test_gateway_radius_rest_is_a_speed_at_the_wheel) {
+/// One rpm is 42 mm/s at 400 mm, and 6 mm/s at 60 mm: standstill depends on rpm, and arm requires the same real speed.
+TEST(test_gateway_radius_standstill_is_the_same_real_speed) {
     static const struct {
         uint16_t radius_mm;
         int16_t at_rest_rpm;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recordings as clients get them: which names are read, and what is in a piece.
+// Recordings for clients: which names are read, and the content of a piece.
 #include "box/box.h"
 #include "disk/box_files.h"
 
@@ -40,7 +40,7 @@ static const char *path_of(const char *name) {
     return path;
 }
 
-/// Bytes that repeat nowhere near a piece's length.
+/// Returns a byte of a sequence that does not repeat near the length of a piece.
 static uint8_t byte_at(size_t i) {
     return (uint8_t)(i * 31U + i / 251U);
 }
@@ -84,7 +84,7 @@ static int64_t number(const char *name) {
     return strtoll(at + strlen(name), NULL, 10);
 }
 
-/// The bytes of `data`.
+/// Decodes the bytes of `data`.
 static size_t decode(uint8_t out[GW_BOX_PIECE]) {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     const char *at = strstr(answer.text, "\"data\":\"") + 8;
@@ -105,13 +105,13 @@ static size_t decode(uint8_t out[GW_BOX_PIECE]) {
     return length;
 }
 
-TEST(test_crc_is_that_of_zlib) {
+TEST(test_reader_crc_equals_that_of_zlib) {
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(0, "123456789", 9));
     const uint32_t first = iwn_line_crc(0, "1234", 4);
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, iwn_line_crc(first, "56789", 5));
 }
 
-TEST(test_only_names_of_the_writer_are_known) {
+TEST(test_reader_accepts_only_names_of_the_writer) {
     static const char *const good[] = {LOG, "stop-000017-wheel_lost.jsonl", "stop-4294967295-gateway_died.conf",
                                        "stop-123456-abcdefghijklmnopqrstuvwxyz_abcd.jsonl"};
     static const char *const bad[] = {"",
@@ -159,7 +159,7 @@ TEST(test_only_names_of_the_writer_are_known) {
     }
 }
 
-TEST(test_links_pipes_and_folders_are_not_read) {
+TEST(test_reader_refuses_links_pipes_and_folders) {
     make("secret", 0, 10);
     TEST_ASSERT_EQUAL(0, symlink("secret", path_of("stop-000001-a.log")));
     TEST_ASSERT_EQUAL(IWN_DENIED, ask("stop-000001-a.log", 0));
@@ -174,7 +174,7 @@ TEST(test_links_pipes_and_folders_are_not_read) {
     TEST_ASSERT_EQUAL(IWN_DENIED, ask("stop-000004-a.log", 0));
 }
 
-TEST(test_directory_that_is_a_link_or_everybodys_is_not_read) {
+TEST(test_reader_refuses_directory_link_or_writable_by_all) {
     char elsewhere[80];
     make(LOG, 0, 10);
     TEST_ASSERT_EQUAL(0, chmod(directory, 0777));
@@ -187,7 +187,7 @@ TEST(test_directory_that_is_a_link_or_everybodys_is_not_read) {
     TEST_ASSERT_EQUAL(IWN_DENIED, ask(LOG, 0));
 }
 
-TEST(test_pieces_make_the_file_whatever_its_length) {
+TEST(test_reader_pieces_form_the_file_for_every_length) {
     static const size_t sizes[] = {
         0, 1, 2, 3, 4, GW_BOX_PIECE - 1U, GW_BOX_PIECE, GW_BOX_PIECE + 1U, 3U * GW_BOX_PIECE + 2U};
     static uint8_t piece[GW_BOX_PIECE];
@@ -217,7 +217,7 @@ TEST(test_pieces_make_the_file_whatever_its_length) {
     }
 }
 
-TEST(test_offset_at_the_end_is_empty_and_one_outside_is_refused) {
+TEST(test_reader_offset_at_end_is_empty_beyond_is_refused) {
     make(LOG, 0, 100);
     TEST_ASSERT_EQUAL(IWN_OK, ask(LOG, 100));
     assert_says("\"data\":\"\",\"crc32\":0,\"file_crc32\":");
@@ -228,7 +228,7 @@ TEST(test_offset_at_the_end_is_empty_and_one_outside_is_refused) {
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, INT64_MIN));
 }
 
-TEST(test_file_that_grows_or_goes_between_pieces_is_told) {
+TEST(test_reader_file_that_changes_between_pieces_is_reported) {
     make(LOG, 0, 10);
     TEST_ASSERT_EQUAL(IWN_OK, ask(LOG, 10));
     make(LOG, 10, 25);
@@ -244,7 +244,7 @@ TEST(test_file_that_grows_or_goes_between_pieces_is_told) {
     assert_says("is not there");
 }
 
-TEST(test_list_has_recordings_only_the_oldest_first) {
+TEST(test_reader_list_has_recordings_only_oldest_first) {
     TEST_ASSERT_EQUAL_STRING("\"recordings\":[]", list());
     make("stop-000010-wheel_lost.log", 0, 30);
     make("stop-000010-wheel_lost.jsonl", 0, 20);
@@ -264,7 +264,7 @@ TEST(test_list_has_recordings_only_the_oldest_first) {
     TEST_ASSERT_NULL(strstr(answer.text, "000011"));
 }
 
-TEST(test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line) {
+TEST(test_reader_list_has_the_newest_that_fit_into_a_line) {
     for (unsigned i = 1; i <= 3U * GW_BOX_LISTED; i++) {
         char name[GW_BOX_CAUSE_SIZE + 40U];
         (void)snprintf(name, sizeof name, "stop-%010u-abcdefghijklmnopqrstuvwxyz_abcd.jsonl", i);
@@ -288,7 +288,7 @@ static void open_box(uint16_t seconds) {
     TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_config_t){.blackbox_s = seconds, .directory = directory}));
 }
 
-TEST(test_refusal_after_a_longer_answer_ends_where_it_should) {
+TEST(test_reader_refusal_after_a_longer_reply_has_its_own_length) {
     const gw_box_question_t piece = {.client = 9, .name = LOG};
     const gw_box_question_t missing = {.client = 8, .name = "stop-000099-x.log"};
     make(LOG, 0, 3U * GW_BOX_PIECE);
@@ -302,7 +302,7 @@ TEST(test_refusal_after_a_longer_answer_ends_where_it_should) {
     gw_box_close(&box);
 }
 
-TEST(test_process_answers_and_one_that_is_frozen_holds_up_nobody) {
+TEST(test_reader_frozen_process_does_not_block_the_gateway) {
     const gw_box_question_t question = {.client = 9, .name = LOG};
     make(LOG, 0, 3U * GW_BOX_PIECE);
     open_box(2);
@@ -316,18 +316,18 @@ TEST(test_process_answers_and_one_that_is_frozen_holds_up_nobody) {
         asked++;
         TEST_ASSERT_LESS_THAN(100000U, asked);
     }
-    TEST_ASSERT_GREATER_THAN(64U, asked); // One of each client at the least.
+    TEST_ASSERT_GREATER_THAN(64U, asked); // At least one of each client
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_receive(&box));
     TEST_ASSERT_EQUAL(0, kill(box.reader.pid, SIGKILL));
     wait_for_answer(GW_CHILD_ENDED);
-    TEST_ASSERT_FALSE(gw_box_ask(&box, &question)); // Too soon.
+    TEST_ASSERT_FALSE(gw_box_ask(&box, &question)); // Too early
     box.reader.started_us = 0;
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
     wait_for_answer(GW_CHILD_SAID);
     gw_box_close(&box);
 }
 
-TEST(test_without_recordings_there_is_no_process) {
+TEST(test_reader_without_recordings_has_no_process) {
     const gw_box_question_t question = {.client = 9, .list = true};
     open_box(0);
     TEST_ASSERT_EQUAL(-1, box.reader.fd);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One gateway per bus, and the marker of a crash, wherever the gateways' sockets lie.
+// One gateway per bus, and the crash marker, independent of the paths of the sockets.
 #include "lock/runtime.h"
 
 #include "config/gateway_config.h"
@@ -41,7 +41,7 @@ static void configure(gateway_config_t *config, const char *bus, const char *fol
     (void)mkdir(under(folder), 0755);
 }
 
-/// Opens it, and keeps what it says in `said`.
+/// Opens the runtime and stores its messages in `said`.
 static int open_runtime(gw_runtime_t *runtime, const gateway_config_t *config) {
     FILE *err = fmemopen(said, sizeof said, "w");
     const int result = gw_runtime_open(runtime, config->bus.interface, config->northbound.socket, shared, err);
@@ -59,10 +59,10 @@ static bool exists(const char *path) {
     return access(path, F_OK) == 0;
 }
 
-/// An interface's name that no other run of this test has.
+/// Returns the name of an interface that no other run of this test uses.
 static const char *interface(void) {
     static char name[16];
-    if (name[0] == '\0') { // Before any process is made.
+    if (name[0] == '\0') { // Before any process is created
         (void)snprintf(name, sizeof name, "iwt%ld", (long)getpid());
     }
     return name;
@@ -98,7 +98,7 @@ void tearDown(void) {
     remove_top();
 }
 
-TEST(test_second_gateway_on_interface_with_socket_elsewhere_is_refused) {
+TEST(test_lock_second_gateway_with_other_socket_is_refused) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());
@@ -106,12 +106,12 @@ TEST(test_second_gateway_on_interface_with_socket_elsewhere_is_refused) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "sends nothing"), said);
 }
 
-TEST(test_lock_of_interface_is_free_after_close_and_after_death) {
+TEST(test_lock_of_interface_is_free_after_close_and_exit) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     gw_runtime_close(&first);
     const pid_t process = fork();
     if (process == 0) {
-        _exit(open_runtime(&second, &other)); // Dies holding it.
+        _exit(open_runtime(&second, &other)); // The process ends while it holds the lock.
     }
     int status = 0;
     TEST_ASSERT_EQUAL_INT(process, waitpid(process, &status, 0));
@@ -119,20 +119,20 @@ TEST(test_lock_of_interface_is_free_after_close_and_after_death) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
 }
 
-TEST(test_many_who_ask_leave_the_lock_where_it_is) {
+TEST(test_lock_is_retained_after_many_refused_opens) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     for (int i = 0; i < 500; i++) {
         TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     }
 }
 
-TEST(test_other_interface_is_free) {
+TEST(test_lock_of_another_interface_is_free) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     (void)snprintf(other.bus.interface, sizeof other.bus.interface, "%.12sx", interface());
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&second, &other));
 }
 
-TEST(test_second_gateway_on_local_bus_is_refused) {
+TEST(test_lock_second_gateway_on_local_bus_is_refused) {
     char bus[64];
     (void)snprintf(bus, sizeof bus, "unix:%s/bus", top);
     configure(&one, bus, "one");
@@ -153,7 +153,7 @@ static void crash_while_sending(const gateway_config_t *config) {
     gw_runtime_close(&first);
 }
 
-TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere) {
+TEST(test_marker_is_found_by_a_gateway_with_other_socket) {
     crash_while_sending(&one);
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&second, &other));
     TEST_ASSERT_TRUE(gw_runtime_crashed(&second));
@@ -163,8 +163,8 @@ TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere) {
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
 }
 
-TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket) {
-    FILE *in_the_way = fopen(shared, "w"); // Keeps root out too.
+TEST(test_marker_without_shared_directory_is_next_to_the_socket) {
+    FILE *in_the_way = fopen(shared, "w"); // This also prevents root.
     TEST_ASSERT_NOT_NULL(in_the_way);
     (void)fclose(in_the_way);
     crash_while_sending(&one);
@@ -177,21 +177,21 @@ TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket) {
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
 }
 
-TEST(test_marker_that_cannot_be_set_or_removed_is_told_with_its_path) {
+TEST(test_marker_that_cannot_be_set_or_removed_has_its_path) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     // A directory can neither be opened for writing nor unlinked, not even by root.
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[0], 0755));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_STRING(first.place[1], first.marker_path);
-    TEST_ASSERT_FALSE(gw_runtime_mark(&first, true)); // Tried again.
+    TEST_ASSERT_FALSE(gw_runtime_mark(&first, true)); // Second try
     TEST_ASSERT_EQUAL_INT(0, rmdir(first.place[1]));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
 }
 
-TEST(test_marker_that_could_be_removed_in_one_place_only_is_set_anew) {
+TEST(test_marker_removed_in_one_place_only_is_set_again) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
@@ -203,12 +203,12 @@ TEST(test_marker_that_could_be_removed_in_one_place_only_is_set_anew) {
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, false));
 }
 
-// Strangers -----------------------------------------------------------------------------------------------------------
+// Other users ---------------------------------------------------------------------------------------------------------
 
 #define STRANGER 65534
 #define SERVICE  2
 
-/// Runs `act` as that user in a process that stays until the test ends. Its result is what `act` returns.
+/// Runs `act` as this user in a process that exists until the end of the test. Returns the result of `act`.
 static int in_process_of(uid_t uid, int (*act)(void)) {
     int result = -1;
     int ends[2];
@@ -237,7 +237,7 @@ static int bind_abstract(const char *name, int backlog) {
     return (result == 0 && backlog >= 0) ? listen(fd, backlog) : result;
 }
 
-/// The places of root's gateway.
+/// Binds the names of the gateway of root.
 static int take_names(unsigned count, int backlog) {
     char name[64];
     int result = 0;
@@ -268,7 +268,7 @@ static bool is_root(void) {
     return geteuid() == 0;
 }
 
-TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named) {
+TEST(test_lock_name_held_by_another_user_is_acquired_and_named) {
     if (!is_root()) {
         return;
     }
@@ -279,19 +279,19 @@ TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_nam
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
-TEST(test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told) {
+TEST(test_lock_name_bound_by_another_user_is_acquired_and_logged) {
     if (!is_root()) {
         return;
     }
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_silently));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "another program"),
-                                 said); // Its user too, where the kernel lists sockets.
+                                 said); // Also the user, if the kernel lists sockets
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "holds @iwheel-gateway/"), said);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
-TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file) {
+TEST(test_lock_with_every_name_held_excludes_by_its_file) {
     if (!is_root()) {
         return;
     }
@@ -301,14 +301,14 @@ TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file) {
     assert_said_pid(getpid());
 }
 
-/// Neither file nor directory can be made, not even by root.
+/// Neither the file nor the directory can be created, not even by root.
 static void spoil_shared(void) {
     FILE *in_the_way = fopen(shared, "w");
     TEST_ASSERT_NOT_NULL(in_the_way);
     (void)fclose(in_the_way);
 }
 
-TEST(test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first) {
+TEST(test_lock_without_its_file_excludes_by_the_next_name) {
     if (!is_root()) {
         return;
     }
@@ -322,7 +322,7 @@ TEST(test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_f
     assert_said_pid(getpid());
 }
 
-TEST(test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone) {
+TEST(test_lock_at_a_later_name_excludes_after_the_first_is_free) {
     if (!is_root()) {
         return;
     }
@@ -331,7 +331,7 @@ TEST(test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone)
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
     end_child();
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE,
-                          open_runtime(&second, &other)); // Its place comes before: it waits, then gives in.
+                          open_runtime(&second, &other)); // The place of `second` is earlier: it waits, then fails.
 }
 
 static int hold_file(void) {
@@ -339,7 +339,7 @@ static int hold_file(void) {
     return (fd >= 0) ? flock(fd, LOCK_EX | LOCK_NB) : -1;
 }
 
-TEST(test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes) {
+TEST(test_lock_of_local_bus_with_held_file_excludes) {
     char bus[64];
     if (!is_root()) {
         return;
@@ -356,13 +356,13 @@ TEST(test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_exclud
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
 }
 
-// Those who may run one -----------------------------------------------------------------------------------------------
+// Users who may run a gateway -----------------------------------------------------------------------------------------
 
 static int open_second(void) {
     return open_runtime(&second, &other);
 }
 
-TEST(test_lock_held_by_root_keeps_out_the_service_and_everybody_else) {
+TEST(test_lock_held_by_root_excludes_all_other_users) {
     if (!is_root()) {
         return;
     }
@@ -374,7 +374,7 @@ TEST(test_lock_held_by_root_keeps_out_the_service_and_everybody_else) {
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, in_process_of(STRANGER, open_second));
 }
 
-TEST(test_lock_held_by_the_service_keeps_out_root_and_everybody_else) {
+TEST(test_lock_held_by_the_service_excludes_all_other_users) {
     if (!is_root()) {
         return;
     }
@@ -392,8 +392,8 @@ TEST(test_lock_held_by_the_service_keeps_out_root_and_everybody_else) {
 static int go[2];
 static int told[2];
 
-/// A developer's gateway: looks whether it is alone and says so, looks who has come when it is told to, and says whom it
-/// gives way to.
+/// Gateway of a developer: reports whether it is alone, polls the lock again on request, and reports the holder to
+/// which it gives way.
 static int open_and_tend(void) {
     const int result = open_second();
     const pid_t process = fork();
@@ -410,7 +410,7 @@ static int open_and_tend(void) {
     return (read(told[0], &byte, 1) == 1) ? result : -1;
 }
 
-TEST(test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up) {
+TEST(test_lock_held_by_another_user_is_given_up_to_root) {
     gw_holder_t holder = {0};
     if (!is_root()) {
         return;
@@ -431,7 +431,8 @@ TEST(test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up) {
     }
 }
 
-/// One of several that start in the same moment: when the pipe is closed. Says what became of it, and keeps what it has.
+/// One of several processes that start at the same time, when the pipe is closed. Reports its result and retains its
+/// lock.
 static void start_at_once(const gateway_config_t *config, const int start[2], const int done[2], int result_fd) {
     char byte;
     (void)close(start[1]);
@@ -473,13 +474,13 @@ static int how_many_run(void) {
     return running;
 }
 
-TEST(test_lock_of_several_that_start_in_the_same_moment_goes_to_one) {
+TEST(test_lock_of_simultaneous_starts_is_acquired_by_one) {
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
     remove_top();
     TEST_ASSERT_EQUAL_INT(0, mkdir(top, 0755));
-    spoil_shared(); // By name alone.
+    spoil_shared(); // By name only
     for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
@@ -487,7 +488,7 @@ TEST(test_lock_of_several_that_start_in_the_same_moment_goes_to_one) {
 
 // Markers -------------------------------------------------------------------------------------------------------------
 
-TEST(test_marker_of_a_stranger_is_none_and_is_not_used) {
+TEST(test_marker_of_another_user_is_ignored) {
     struct stat status;
     if (!is_root()) {
         return;

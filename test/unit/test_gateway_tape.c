@@ -11,7 +11,7 @@ static iw_hal_t hal;
 static blackbox_entry_t entries[8U * BLACKBOX_BLOCK];
 static size_t count;
 
-// A port that answers as it is told.
+// Port with results that the test sets.
 static int send_answer, estop_answer, waiting;
 static iw_bus_state_t bus_answer;
 
@@ -87,7 +87,7 @@ static void expect_kinds(const uint8_t *kinds, size_t expected) {
     }
 }
 
-TEST(test_answers_are_noted_first_and_when_they_change) {
+TEST(test_tape_answers_are_recorded_first_and_on_change) {
     const uint8_t kinds[] = {BLACKBOX_ESTOP, BLACKBOX_BUS,  BLACKBOX_STEP, BLACKBOX_STEP,
                              BLACKBOX_ESTOP, BLACKBOX_STEP, BLACKBOX_BUS,  BLACKBOX_STEP};
     step(1);
@@ -102,7 +102,7 @@ TEST(test_answers_are_noted_first_and_when_they_change) {
     TEST_ASSERT_EQUAL_UINT64(4, entries[7].at_us);
 }
 
-TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus) {
+TEST(test_tape_frame_not_accepted_is_recorded_with_the_result) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     const uint8_t kinds[] = {BLACKBOX_NOT_SENT, BLACKBOX_NOT_SENT};
     gw_tape_step_begin(&tape, 5);
@@ -117,7 +117,7 @@ TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus)
     TEST_ASSERT_EQUAL_UINT32(266, entries[1].number);
 }
 
-TEST(test_frames_have_the_time_of_their_step_and_stand_for_it) {
+TEST(test_tape_frames_have_the_time_of_their_step) {
     const uint8_t kinds[] = {BLACKBOX_ESTOP, BLACKBOX_BUS, BLACKBOX_FRAME, BLACKBOX_FRAME, BLACKBOX_STEP};
     waiting = 2;
     step(7);
@@ -129,7 +129,7 @@ TEST(test_frames_have_the_time_of_their_step_and_stand_for_it) {
     TEST_ASSERT_EQUAL(2, entries[2].as.data[0]);
 }
 
-TEST(test_only_a_send_that_failed_is_noted) {
+TEST(test_tape_only_a_failed_send_is_recorded) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     gw_tape_step_begin(&tape, 5);
     TEST_ASSERT_EQUAL(1, hal.send(hal.context, &frame, 1));
@@ -144,7 +144,7 @@ TEST(test_only_a_send_that_failed_is_noted) {
     TEST_ASSERT_EQUAL(BLACKBOX_PURGE, entries[1].kind);
 }
 
-TEST(test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted) {
+TEST(test_tape_first_refused_frame_of_a_pair_is_recorded) {
     static const int answers[] = {2, 1, 0, -1};
     const iw_can_frame_t pair[] = {{.id = 266, .dlc = 5}, {.id = 298, .dlc = 5}};
     gw_tape_step_begin(&tape, 5);
@@ -162,9 +162,9 @@ TEST(test_of_a_pair_that_was_not_taken_whole_the_first_refused_frame_is_noted) {
     TEST_ASSERT_EQUAL_INT64(-1, entries[2].as.value);
 }
 
-TEST(test_answers_are_noted_again_each_second) {
+TEST(test_tape_answers_are_recorded_again_each_second) {
     const iw_bus_facts_t facts = {.timing_contradicted = true, .echo_proven = true};
-    TEST_ASSERT_FALSE(gw_tape_again(&tape, 5000000)); // Nothing has been asked yet.
+    TEST_ASSERT_FALSE(gw_tape_again(&tape, 5000000)); // No answer was requested yet.
     gw_tape_facts(&tape, 1, &facts);
     gw_tape_facts(&tape, 2, &facts);
     step(1000000);
@@ -178,7 +178,7 @@ TEST(test_answers_are_noted_again_each_second) {
     TEST_ASSERT_EQUAL(1, entries[9].b);
 }
 
-TEST(test_drive_keeps_what_was_asked_and_when_it_was_sent) {
+TEST(test_tape_drive_has_the_request_and_its_age) {
     const iw_drive_t request = {.speed_mm_s = {300, -2147483647}, .current_mA = {100000, -100000}, .has_current = true};
     const blackbox_entry_t entry = {.at_us = 1000, .number = 7, .b = IW_REFUSE_BUSY};
     gw_tape_drive(&tape, &entry, &request, 400);
@@ -193,7 +193,7 @@ TEST(test_drive_keeps_what_was_asked_and_when_it_was_sent) {
     TEST_ASSERT_EQUAL_UINT32(600, entries[0].as.drive.age_us);
 }
 
-TEST(test_frames_around_a_stop_are_kept_apart) {
+TEST(test_tape_frames_around_a_stop_are_stored_separately) {
     for (iw_time_us_t at_us = 1; at_us <= 100; at_us++) {
         waiting = 1;
         step(at_us);
@@ -214,14 +214,14 @@ TEST(test_frames_around_a_stop_are_kept_apart) {
     TEST_ASSERT_EQUAL_UINT64(100, tape.before[GW_AROUND - 1U].at_us);
 }
 
-TEST(test_few_frames_before_a_stop_are_all_there_is) {
+TEST(test_tape_few_frames_before_a_stop_are_all_stored) {
     waiting = 3;
     step(1);
     gw_tape_mark(&tape);
     TEST_ASSERT_EQUAL_UINT32(3, tape.before_count);
 }
 
-TEST(test_without_a_ring_nothing_is_noted_and_all_passes) {
+TEST(test_tape_without_a_ring_records_nothing_and_passes_calls) {
     gw_tape_init(&tape, NULL);
     hal = gw_tape_hal(&tape, &port);
     waiting = 2;

@@ -17,7 +17,7 @@
 #define ROOM     4
 
 static sock_wakeup_t wakeup;
-static bool asks_only; // What a long wait asks the kernel for, without waiting.
+static bool asks_only; // A long wait stores its time and does not wait.
 static struct timespec asked_for;
 static int event_fd;
 
@@ -46,7 +46,7 @@ static iw_time_us_t in_us(iw_time_us_t span_us) {
     return iwl_clock_now_us() + span_us;
 }
 
-/// The C library's, which waits; here the last wait only says for how long.
+/// Replaces the function of the C library. It waits, or stores the time only.
 int ppoll(struct pollfd *watched, nfds_t count, const struct timespec *span, const sigset_t *mask) {
     (void)mask;
     TEST_ASSERT_EQUAL_UINT(1U, (unsigned)count);
@@ -83,23 +83,23 @@ static void check_event_wakes_before_any_time(void) {
     TEST_ASSERT_EQUAL_INT(1, wait_until(IW_NEVER));
 }
 
-TEST(test_wakes_at_its_time_and_not_before) {
+TEST(test_wakeup_is_not_before_its_time) {
     check_wakes_at_its_time_and_not_before();
 }
 
-TEST(test_time_that_was_read_before_is_not_read_again) {
+TEST(test_wakeup_uses_the_given_time) {
     check_time_that_was_read_before_is_not_read_again();
 }
 
-TEST(test_time_that_is_past_only_looks) {
+TEST(test_wakeup_with_a_past_time_only_polls) {
     check_time_that_is_past_only_looks();
 }
 
-TEST(test_event_wakes_before_any_time) {
+TEST(test_wakeup_by_an_event_is_immediate) {
     check_event_wakes_before_any_time();
 }
 
-TEST(test_old_kernel_does_the_same_by_two_calls) {
+TEST(test_wakeup_on_an_old_kernel_uses_two_calls) {
     wakeup.two_calls = true;
     check_wakes_at_its_time_and_not_before();
     check_time_that_was_read_before_is_not_read_again();
@@ -107,7 +107,7 @@ TEST(test_old_kernel_does_the_same_by_two_calls) {
     check_event_wakes_before_any_time();
 }
 
-TEST(test_wait_of_seconds_is_told_in_seconds_and_the_rest) {
+TEST(test_wakeup_of_seconds_has_seconds_and_nanoseconds) {
     wakeup.two_calls = true;
     asks_only = true;
     TEST_ASSERT_EQUAL_INT(0, wait_until(in_us(7800000U)));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Battery and temperature against thresholds: what is a fault, how long it must last, and that none is without a threshold.
+// Battery and temperature against their thresholds: which value is a fault, how long it must last, and no fault without
+// a threshold.
 #include "wheels/health.h"
 
 #include "iwheel/codec.h"
@@ -37,7 +38,7 @@ TEST(test_health_at_the_thresholds_is_no_fault) {
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
-TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel) {
+TEST(test_health_value_beyond_for_5_s_is_a_fault_of_its_wheel) {
     told[IW_LEFT].status.battery_dV = 219;
     told[IW_RIGHT].status.temperature_degC = 61;
     step(0);
@@ -51,7 +52,7 @@ TEST(test_health_beyond_for_five_seconds_is_a_fault_of_that_wheel) {
     TEST_ASSERT_TRUE(health.present[IW_RIGHT][GW_TEMPERATURE_HIGH]);
 }
 
-TEST(test_health_fault_is_gone_after_five_seconds_within) {
+TEST(test_health_fault_ends_after_5_s_within_the_thresholds) {
     told[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US);
@@ -64,7 +65,7 @@ TEST(test_health_fault_is_gone_after_five_seconds_within) {
     TEST_ASSERT_EQUAL_UINT32(2, health.changes);
 }
 
-TEST(test_health_dip_in_between_begins_anew) {
+TEST(test_health_good_value_in_between_restarts_the_time) {
     told[IW_LEFT].status.battery_dV = 100;
     step(0);
     step(GW_HEALTH_US - 1U);
@@ -78,7 +79,7 @@ TEST(test_health_dip_in_between_begins_anew) {
     TEST_ASSERT_EQUAL_UINT32(1, health.changes);
 }
 
-TEST(test_health_without_thresholds_knows_no_fault) {
+TEST(test_health_without_thresholds_reports_no_fault) {
     health.limits = (gw_health_limits_t){0, 0};
     told[IW_LEFT].status.battery_dV = 0;
     told[IW_LEFT].status.temperature_degC = 200;
@@ -87,13 +88,13 @@ TEST(test_health_without_thresholds_knows_no_fault) {
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);
 }
 
-TEST(test_health_value_that_is_not_known_changes_nothing) {
+TEST(test_health_unknown_value_changes_nothing) {
     told[IW_LEFT].status.battery_dV = 100;
     told[IW_RIGHT].status.temperature_degC = IW_TEMPERATURE_MAX_degC + 1U;
     step(0);
     seen.wheel[IW_LEFT].status_us = seen.at_us;
     seen.at_us += GW_HEALTH_FRESH_US + 1U;
-    gw_health_look(&health, &seen); // Too old: the time begins anew.
+    gw_health_look(&health, &seen); // The value is too old: the time starts again.
     step(GW_HEALTH_US - GW_HEALTH_FRESH_US);
     step(GW_HEALTH_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, health.changes);

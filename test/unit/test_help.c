@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The help texts are files: what is said in the code as well must be the same there.
+// The help texts are files. A text that the code contains as well must be the same in both.
 #include "config/gateway_config.h"
 #include "help.h"
 #include "mqtt_settings.h"
@@ -43,7 +43,7 @@ TEST(test_help_names_the_configuration_that_is_read) {
 #endif
 }
 
-/// The comment of each key is compiled in from the file in share/, by its section and name.
+/// The comment of each key is compiled in from the file in share/; section and name select it.
 static void expect_comments(const settings_form_t *form) {
     for (size_t i = 0; i < form->count; i++) {
         const settings_key_t *key = &form->keys[i];
@@ -67,18 +67,18 @@ TEST(test_help_of_each_key_is_in_its_configuration_file) {
 #endif
 }
 
-TEST(test_help_says_durations_as_they_are_read) {
+TEST(test_help_durations_have_the_form_that_is_parsed) {
     expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
     expect_said(help_record, "--for TIME  " DURATION_FORM ";");
 }
 
-/// The verb of that place in the program's page, or a null pointer behind the last.
+/// Returns the verb at that place in the page of the program, or a null pointer after the last one.
 static const verb_t *verb_at(unsigned number) {
     const char *name = help_find("help")->choice(number);
     return (name != NULL) ? help_find(name) : NULL;
 }
 
-/// Completion and the program's page take the words and the summary from their places in the page.
+/// Shell completion and the page of the program read the strings and the summary at fixed places of the page of a verb.
 TEST(test_help_of_each_verb_has_usage_and_summary_in_their_places) {
     const verb_t *verb = NULL;
     for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
@@ -103,8 +103,8 @@ TEST(test_help_fits_a_terminal_of_80_columns) {
     }
 }
 
-/// Each word of the choice, where the page lists them or in the usage.
-TEST(test_help_names_each_word_that_may_follow) {
+/// The page contains each word of the choice, in its list or in the usage.
+TEST(test_help_names_each_choice_of_an_argument) {
     const verb_t *verb = NULL;
     unsigned choices = 0;
     for (unsigned i = 0; (verb = verb_at(i)) != NULL; i++) {
@@ -116,14 +116,14 @@ TEST(test_help_names_each_word_that_may_follow) {
     TEST_ASSERT_GREATER_THAN(IW_ASSUMPTION_ITEMS + IWN_TOPICS, choices);
 }
 
-TEST(test_help_of_confirm_lists_the_items_and_no_other) {
+TEST(test_help_of_confirm_lists_exactly_the_items) {
     char expected[512] = "\nITEM  ";
     char found[512] = "";
     for (unsigned i = 0; i < IW_ASSUMPTION_ITEMS; i++) {
         (void)snprintf(&expected[strlen(expected)], sizeof expected - strlen(expected), "%s%s", (i > 0U) ? ", " : "",
                        iwn_assumption_item_name((iw_assumption_item_t)i));
     }
-    // Lines that go on are indented.
+    // Continuation lines are indented.
     size_t used = 0;
     for (const char *at = strstr(help_confirm, "\nITEM  "); at != NULL && at[0] != '\0' && used + 1U < sizeof found;) {
         if (strncmp(at, "\n      ", 7U) == 0) {

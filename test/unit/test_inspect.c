@@ -17,7 +17,7 @@ void setUp(void) {
     inspect_heard_begin(&heard);
 }
 
-/// Two seconds of a healthy pair.
+/// Receives two seconds of a healthy pair.
 static void hear_healthy(void) {
     heard.was_up = true;
     heard.span_us = 2000000U;
@@ -45,7 +45,7 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
     TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every trouble has a cure");
 }
 
-TEST(test_healthy_bus_finds_nothing_to_mend) {
+TEST(test_inspect_healthy_bus_has_no_finding) {
     hear_healthy();
     inspect_bus(&local, &heard, &config, &findings);
     expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
@@ -54,7 +54,7 @@ TEST(test_healthy_bus_finds_nothing_to_mend) {
     TEST_ASSERT_EQUAL(findings.count, findings.total[INSPECT_OK]);
 }
 
-TEST(test_silent_wheel_fails_and_its_other_messages_are_not_asked_for) {
+TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
     hear_healthy();
     for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
@@ -65,7 +65,7 @@ TEST(test_silent_wheel_fails_and_its_other_messages_are_not_asked_for) {
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
 
-TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers) {
+TEST(test_inspect_rate_off_by_over_10_percent_warns_with_numbers) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
     inspect_bus(&local, &heard, &config, &findings);
@@ -73,7 +73,7 @@ TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers) {
     TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
 }
 
-TEST(test_rate_within_a_tenth_or_two_frames_is_right) {
+TEST(test_inspect_rate_within_10_percent_or_two_frames_is_ok) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
     heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
@@ -84,21 +84,21 @@ TEST(test_rate_within_a_tenth_or_two_frames_is_right) {
     TEST_ASSERT_NOT_NULL(find("rates"));
 }
 
-TEST(test_message_that_never_comes_is_named) {
+TEST(test_inspect_missing_message_is_named) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
     inspect_bus(&local, &heard, &config, &findings);
     expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
 }
 
-TEST(test_offsets_may_be_missing_after_the_first_minute) {
+TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
     hear_healthy();
     TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
     inspect_bus(&local, &heard, &config, &findings);
     TEST_ASSERT_NULL(find("rates"));
 }
 
-TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them) {
+TEST(test_inspect_foreign_setpoints_fail_without_a_gateway) {
     inspect_config_t beside_gateway = config;
     beside_gateway.others_may_send = true;
     hear_healthy();
@@ -109,7 +109,7 @@ TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them) {
     expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
 }
 
-TEST(test_unknown_ids_are_listed_and_the_list_is_bounded) {
+TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     iw_can_frame_t frame = {.id = 0x266U};
     hear_healthy();
     inspect_heard_take(&heard, &frame);
@@ -129,7 +129,7 @@ TEST(test_unknown_ids_are_listed_and_the_list_is_bounded) {
     TEST_ASSERT_NOT_NULL(strstr(find("unknown_ids")->text, " ..."));
 }
 
-TEST(test_damaged_frames_are_counted_apart) {
+TEST(test_inspect_damaged_frames_have_their_own_counts) {
     const iw_can_frame_t brief = {.id = IW_ID_LEFT_SPEED, .dlc = 3};
     const iw_can_frame_t remote = {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 4};
     const iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
@@ -142,14 +142,14 @@ TEST(test_damaged_frames_are_counted_apart) {
     TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, heard.bits);
 }
 
-TEST(test_full_bus_warns) {
+TEST(test_inspect_full_bus_warns) {
     hear_healthy();
     heard.bits = 1100000U;
     inspect_bus(&local, &heard, &config, &findings);
     expect("load", INSPECT_WARN, "55.0 %", "lower ids");
 }
 
-TEST(test_bus_that_never_lived_says_nothing_of_wheels) {
+TEST(test_inspect_bus_that_was_never_up_does_not_judge_wheels) {
     iwl_bus_link_t link = {.presence = IWL_LINK_UP};
     inspect_bus(&link, &heard, &config, &findings);
     expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
@@ -159,16 +159,16 @@ TEST(test_bus_that_never_lived_says_nothing_of_wheels) {
     expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
 }
 
-TEST(test_error_passive_bus_warns) {
+TEST(test_inspect_error_passive_bus_warns) {
     hear_healthy();
     heard.worst = IW_BUS_PASSIVE;
     inspect_bus(&local, &heard, &config, &findings);
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
 }
 
-TEST(test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it) {
+TEST(test_inspect_bus_off_fails_and_wheels_are_not_judged) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP};
-    heard.was_up = true; // Before it went off, or before its first error frame came.
+    heard.was_up = true; // The bus was up before it went bus-off, or before the first error frame.
     heard.worst = IW_BUS_OFF;
     heard.last = IW_BUS_OFF;
     inspect_bus(&link, &heard, &config, &findings);
@@ -180,7 +180,7 @@ TEST(test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it)
     TEST_ASSERT_NULL(find("left_wheel"));
 }
 
-TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged) {
+TEST(test_inspect_past_bus_off_warns_and_wheels_are_judged) {
     hear_healthy();
     heard.worst = IW_BUS_OFF;
     inspect_bus(&local, &heard, &config, &findings);
@@ -188,7 +188,7 @@ TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged) {
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
 
-TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for) {
+TEST(test_inspect_absent_hardware_gets_the_requested_verdict) {
     const inspect_estop_t estop = {
         .line = "ESTOP", .present = true, .level = -1, .trouble = "no chip", .no_gpio = true};
     findings.absent = INSPECT_SKIP;
@@ -203,7 +203,7 @@ TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for) {
     TEST_ASSERT_EQUAL_STRING("skip", inspect_verdict_word(INSPECT_SKIP));
 }
 
-TEST(test_right_link_has_nothing_to_mend) {
+TEST(test_inspect_correct_link_has_no_finding) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
                                  .echo_proven = true,
                                  .bitrate_hz = 1000000,
@@ -215,7 +215,7 @@ TEST(test_right_link_has_nothing_to_mend) {
     expect("bit_timing", INSPECT_OK, "1000000 bit/s, sample point 62.5 %", "");
 }
 
-TEST(test_each_fault_of_the_link_has_its_command) {
+TEST(test_inspect_each_fault_of_the_link_names_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP,
                                  .is_mute = true,
                                  .bitrate_hz = 500000,
@@ -230,20 +230,20 @@ TEST(test_each_fault_of_the_link_has_its_command) {
     expect("echo", INSPECT_WARN, "unproven", "IFF_ECHO");
 }
 
-TEST(test_room_for_frames_that_is_granted_is_told) {
+TEST(test_inspect_granted_buffer_is_reported) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 2U * IWL_LINK_ROOM_BYTES};
     inspect_room(&link, &findings);
     expect("room", INSPECT_OK, "4096 of 4096 KiB granted, 512 ms of a full bus", "");
 }
 
-TEST(test_room_for_frames_that_is_not_granted_has_its_command) {
+TEST(test_inspect_buffer_not_granted_names_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 425984U};
     inspect_room(&link, &findings);
     expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; when others",
            "sudo sysctl net.core.rmem_max=4194304");
 }
 
-TEST(test_room_for_frames_that_is_not_known_is_not_judged) {
+TEST(test_inspect_unknown_buffer_is_not_judged) {
     const iwl_bus_link_t hub = {.presence = IWL_LINK_LOCAL, .room_bytes = 425984U};
     const iwl_bus_link_t unknown = {.presence = IWL_LINK_UP};
     inspect_room(&hub, &findings);
@@ -251,7 +251,7 @@ TEST(test_room_for_frames_that_is_not_known_is_not_judged) {
     TEST_ASSERT_EQUAL_UINT(0U, findings.count);
 }
 
-TEST(test_wrong_timing_only_warns_where_it_is_configured_so) {
+TEST(test_inspect_wrong_timing_warns_only_where_configured) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
     inspect_config_t lenient = config;
     lenient.refuses = false;
@@ -259,7 +259,7 @@ TEST(test_wrong_timing_only_warns_where_it_is_configured_so) {
     expect("bit_timing", INSPECT_WARN, "500000", "bitrate 1000000");
 }
 
-TEST(test_absent_and_foreign_interfaces_are_told_apart) {
+TEST(test_inspect_absent_and_foreign_interfaces_differ) {
     iwl_bus_link_t link = {.presence = IWL_LINK_ABSENT};
     inspect_link(&link, &config, &findings);
     expect("interface", INSPECT_FAIL, "no such interface", "ip -brief link show type can");
@@ -275,7 +275,7 @@ TEST(test_absent_and_foreign_interfaces_are_told_apart) {
     expect("interface", INSPECT_FAIL, "is down", "ip link set can0 up");
 }
 
-TEST(test_estop_levels) {
+TEST(test_inspect_estop_levels_have_their_verdicts) {
     inspect_estop_t estop = {.line = "ESTOP", .present = true, .level = -1, .trouble = "gpioinfo lists them"};
     inspect_estop(&estop, &findings);
     expect("estop", INSPECT_FAIL, "unreadable, which counts as pressed", "gpioinfo");
@@ -309,7 +309,7 @@ TEST(test_estop_levels) {
     expect("estop", INSPECT_WARN, "none", "[estop] line");
 }
 
-TEST(test_full_list_counts_on_and_loses_no_failure) {
+TEST(test_inspect_full_list_counts_further_failures) {
     for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
         inspect_cure(&findings, "cure %u", i);

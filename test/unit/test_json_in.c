@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading JSON where it lies: what is JSON and what is not, and walking what is.
+// The JSON reader in place: valid and invalid JSON, and the walk through valid JSON.
 #include "iwheel_northbound/json_in.h"
 #include "unit.h"
 
@@ -16,7 +16,7 @@ void setUp(void) {
     why[0] = '\0';
 }
 
-/// In a copy of exactly that length, so that sanitizers see a byte read behind it.
+/// Checks a copy of exactly that length, so that sanitizers detect a read after the last byte.
 static bool check(const char *text, size_t length) {
     static char *copy;
     iwn_text_t fault = iwn_text_begin(why, sizeof why);
@@ -44,7 +44,7 @@ static iwn_json_t member(const char *name) {
 #define OWN_YES(name, text) YES(name, text)
 #define OWN_NO(name, text)  NO(name, text)
 
-TEST(test_json_every_vector_is_read_or_refused_as_the_table_says){
+TEST(test_json_every_vector_is_read_or_refused_as_in_the_table){
 #include "json_vectors.inc"
 }
 
@@ -68,7 +68,7 @@ TEST(test_json_nul_byte_anywhere_is_refused) {
     }
 }
 
-TEST(test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line) {
+TEST(test_json_duplicate_or_too_many_names_are_refused) {
     static char text[16384];
     size_t length = (size_t)snprintf(text, sizeof text, "{\"z\":0");
     for (unsigned i = 0; i < IWN_NAMES_MAX - 1U; i++) {
@@ -82,7 +82,7 @@ TEST(test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line) {
     refused(text, "too many names near '\"y\"'");
 }
 
-TEST(test_json_text_longer_than_its_places_can_be_told_is_refused) {
+TEST(test_json_longer_than_the_limit_is_refused) {
     static char text[IWN_JSON_MAX + 1U];
     memset(text, ' ', sizeof text);
     memcpy(text, "[]", 2);
@@ -90,7 +90,7 @@ TEST(test_json_text_longer_than_its_places_can_be_told_is_refused) {
     TEST_ASSERT_FALSE(check(text, IWN_JSON_MAX + 1U));
 }
 
-TEST(test_json_refusal_tells_what_is_wrong_and_near_what) {
+TEST(test_json_refusal_names_the_fault_and_its_place) {
     refused("", "'[' or '{' expected near end of file");
     refused("x", "'[' or '{' expected near 'x'");
     refused("{\"a\":1,}", "string or '}' expected near '}'");
@@ -121,14 +121,14 @@ TEST(test_json_refusal_tells_what_is_wrong_and_near_what) {
     refused("[truetruetruetruetruet]", "invalid token");
 }
 
-TEST(test_json_character_cut_by_the_end_is_not_completed_from_behind) {
+TEST(test_json_character_cut_by_the_end_is_refused) {
     static const char text[] = "[\"\xC3\xA9\"]";
     iwn_text_t fault = iwn_text_begin(why, sizeof why);
     TEST_ASSERT_FALSE(iwn_json_check(text, 3U, &work, &root, &fault));
     TEST_ASSERT_EQUAL_STRING("unable to decode byte 0xc3 near '\"'", why);
 }
 
-TEST(test_json_walk_gives_members_and_values_in_their_order) {
+TEST(test_json_walk_returns_members_and_values_in_order) {
     const char *text = " { \"a\" : [ 1 , \"]\" , { } ] , \"b\" : { \"c\\\"\" : null } , \"d\" : -5 } ";
     static const char *const names[] = {"a", "b", "d"};
     iwn_json_t name;
@@ -172,7 +172,7 @@ TEST(test_json_names_of_the_root_are_found_in_their_order) {
     TEST_ASSERT_EQUAL_UINT16(0, work.names);
 }
 
-TEST(test_json_kinds_are_told_apart) {
+TEST(test_json_kinds_differ) {
     const char *text = "{\"t\":true,\"f\":false,\"n\":null,\"i\":-0,\"r\":0.0,\"e\":1E5,\"s\":\"\",\"o\":{},\"l\":[]}";
     TEST_ASSERT_TRUE(check(text, strlen(text)));
     TEST_ASSERT_EQUAL_INT(IWN_JSON_TRUE, iwn_json_kind(member("t")));
@@ -186,7 +186,7 @@ TEST(test_json_kinds_are_told_apart) {
     TEST_ASSERT_EQUAL_INT(IWN_JSON_LIST, iwn_json_kind(member("l")));
 }
 
-TEST(test_json_integers_come_as_sent_to_the_last_one) {
+TEST(test_json_integers_at_the_limits_are_read_exactly) {
     const char *text = "{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":-0,\"d\":42}";
     TEST_ASSERT_TRUE(check(text, strlen(text)));
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, iwn_json_integer(member("a")));
@@ -195,7 +195,7 @@ TEST(test_json_integers_come_as_sent_to_the_last_one) {
     TEST_ASSERT_EQUAL_INT64(42, iwn_json_integer(member("d")));
 }
 
-TEST(test_json_text_is_given_as_it_means_if_it_fits) {
+TEST(test_json_text_that_fits_is_unescaped) {
     const char *text =
         "{\"a\":\"\\\"\\\\\\/\\b\\f\\n\\r\\t\\u0041\\u00e9\\u20AC\\ud83d\\ude00\xC3\xA9\",\"b\":\"1234567\",\"c\":7}";
     char out[32];

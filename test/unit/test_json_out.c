@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The writer of replies and events: the same bytes as a writer that goes byte by byte, and never one too many.
+// The writer of replies and events writes the same bytes as a byte-by-byte writer, and never exceeds its buffer.
 #include "iwheel_northbound/json_out.h"
 #include "unit.h"
 
@@ -20,7 +20,7 @@ static void expect(const char *text) {
     TEST_ASSERT_EQUAL_STRING_LEN(text, line, json.length);
 }
 
-TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8) {
+TEST(test_json_control_characters_and_invalid_utf8_are_escaped) {
     iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
@@ -30,7 +30,7 @@ TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8) {
         "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
 }
 
-TEST(test_json_escapes_and_separates) {
+TEST(test_json_members_are_escaped_and_separated) {
     iwn_out_init(&json, line, sizeof line);
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "low", INT64_MIN);
@@ -53,7 +53,7 @@ TEST(test_json_escapes_and_separates) {
         line);
 }
 
-TEST(test_json_that_does_not_fit_is_no_line_at_any_size) {
+TEST(test_json_that_does_not_fit_is_not_written_at_any_size) {
     for (size_t size = 1; size <= 64U; size++) {
         memset(line, 0x5A, sizeof line);
         iwn_out_init(&json, line, size);
@@ -68,7 +68,7 @@ TEST(test_json_that_does_not_fit_is_no_line_at_any_size) {
     }
 }
 
-TEST(test_json_number_is_written_as_printf_writes_it) {
+TEST(test_json_number_is_written_like_printf) {
     int64_t number = 1;
     for (unsigned digits = 1; digits < 19U; digits++) {
         number *= 10;
@@ -88,7 +88,7 @@ TEST(test_json_number_is_written_as_printf_writes_it) {
     expect("9223372036854775807,4294967296,4000000000000000007");
 }
 
-/// As the RFC and text.h say, one byte after the other, for bytes below 0x80.
+/// Escapes bytes below 0x80 one by one, as the RFC and text.h specify.
 static void write_slowly(const char *text, char *out) {
     out += sprintf(out, "\"t\":\"");
     for (; *text != '\0'; text++) {
@@ -103,7 +103,7 @@ static void write_slowly(const char *text, char *out) {
     (void)sprintf(out, "\"");
 }
 
-TEST(test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte) {
+TEST(test_json_ascii_byte_anywhere_equals_the_reference_writer) {
     char text[32];
     char wanted[256];
     for (size_t length = 1; length < 20U; length++) {
@@ -121,7 +121,7 @@ TEST(test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte) {
     }
 }
 
-TEST(test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place) {
+TEST(test_json_lone_byte_beyond_ascii_is_replaced_at_any_place) {
     char text[32];
     for (size_t at = 0; at < 18U; at++) {
         for (int byte = 0x80; byte < 0x100; byte++) {
@@ -136,12 +136,12 @@ TEST(test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place) {
     }
 }
 
-TEST(test_json_text_beyond_ascii_is_kept) {
+TEST(test_json_text_beyond_ascii_is_unchanged) {
     iwn_out_text(&json, "t", "a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9");
     expect("\"t\":\"a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9\"");
 }
 
-TEST(test_json_every_element_fits_to_the_last_byte_and_not_one_less) {
+TEST(test_json_elements_need_exactly_their_length) {
     char whole[512];
     iwn_out_open(&json, NULL, '{');
     iwn_out_int(&json, "int", -1234567);
@@ -174,7 +174,7 @@ TEST(test_json_every_element_fits_to_the_last_byte_and_not_one_less) {
         line, length);
 }
 
-TEST(test_json_frame_has_its_bytes_its_kind_and_its_flags) {
+TEST(test_json_frame_has_its_bytes_kind_and_flags) {
     const iw_can_frame_t frame = {.id = 0x10AU, .dlc = 3, .kind = (uint8_t)IW_CAN_ECHO, .data = {0x00, 0x9F, 0xA0}};
     iwn_out_frame(&frame, 17, &json);
     expect("\"t_us\":17,\"id\":266,\"dlc\":3,\"data\":\"009FA0\",\"kind\":\"echo\",\"flags\":[]");

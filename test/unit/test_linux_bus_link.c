@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The verdict on a link's bit timing.
+// The verdict on the bit timing of a link.
 #include "iwheel_linux/bus_link.h"
 
 #include "iwheel/bit_timing.h"
@@ -15,7 +15,7 @@ static iwl_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
     return iwl_timing_judge(&link, IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE);
 }
 
-TEST(test_timing_bands_around_the_wanted_sample_point) {
+TEST(test_timing_verdict_depends_on_the_sample_point_distance) {
     for (uint16_t permille = 1; permille <= 1000; permille++) {
         const int off = (permille > 625) ? permille - 625 : 625 - permille;
         const iwl_timing_t expected = (off <= 5) ? IWL_TIMING_RIGHT : (off <= 25) ? IWL_TIMING_NEAR : IWL_TIMING_WRONG;
@@ -23,25 +23,25 @@ TEST(test_timing_bands_around_the_wanted_sample_point) {
     }
 }
 
-TEST(test_timing_another_bit_rate_is_wrong_whatever_the_sample_point) {
+TEST(test_timing_other_bit_rate_is_wrong_at_any_sample_point) {
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(999999, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(500000, 0));
 }
 
-TEST(test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts) {
+TEST(test_timing_missing_value_is_unknown_unless_other_is_wrong) {
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(1000000, 0));
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 625));
     TEST_ASSERT_EQUAL(IWL_TIMING_UNKNOWN, judge(0, 0));
     TEST_ASSERT_EQUAL(IWL_TIMING_WRONG, judge(0, 750));
 }
 
-TEST(test_timing_of_a_virtual_link_does_not_exist) {
+TEST(test_timing_of_a_virtual_link_is_not_judged) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .is_virtual = true, .bitrate_hz = 5};
     TEST_ASSERT_EQUAL(IWL_TIMING_VIRTUAL, iwl_timing_judge(&link, 1000000, 625));
 }
 
-TEST(test_same_looks_at_everything_the_interface_tells_and_nothing_else) {
+TEST(test_link_is_same_compares_interface_values_only) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .bitrate_hz = 1, .queue_length = 2};
     iwl_bus_link_t other = link;
     other.purge = IWL_LINK_PURGE_DONE;
@@ -64,8 +64,8 @@ TEST(test_same_looks_at_everything_the_interface_tells_and_nothing_else) {
 #undef DIFFERS
 }
 
-/// The loopback has a carrier, unless it is down: then the kernel gives no answer.
-TEST(test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing) {
+/// The loopback interface has a carrier unless it is down; then the kernel returns no value.
+TEST(test_link_carrier_is_that_of_the_kernel_or_unknown) {
     char told[8] = "";
     FILE *file = fopen("/sys/class/net/lo/carrier", "r");
     TEST_ASSERT_NOT_NULL(file);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The load of the bus, told once a second.
+// The load of the bus, computed once per second.
 #include "bus.h"
 
 #include "unit.h"
@@ -15,7 +15,7 @@ void setUp(void) {
     permille = 77U;
 }
 
-TEST(test_load_is_told_when_the_second_is_over_and_not_before) {
+TEST(test_load_is_reported_at_the_end_of_each_second) {
     load.bits = 250000U;
     TEST_ASSERT_FALSE(iwl_bus_load_take(&load, START_US + SECOND - 1U, 1000000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(77U, permille);
@@ -23,7 +23,7 @@ TEST(test_load_is_told_when_the_second_is_over_and_not_before) {
     TEST_ASSERT_EQUAL_UINT32(250U, permille);
 }
 
-TEST(test_load_every_second_begins_anew) {
+TEST(test_load_of_each_second_starts_at_zero) {
     load.bits = 250000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + SECOND, 1000000U, &permille));
     TEST_ASSERT_FALSE(iwl_bus_load_take(&load, START_US + SECOND + 1U, 1000000U, &permille));
@@ -31,13 +31,13 @@ TEST(test_load_every_second_begins_anew) {
     TEST_ASSERT_EQUAL_UINT32(0U, permille);
 }
 
-TEST(test_load_of_a_look_that_comes_late_is_of_all_the_time) {
+TEST(test_load_of_a_late_call_covers_the_whole_time) {
     load.bits = 1000000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + 4U * SECOND, 1000000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(250U, permille);
 }
 
-TEST(test_load_is_of_the_bit_rate_and_of_the_wheels_if_none_is_known) {
+TEST(test_load_without_a_bit_rate_uses_that_of_the_wheels) {
     load.bits = 250000U;
     TEST_ASSERT_TRUE(iwl_bus_load_take(&load, START_US + SECOND, 500000U, &permille));
     TEST_ASSERT_EQUAL_UINT32(500U, permille);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which frames the port asks the kernel for, and what it makes of them.
+// The filters that the port sets in the kernel, and its translation of received frames.
 #include "socketcan_socket.h"
 
 #include "iwheel/codec.h"
@@ -19,7 +19,8 @@ void setUp(void) {
     iwl_socketcan_filters(IWL_SOCKETCAN_OTHERS, others);
 }
 
-/// The kernel's rule (can/raw.h, af_can.c): one filter is enough; an inverted one passes what it does not match.
+/// Rule of the kernel (can/raw.h, af_can.c): one matching filter is enough; an inverted filter passes each frame that
+/// does not match it.
 static bool passes(const struct can_filter *filter, canid_t can_id) {
     const bool inverted = (filter->can_id & CAN_INV_FILTER) != 0U;
     const bool equal = (can_id & filter->can_mask) == (filter->can_id & ~CAN_INV_FILTER & filter->can_mask);
@@ -35,7 +36,7 @@ static bool is_ours(canid_t can_id) {
 }
 
 static bool is_others(canid_t can_id) {
-    bool all = true; // Joined.
+    bool all = true; // Joined filters: all must match.
     for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         all = all && passes(&others[i], can_id);
     }
@@ -59,7 +60,7 @@ TEST(test_filters_every_standard_id_goes_to_exactly_one_socket) {
     }
 }
 
-TEST(test_filters_an_extended_frame_counts_by_its_whole_number) {
+TEST(test_filters_extended_frame_is_matched_by_its_whole_id) {
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         TEST_ASSERT_TRUE(is_ours(ids[i] | CAN_EFF_FLAG));
         TEST_ASSERT_FALSE(is_others(ids[i] | CAN_EFF_FLAG));
@@ -68,7 +69,7 @@ TEST(test_filters_an_extended_frame_counts_by_its_whole_number) {
     }
 }
 
-TEST(test_filters_do_not_ask_for_error_frames) {
+TEST(test_filters_do_not_request_error_frames) {
     for (size_t i = 0; i < IWL_SOCKETCAN_IDS; i++) {
         TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
         TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
@@ -81,7 +82,7 @@ static iw_can_frame_t translate(canid_t can_id, uint8_t length, int flags) {
     return iwl_socketcan_translate(&raw, flags);
 }
 
-TEST(test_translate_keeps_format_number_and_data) {
+TEST(test_translate_preserves_format_id_and_data) {
     const iw_can_frame_t plain = translate(256, 4, 0);
     TEST_ASSERT_EQUAL_HEX32(256, plain.id);
     TEST_ASSERT_EQUAL(4, plain.dlc);
@@ -93,13 +94,13 @@ TEST(test_translate_keeps_format_number_and_data) {
                             translate(256U | CAN_EFF_FLAG | CAN_RTR_FLAG, 0, 0).id);
 }
 
-TEST(test_translate_only_our_own_sockets_frame_is_an_echo) {
+TEST(test_translate_only_a_frame_of_our_socket_is_an_echo) {
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, translate(266, 5, MSG_CONFIRM | MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, MSG_DONTROUTE).kind);
     TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, 0).kind);
 }
 
-TEST(test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry) {
+TEST(test_translate_frame_longer_than_classic_is_no_telemetry) {
     iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t frame = translate(256, 64, MSG_TRUNC);
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_FD, frame.id);
@@ -116,7 +117,7 @@ static iwl_can_error_t error_of(canid_t classes, uint8_t controller) {
     return iwl_can_error_of(&raw);
 }
 
-TEST(test_error_frames_tell_the_state) {
+TEST(test_error_frames_map_to_states) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF, error_of(CAN_ERR_BUSOFF, 0));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED, 0));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
@@ -127,13 +128,13 @@ TEST(test_error_frames_tell_the_state) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
 }
 
-TEST(test_error_frames_the_gravest_news_comes_first) {
+TEST(test_error_frames_with_several_flags_report_the_worst) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_BUS_OFF,
                       error_of(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
 }
 
-TEST(test_error_frames_that_are_about_something_else_change_no_state) {
+TEST(test_error_frames_of_other_kinds_change_no_state) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_LOSTARB, 0xFF));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_PROT | CAN_ERR_ACK | CAN_ERR_BUSERROR, 0xFF));
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, 0));
@@ -141,11 +142,11 @@ TEST(test_error_frames_that_are_about_something_else_change_no_state) {
     TEST_ASSERT_EQUAL(IWL_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW));
 }
 
-TEST(test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration) {
+TEST(test_error_mask_has_the_known_classes_only) {
     TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iwl_can_error_mask());
 }
 
-TEST(test_bits_of_frames) {
+TEST(test_frame_bits_match_format_and_length) {
     struct can_frame raw = {.can_id = 266, .len = 5};
     TEST_ASSERT_EQUAL_UINT32(47 + 40, iwl_socketcan_bits(&raw));
     raw.can_id = 266U | CAN_RTR_FLAG;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The socket of the bus against what the kernel promises: what is asked for, what an error means, what is sent. The calls are this file's own.
+// The socket of the bus against a fake kernel: options, errors, sent frames. This file replaces the system calls.
 #include "socketcan_socket.h"
 
 #include "unit.h"
@@ -18,14 +18,14 @@ static struct {
     int value;
 } asked[ASKED_MAX];
 static unsigned count;
-static int refused;   // The option that the kernel does not take; 0: it takes all.
-static int come;      // What recvmmsg says: frames, or minus an errno.
-static int taken;     // Frames that sendmmsg takes at most; negative: minus an errno.
-static size_t length; // Of each of them, it says.
+static int refused;   // The option that the kernel refuses; 0: none.
+static int come;      // Result of recvmmsg: number of frames, or a negative errno.
+static int taken;     // Most frames that sendmmsg accepts; negative: a negative errno.
+static size_t length; // Length that sendmmsg reports for each frame.
 static struct can_frame on_bus[IW_SIDES];
-static int calls;    // Of sendmmsg.
-static bool unknown; // CAN, to this kernel.
-static int before;   // The errno that a call of before has left.
+static int calls;    // Calls of sendmmsg.
+static bool unknown; // The kernel does not support CAN.
+static int before;   // The errno that an earlier call has left.
 static iwl_socketcan_socket_t bus;
 
 int socket(int domain, int type, int protocol) {
@@ -119,7 +119,7 @@ static bool was_asked(int level, int name, int value) {
     return false;
 }
 
-TEST(test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost) {
+TEST(test_can_socket_of_ours_requests_errors_echoes_and_losses) {
     bus.lost = 7;
     bus.count = 5;
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
@@ -132,13 +132,13 @@ TEST(test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost) {
     TEST_ASSERT_EQUAL_UINT32(0, bus.count);
 }
 
-TEST(test_can_socket_of_others_joins_its_filters_and_wants_no_errors) {
+TEST(test_can_socket_of_others_joins_filters_without_echoes) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
     TEST_ASSERT_TRUE(was_asked(SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1));
     TEST_ASSERT_FALSE(was_asked(SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1));
 }
 
-TEST(test_can_socket_without_what_it_needs_is_not_opened) {
+TEST(test_can_socket_without_a_required_option_is_not_opened) {
     static const int needed[] = {CAN_RAW_FILTER, CAN_RAW_ERR_FILTER, CAN_RAW_RECV_OWN_MSGS, SO_RXQ_OVFL};
     for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
         count = 0;
@@ -151,7 +151,7 @@ TEST(test_can_socket_without_what_it_needs_is_not_opened) {
     TEST_ASSERT_EQUAL_INT(ENOPROTOOPT, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OTHERS));
 }
 
-TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went) {
+TEST(test_can_socket_fill_separates_empty_from_interface_down) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     before = ENODEV;
     come = (int)IWL_SOCKETCAN_BATCH;
@@ -167,7 +167,7 @@ TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went) {
     TEST_ASSERT_EQUAL_INT(ENETDOWN, iwl_socketcan_socket_fill(&bus));
 }
 
-TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained) {
+TEST(test_can_socket_drop_empties_it_but_does_not_set_drained) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     come = 3;
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_drop(&bus));
@@ -178,7 +178,7 @@ TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_draine
     TEST_ASSERT_EQUAL_INT(ENODEV, iwl_socketcan_socket_drop(&bus));
 }
 
-TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone) {
+TEST(test_can_socket_send_separates_busy_from_bus_lost) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, 1));
     static const int for_now[] = {EAGAIN, ENOBUFS, EINTR};
@@ -189,15 +189,15 @@ TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone) {
     }
     taken = -ENETDOWN;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
-    taken = 0; // No frame. What a call of before left says nothing.
+    taken = 0; // No frame. The errno of an earlier call has no meaning.
     before = EAGAIN;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
-    taken = 1; // Less than a frame: no frame.
+    taken = 1; // Less than a whole frame counts as no frame.
     length = sizeof(struct can_frame) - 1U;
     TEST_ASSERT_EQUAL_INT(-1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
 }
 
-TEST(test_can_socket_pair_leaves_in_one_call_left_first) {
+TEST(test_can_socket_pair_is_sent_in_one_call_left_first) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
     TEST_ASSERT_EQUAL_INT(1, calls);
@@ -208,21 +208,21 @@ TEST(test_can_socket_pair_leaves_in_one_call_left_first) {
     }
 }
 
-TEST(test_can_socket_of_a_pair_that_leaves_in_half_reports_one) {
+TEST(test_can_socket_half_sent_pair_reports_one_frame) {
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     taken = 1;
     before = ENOBUFS;
     TEST_ASSERT_EQUAL_INT(1, iwl_socketcan_socket_send(&bus, pair, IW_SIDES));
-    TEST_ASSERT_EQUAL_INT(1, calls); // The second frame is not tried again.
+    TEST_ASSERT_EQUAL_INT(1, calls); // The port does not retry the second frame.
 }
 
-TEST(test_can_socket_call_never_brings_more_frames_than_wheels) {
+TEST(test_can_socket_call_sends_no_more_frames_than_wheels) {
     iw_can_frame_t many[IW_SIDES + 1U] = {{.id = 1}, {.id = 2}, {.id = 3}};
     TEST_ASSERT_EQUAL_INT(0, iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS));
     TEST_ASSERT_EQUAL_INT(2, iwl_socketcan_socket_send(&bus, many, IW_SIDES + 1U));
 }
 
-TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such) {
+TEST(test_can_socket_unknown_to_the_kernel_reports_eafnosupport) {
     unknown = true;
     memset(&bus, 0xA5, sizeof bus);
     const int error = iwl_socketcan_socket_open(&bus, 3, IWL_SOCKETCAN_OURS);
@@ -232,7 +232,7 @@ TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such) {
     TEST_ASSERT_EQUAL_UINT(0, count);
 }
 
-TEST(test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one) {
+TEST(test_can_socket_is_a_hub_only_when_used_as_one) {
     iwl_socketcan_socket_use(&bus, 77, true);
     TEST_ASSERT_EQUAL_INT(77, bus.fd);
     TEST_ASSERT_TRUE(bus.is_hub);

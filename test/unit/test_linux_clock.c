@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Which of the kernel's clocks is which: the wall's may be set, and the one that counts the machine's sleep is not the loop's.
+// Roles of the kernel clocks: the wall clock may be set, and the clock that counts suspend time is not that of the
+// loop.
 #include "iwheel_linux/clock.h"
 
 #include "unit.h"
 
 #include <time.h>
 
-/// What the kernel's clocks tell, and by how much each call takes longer than none.
+/// Values of the kernel clocks, and the time that passes in each call.
 static struct timespec monotonic;
 static struct timespec boot;
 static struct timespec wall;
@@ -35,7 +36,7 @@ TEST(test_clock_of_the_loop_is_monotonic_in_microseconds) {
     TEST_ASSERT_EQUAL_UINT64(5000123456U, iwl_clock_read(&suspended_us));
 }
 
-TEST(test_clock_tells_sleep_that_the_loop_does_not_count) {
+TEST(test_clock_reports_suspend_time_that_the_loop_does_not_count) {
     iw_time_us_t suspended_us = 1;
     (void)iwl_clock_read(&suspended_us);
     TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
@@ -47,7 +48,7 @@ TEST(test_clock_tells_sleep_that_the_loop_does_not_count) {
     TEST_ASSERT_EQUAL_UINT64(2000000, iwl_clock_suspended_us());
 }
 
-TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep) {
+TEST(test_clock_time_between_two_readings_is_no_suspend_time) {
     iw_time_us_t suspended_us = 1;
     passes_ns = 40000000;
     (void)iwl_clock_read(&suspended_us);
@@ -57,7 +58,7 @@ TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep) {
     TEST_ASSERT_TRUE(suspended_us <= 2000000U);
 }
 
-TEST(test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known) {
+TEST(test_clock_awake_adds_only_suspend_time_not_yet_counted) {
     TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(0));
     boot.tv_sec += 2;
     wall.tv_sec += 3600;
@@ -65,6 +66,6 @@ TEST(test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_kno
     TEST_ASSERT_EQUAL_UINT64(iwl_clock_now_us(), iwl_clock_awake_us(2000000U));
 }
 
-TEST(test_clock_of_the_wall_is_for_people_only) {
+TEST(test_clock_wall_time_is_in_microseconds) {
     TEST_ASSERT_EQUAL_INT64(1700000000987654, iwl_clock_wall_us());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How a GPIO line is named, and when its button counts as released.
+// The address of a GPIO line, and when its button counts as released.
 #include "gpio.h"
 
 #include "unit.h"
@@ -21,7 +21,7 @@ void setUp(void) {
     now_us = START_US;
 }
 
-TEST(test_address_by_chip_and_offset) {
+TEST(test_address_by_chip_and_offset_is_parsed) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("gpiochip0:4", &address));
     TEST_ASSERT_TRUE(address.by_offset);
     TEST_ASSERT_EQUAL_STRING("gpiochip0", address.name);
@@ -31,7 +31,7 @@ TEST(test_address_by_chip_and_offset) {
     TEST_ASSERT_EQUAL_UINT(65535, address.offset);
 }
 
-TEST(test_address_by_name) {
+TEST(test_address_by_name_is_parsed) {
     static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, iwl_gpio_address_parse(names[i], &address), names[i]);
@@ -40,7 +40,7 @@ TEST(test_address_by_name) {
     }
 }
 
-TEST(test_address_that_is_none_is_refused_and_changes_nothing) {
+TEST(test_address_invalid_is_refused_and_changes_nothing) {
     static const char *const wrong[] = {"",
                                         "gpiochip:4",
                                         "gpiochip0:",
@@ -60,7 +60,7 @@ TEST(test_address_that_is_none_is_refused_and_changes_nothing) {
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, &address, sizeof address);
 }
 
-TEST(test_address_the_longest_name_fits) {
+TEST(test_address_with_the_longest_name_fits) {
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
     TEST_ASSERT_EQUAL_size_t(31, strlen(address.name));
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwl_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
@@ -75,13 +75,13 @@ static bool pressed(void) {
     return iwl_gpio_release_take_pressed(&release, now_us);
 }
 
-TEST(test_release_a_line_that_is_inactive_from_the_start_is_released_at_once) {
+TEST(test_release_line_inactive_at_start_is_released) {
     look(0, false, false);
     TEST_ASSERT_FALSE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
-TEST(test_release_a_press_counts_at_once) {
+TEST(test_release_press_counts_immediately) {
     look(0, true, false);
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
@@ -90,7 +90,7 @@ TEST(test_release_a_press_counts_at_once) {
     TEST_ASSERT_TRUE(pressed());
 }
 
-TEST(test_release_counts_when_it_has_lasted) {
+TEST(test_release_counts_after_the_debounce_time) {
     look(0, true, true);
     (void)pressed();
     look(1000U * MS, false, true);
@@ -103,7 +103,7 @@ TEST(test_release_counts_when_it_has_lasted) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_release_next_us(&release, now_us));
 }
 
-TEST(test_release_is_put_off_by_every_bounce) {
+TEST(test_release_is_delayed_by_every_bounce) {
     look(0, true, true);
     (void)pressed();
     for (unsigned bounce = 0; bounce < 20U; bounce++) {
@@ -118,7 +118,7 @@ TEST(test_release_is_put_off_by_every_bounce) {
     TEST_ASSERT_FALSE(pressed());
 }
 
-TEST(test_release_a_pulse_between_two_looks_is_told) {
+TEST(test_release_pulse_between_two_polls_is_a_press) {
     look(0, false, false);
     (void)pressed();
     look(20U * MS, false, true);
@@ -127,14 +127,14 @@ TEST(test_release_a_pulse_between_two_looks_is_told) {
     TEST_ASSERT_FALSE(pressed());
 }
 
-TEST(test_release_an_edge_is_told_however_late_it_is_asked_for) {
+TEST(test_release_edge_is_reported_once_at_a_late_read) {
     look(0, false, true);
     now_us += 1000U * MS;
     TEST_ASSERT_TRUE(pressed());
     TEST_ASSERT_FALSE(pressed());
 }
 
-TEST(test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked) {
+TEST(test_release_edge_before_a_second_poll_is_reported_once) {
     look(0, false, true);
     look(10U * MS, false, false);
     now_us += 1000U * MS;
@@ -142,7 +142,7 @@ TEST(test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody
     TEST_ASSERT_FALSE(pressed());
 }
 
-TEST(test_release_a_level_seen_and_gone_again_is_told_without_any_edge) {
+TEST(test_release_short_active_level_without_edge_is_reported) {
     look(0, true, false);
     look(10U * MS, false, false);
     now_us += 1000U * MS;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The e-stop on a GPIO line that the test plays: presses, pulses, a chip that goes and comes, a line that somebody else has.
+// The e-stop on a fake GPIO line: presses, pulses, a chip that disappears and returns, a line that another process
+// holds.
 #include "gpio.h"
 
 #include "iwheel_linux/backend.h"
@@ -17,7 +18,7 @@
 
 static struct {
     int level; ///< -1: cannot be read.
-    int edges; ///< -1: gone.
+    int edges; ///< -1: the chip is absent.
     int open_error;
     int opened;
     int fd;
@@ -69,7 +70,7 @@ static void poll_after(unsigned after_ms) {
     iwl_gpio_estop_ops->poll(&store, now_us);
 }
 
-/// With a wait before that has told of edges if there are any.
+/// Reads the e-stop after a wait that has reported edges, if there are any.
 static int pressed(void) {
     return iwl_gpio_estop_ops->pressed(&store, wire.edges == 0);
 }
@@ -108,7 +109,7 @@ TEST(test_estop_line_low_is_pressed_and_high_is_released) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
-TEST(test_estop_line_active_high_is_the_other_way_round) {
+TEST(test_estop_line_active_high_is_pressed_when_high) {
     tearDown();
     begin(true);
     TEST_ASSERT_EQUAL_INT(0, pressed());
@@ -118,14 +119,14 @@ TEST(test_estop_line_active_high_is_the_other_way_round) {
     TEST_ASSERT_EQUAL_INT(1, pressed());
 }
 
-TEST(test_estop_level_is_looked_at_although_the_wait_has_told_nothing) {
+TEST(test_estop_level_is_read_without_a_report_of_the_wait) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.level = 0;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(1, iwl_gpio_estop_ops->pressed(&store, true));
 }
 
-TEST(test_estop_pulse_of_which_only_the_edges_are_left_is_a_press) {
+TEST(test_estop_pulse_with_only_its_edges_left_is_a_press) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
     wire.edges = 2;
     poll_after(1);
@@ -134,7 +135,7 @@ TEST(test_estop_pulse_of_which_only_the_edges_are_left_is_a_press) {
     TEST_ASSERT_EQUAL_INT(0, pressed());
 }
 
-TEST(test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges) {
+TEST(test_estop_chip_lost_is_unreadable_by_level_and_by_edges) {
     wire.level = -1;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
@@ -148,7 +149,7 @@ TEST(test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges) {
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
-TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once) {
+TEST(test_estop_chip_lost_and_back_is_released_again) {
     wire.level = -1;
     poll_after(1);
     TEST_ASSERT_EQUAL_INT(-1, pressed());
@@ -159,7 +160,7 @@ TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_estop_ops->trouble(&store));
 }
 
-TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while) {
+TEST(test_estop_lost_chip_is_retried_every_200_ms) {
     wire.level = -1;
     poll_after(1);
     (void)pressed();
@@ -175,7 +176,7 @@ TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while) {
     TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_estop_ops->trouble(&store));
 }
 
-TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can) {
+TEST(test_estop_line_busy_at_start_is_unreadable_until_it_opens) {
     tearDown();
     wire.open_error = EBUSY;
     begin(false);
@@ -187,7 +188,7 @@ TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can) {
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_gpio_estop_ops->next_us(&store));
 }
 
-TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed) {
+TEST(test_estop_line_with_another_name_counts_as_pressed) {
     tearDown();
     wire.open_error = EREMCHG;
     begin(false);
@@ -197,7 +198,7 @@ TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed) {
     TEST_ASSERT_EQUAL_INT(-1, pressed());
 }
 
-TEST(test_estop_line_has_names_as_long_as_it_can_be_read) {
+TEST(test_estop_line_has_names_while_it_is_readable) {
     const iwl_estop_seen_t *seen = iwl_gpio_estop_ops->seen(&store);
     TEST_ASSERT_NOT_NULL(seen);
     TEST_ASSERT_EQUAL_STRING("label", seen->chip);
@@ -207,7 +208,7 @@ TEST(test_estop_line_has_names_as_long_as_it_can_be_read) {
     TEST_ASSERT_NULL(iwl_gpio_estop_ops->seen(&store));
 }
 
-TEST(test_estop_expects_what_is_configured_and_nothing_for_any) {
+TEST(test_estop_expects_configured_names_and_none_for_any) {
     static const char *const longest = "0123456789012345678901234567890";
     static const struct {
         const char *chip;
@@ -234,7 +235,7 @@ TEST(test_estop_expects_what_is_configured_and_nothing_for_any) {
     begin(false);
 }
 
-TEST(test_estop_that_is_no_line_is_called_nothing) {
+TEST(test_estop_without_a_line_has_no_name) {
     iwl_estop_seen_t seen;
     TEST_ASSERT_EQUAL_INT(ENOTSUP, iwl_estop_see("unix:/tmp/button", &seen));
     TEST_ASSERT_EQUAL_INT(EINVAL, iwl_estop_see("gpiochip:4", &seen));
@@ -255,7 +256,7 @@ TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now) {
     TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
 }
 
-TEST(test_estop_without_a_descriptor_for_waiting_is_refused) {
+TEST(test_estop_without_a_free_descriptor_is_refused) {
     struct rlimit before;
     tearDown();
     TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));

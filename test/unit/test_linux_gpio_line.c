@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A GPIO line through libgpiod, the same for both its generations: how it is asked for, read, lost and given back.
+// A GPIO line through libgpiod, the same for both its generations: request, reading, loss and release.
 #include "../support/fake_gpio.h"
 #include "gpio.h"
 
@@ -54,7 +54,7 @@ void tearDown(void) {
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
 }
 
-TEST(test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait) {
+TEST(test_line_is_a_pulled_up_input_with_both_edges_nonblocking) {
     TEST_ASSERT_EQUAL_INT(1, fake_gpio.requested);
     TEST_ASSERT_TRUE(fake_gpio.is_input);
     TEST_ASSERT_TRUE(fake_gpio.pulled_up);
@@ -73,7 +73,7 @@ TEST(test_line_by_chip_and_offset_is_that_line) {
     TEST_ASSERT_EQUAL_INT(1, fake_gpio.open);
 }
 
-TEST(test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read) {
+TEST(test_line_level_is_that_of_the_wire_or_an_error) {
     fake_gpio.level = 1;
     TEST_ASSERT_EQUAL_INT(1, iwl_gpio_line_level(&line));
     fake_gpio.level = 0;
@@ -82,7 +82,7 @@ TEST(test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read) {
     TEST_ASSERT_TRUE(iwl_gpio_line_level(&line) < 0);
 }
 
-TEST(test_edges_are_all_taken_and_counted) {
+TEST(test_line_edges_are_all_read_and_counted) {
     static const int numbers[] = {0, 1, 2, 15, 16, 17, 33};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         fake_gpio.edges = numbers[i];
@@ -91,17 +91,17 @@ TEST(test_edges_are_all_taken_and_counted) {
     }
 }
 
-TEST(test_edges_without_end_take_a_bounded_time) {
+TEST(test_line_endless_edges_need_bounded_reads) {
     fake_gpio.edges = 1000000;
     TEST_ASSERT_GREATER_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, iwl_gpio_line_take_edges(&line));
     TEST_ASSERT_LESS_OR_EQUAL_INT(IWL_GPIO_EDGES_MAX, fake_gpio.reads);
 }
 
-TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none) {
+TEST(test_line_edges_of_a_lost_line_are_an_error_eintr_is_none) {
     fake_gpio.edges_error = ENODEV;
     TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0);
     fake_gpio.edges = 3;
-    TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0); // Whatever there was before.
+    TEST_ASSERT_TRUE(iwl_gpio_line_take_edges(&line) < 0); // Edges that were counted before do not matter.
     fake_gpio.edges_error = EINTR;
     TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_take_edges(&line));
     fake_gpio.edges = 5;
@@ -109,7 +109,7 @@ TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none)
     TEST_ASSERT_EQUAL_INT(5, iwl_gpio_line_take_edges(&line));
 }
 
-TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open) {
+TEST(test_line_that_cannot_open_returns_errno_and_leaks_nothing) {
     iwl_gpio_line_close(&line);
     fake_gpio.busy_error = EBUSY;
     TEST_ASSERT_EQUAL_INT(EBUSY, iwl_gpio_line_open(&line, &by_name));
@@ -142,7 +142,7 @@ TEST(test_line_name_that_exists_twice_is_refused) {
     }
 }
 
-TEST(test_line_that_is_called_otherwise_than_expected_is_not_taken) {
+TEST(test_line_with_unexpected_names_is_refused) {
     static const struct {
         iwl_estop_seen_t expected;
         int error;
@@ -167,11 +167,11 @@ TEST(test_line_that_is_called_otherwise_than_expected_is_not_taken) {
     }
 }
 
-TEST(test_line_whose_chip_was_renumbered_is_not_taken) {
+TEST(test_line_of_a_renumbered_chip_is_refused) {
     iwl_gpio_address_t address = by_offset;
     address.expected = (iwl_estop_seen_t){.chip = FAKE_GPIO_LABEL};
     iwl_gpio_line_close(&line);
-    fake_gpio.label = "raspberrypi-exp-gpio"; // Has the number of the other one now.
+    fake_gpio.label = "raspberrypi-exp-gpio"; // Another chip has the number now.
     TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_line_open(&line, &address));
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
     address.expected = (iwl_estop_seen_t){.line = FAKE_GPIO_NAME};
@@ -179,12 +179,12 @@ TEST(test_line_whose_chip_was_renumbered_is_not_taken) {
     TEST_ASSERT_EQUAL_INT(EREMCHG, iwl_gpio_line_open(&line, &address));
 }
 
-TEST(test_line_is_seen_with_label_and_name_and_not_taken) {
+TEST(test_line_lookup_returns_names_without_a_request) {
     const iwl_gpio_address_t *const addresses[] = {&by_name, &by_offset};
     for (size_t i = 0; i < 2U; i++) {
         iwl_estop_seen_t seen = {.chip = "x", .line = "y"};
         iwl_gpio_line_close(&line);
-        fake_gpio.busy_error = EBUSY; // Somebody else has it.
+        fake_gpio.busy_error = EBUSY; // Another process holds the line.
         TEST_ASSERT_EQUAL_INT(0, iwl_gpio_line_see(addresses[i], &seen));
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_LABEL, seen.chip);
         TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_NAME, seen.line);
@@ -205,7 +205,7 @@ TEST(test_line_is_seen_with_label_and_name_and_not_taken) {
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
 }
 
-TEST(test_line_that_is_closed_is_given_back) {
+TEST(test_line_that_is_closed_can_be_opened_again) {
     iwl_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);

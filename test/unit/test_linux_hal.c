@@ -70,38 +70,38 @@ static int look(void) {
     return iwl_hal_pressed(&hal);
 }
 
-TEST(test_estop_is_read_whole_by_whoever_does_not_wait) {
+TEST(test_hal_estop_without_a_wait_is_read_fully) {
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-TEST(test_estop_that_was_not_told_of_has_no_edges) {
+TEST(test_hal_estop_not_reported_by_the_wait_has_no_edges) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     TEST_ASSERT_TRUE(was_quiet);
 }
 
-TEST(test_estop_that_was_told_of_is_read_whole) {
+TEST(test_hal_estop_reported_by_the_wait_is_read_fully) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     iwl_hal_waited(&hal, (iwl_reported_t){false, true});
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-TEST(test_wait_counts_for_one_look) {
+TEST(test_hal_wait_counts_for_one_read) {
     iwl_hal_waited(&hal, (iwl_reported_t){false, false});
     (void)look();
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
-TEST(test_last_answer_is_kept) {
+TEST(test_hal_last_result_is_stored) {
     answer = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
     TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
 }
 
-TEST(test_next_time_is_the_sooner_of_bus_and_estop) {
+TEST(test_hal_next_time_is_the_earlier_of_bus_and_estop) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 200;
     estop_due_us = 100;
@@ -121,7 +121,7 @@ static void set_up_two(void) {
 
 int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen);
 
-/// "A" and "a" are one line; "B" is another of its chip, "C" one of another chip; nobody has "D".
+/// "A" and "a" are one line; "B" is another line of its chip; "C" is a line of another chip; "D" does not exist.
 int __wrap_iwl_estop_see(const char *name, iwl_estop_seen_t *out_seen) {
     if (name[0] == 'D') {
         return ENOENT;
@@ -145,7 +145,7 @@ static int open_with(const char *first, const char *second) {
     return error;
 }
 
-TEST(test_one_line_under_two_names_is_no_second_contact) {
+TEST(test_hal_one_line_under_two_names_is_no_second_contact) {
     if (iwl_gpio_estop_ops == NULL) {
         TEST_IGNORE_MESSAGE("without libgpiod");
     }
@@ -158,7 +158,7 @@ TEST(test_one_line_under_two_names_is_no_second_contact) {
     TEST_ASSERT_EQUAL_INT(0, open_with("D", "A"));
 }
 
-TEST(test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first) {
+TEST(test_hal_second_contact_with_too_long_names_is_refused) {
     static const char too_long[] = "01234567890123456789012345678901";
     static iwl_hal_t other;
     const char *cause = NULL;
@@ -173,7 +173,7 @@ TEST(test_second_contact_is_expected_of_a_chip_and_a_name_like_the_first) {
     TEST_ASSERT_EQUAL_STRING("B", cause);
 }
 
-TEST(test_second_contact_is_read_whatever_the_first_says) {
+TEST(test_hal_second_contact_is_read_at_any_value_of_the_first) {
     set_up_two();
     answer = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
@@ -190,7 +190,7 @@ TEST(test_second_contact_is_read_whatever_the_first_says) {
     TEST_ASSERT_EQUAL_INT(-1, look());
 }
 
-TEST(test_contacts_are_judged_at_the_time_of_the_round) {
+TEST(test_hal_contacts_are_judged_at_the_time_of_the_poll) {
     set_up_two();
     answer2 = 1;
     TEST_ASSERT_EQUAL_INT(1, look());
@@ -199,7 +199,7 @@ TEST(test_contacts_are_judged_at_the_time_of_the_round) {
     TEST_ASSERT_EQUAL_INT(IW_ESTOP_DISAGREES, hal.estop_last);
 }
 
-TEST(test_each_contact_is_watched_tended_and_told_of) {
+TEST(test_hal_each_contact_is_waited_for_polled_and_reported) {
     TEST_ASSERT_EQUAL_INT(10, iwl_hal_estop_fd(&hal));
     TEST_ASSERT_EQUAL_INT(-1, iwl_hal_estop2_fd(&hal));
     TEST_ASSERT_EQUAL_INT(1, iwl_hal_estop_trouble(&hal, 0));
@@ -216,7 +216,7 @@ TEST(test_each_contact_is_watched_tended_and_told_of) {
     TEST_ASSERT_EQUAL_INT(2, iwl_hal_estop_trouble(&hal, 1));
 }
 
-TEST(test_each_contact_is_closed) {
+TEST(test_hal_each_contact_is_closed) {
     closed = 0;
     iwl_hal_close(&hal);
     TEST_ASSERT_EQUAL_UINT(1, closed);
@@ -225,7 +225,7 @@ TEST(test_each_contact_is_closed) {
     TEST_ASSERT_EQUAL_UINT(12, closed);
 }
 
-TEST(test_next_time_is_the_soonest_of_both_contacts_and_their_difference) {
+TEST(test_hal_next_time_is_the_earliest_of_bus_and_both_contacts) {
     iwl_bus_t *bus = (iwl_bus_t *)(void *)&hal.bus;
     bus->look_us = 5000000;
     estop_due_us = 4000000;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The Linux port against a hub and a button played by the test: frames, echoes, losses, edges. Time is an argument; nothing sleeps.
+// The Linux port against a fake hub and a fake button: frames, echoes, losses, edges. Time is an argument; nothing
+// sleeps.
 #include "iwheel_linux/linux_hal.h"
 
 #include "unity.h"
@@ -73,7 +74,8 @@ void setUp(void) {
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(-1, estop());
-    estop_listener = listen_at(estop_name, SOCK_STREAM); // Only now: the port would wait for its first word at start.
+    // Listen only now: otherwise the port would wait for the first byte of the button at start.
+    estop_listener = listen_at(estop_name, SOCK_STREAM);
     iwl_hal_poll(&hal, now_us);
     button = accept(estop_listener, NULL, NULL);
     TEST_ASSERT_TRUE(button >= 0);
@@ -87,7 +89,7 @@ void tearDown(void) {
     (void)close(estop_listener);
 }
 
-static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(void) {
+static void test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
     iw_can_frame_t heard;
@@ -109,7 +111,7 @@ static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(
     TEST_ASSERT_FALSE(wakes(iwl_hal_bus_fd(&hal)));
 }
 
-static void test_local_every_frame_of_several_batches_comes_in_order(void) {
+static void test_local_frames_of_several_batches_arrive_in_order(void) {
     iw_can_frame_t heard;
     unsigned expected = 0;
     for (unsigned i = 0; i < 100; i++) {
@@ -124,7 +126,7 @@ static void test_local_every_frame_of_several_batches_comes_in_order(void) {
     TEST_ASSERT_EQUAL_UINT(100, expected);
 }
 
-static void test_local_formats_are_kept_apart(void) {
+static void test_local_frame_formats_differ(void) {
     iw_can_frame_t heard;
     tell(256U | CAN_RTR_FLAG, 4, 0, 0);
     tell(256U | CAN_EFF_FLAG, 4, 0, 0);
@@ -137,7 +139,7 @@ static void test_local_formats_are_kept_apart(void) {
     TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, heard.id);
 }
 
-static void test_local_messages_of_another_size_are_left_out(void) {
+static void test_local_messages_of_another_size_are_ignored(void) {
     iw_can_frame_t heard;
     char junk[40] = {0};
     TEST_ASSERT_EQUAL_INT(15, (int)send(hub, junk, 15, 0));
@@ -149,21 +151,21 @@ static void test_local_messages_of_another_size_are_left_out(void) {
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
 }
 
-static void test_local_hub_gone_and_back_before_anybody_asked_is_reported_once(void) {
+static void test_local_hub_lost_and_back_between_reads_is_reported_once(void) {
     iw_can_frame_t heard;
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     tell(256, 4, 0, 0);
     (void)close(hub);
-    TEST_ASSERT_EQUAL_INT(1, receive(&heard)); // What came before the end still counts.
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard)); // A frame received before the end still counts.
     TEST_ASSERT_TRUE(receive(&heard) < 0);
-    iwl_hal_poll(&hal, now_us); // Back at once.
+    iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
+static void test_local_half_read_batch_is_dropped_when_the_hub_is_lost(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     iw_can_frame_t heard;
     for (unsigned i = 0; i < 10; i++) {
@@ -172,21 +174,21 @@ static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     (void)close(hub);
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) < 0);
-    iwl_hal_poll(&hal, now_us); // Back at once.
+    iwl_hal_poll(&hal, now_us); // The port reconnects immediately.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
 }
 
-static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off(void) {
+static void test_local_lost_hub_is_down_and_retried_at_the_back_off(void) {
     iw_can_frame_t heard;
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     (void)close(bus_listener);
     (void)close(hub);
     TEST_ASSERT_TRUE(receive(&heard) < 0);
     unsigned attempts = 0;
-    for (unsigned i = 0; i < 1000; i++) { // A second, asked every millisecond.
+    for (unsigned i = 0; i < 1000; i++) { // One second, with a poll every millisecond.
         const iw_time_us_t before_us = iwl_hal_next_us(&hal);
         iwl_hal_poll(&hal, now_us);
         attempts += (iwl_hal_next_us(&hal) != before_us) ? 1U : 0U;
@@ -207,7 +209,7 @@ static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
+static void test_local_error_frames_change_only_the_state(void) {
     iw_can_frame_t heard;
     struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
     passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
@@ -217,7 +219,7 @@ static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
-    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus()); // However short.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus()); // A short bus-off is reported, too.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
@@ -225,7 +227,7 @@ static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
-static void test_local_good_news_of_another_client_are_not_believed_and_bad_news_are_told_once(void) {
+static void test_local_state_frames_of_clients_cannot_end_bus_off(void) {
     static const uint32_t good[] = {CAN_ERR_FLAG | CAN_ERR_RESTARTED, CAN_ERR_FLAG | CAN_ERR_CRTL};
     iw_can_frame_t heard;
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
@@ -241,13 +243,13 @@ static void test_local_good_news_of_another_client_are_not_believed_and_bad_news
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
     }
     tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0,
-         CAN_ERR_CRTL_ACTIVE); // The controller's own: it is no end of bus-off either.
+         CAN_ERR_CRTL_ACTIVE); // The frame of the controller does not end bus-off either.
     tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0, CAN_ERR_CRTL_TX_PASSIVE);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
-static void test_local_restart_tells_of_a_loss_that_was_not_heard(void) {
+static void test_local_restart_reports_a_missed_bus_off(void) {
     iw_can_frame_t heard;
     tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
@@ -255,7 +257,7 @@ static void test_local_restart_tells_of_a_loss_that_was_not_heard(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void) {
+static void test_local_full_hub_refuses_the_frame_and_stays_active(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     unsigned sent = 0;
     int result = 1;
@@ -268,7 +270,7 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_loss(void) {
+static void test_local_purge_reconnects_to_the_hub_and_reports_a_loss(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
     iw_can_frame_t heard;
@@ -277,21 +279,22 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus));
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, iwl_hal_link(&hal)->purge);
     const uint32_t changes = iwl_hal_link(&hal)->changes;
-    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus)); // There is nothing to leave.
+    TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&hal.bus)); // There is no connection to leave.
     TEST_ASSERT_EQUAL_UINT32(changes, iwl_hal_link(&hal)->changes);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
-    TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0)); // The end: the hub drops what it holds.
+    // End of the connection: the hub drops its queued frames.
+    TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0));
     (void)close(hub);
     iwl_hal_poll(&hal, now_us);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
-    TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of before.
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of an earlier frame arrives.
     TEST_ASSERT_TRUE(iwl_bus_send(&hal.bus, &frame, 1) > 0);
 }
 
-static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
+static void test_local_estop_is_unreadable_until_the_first_byte(void) {
     TEST_ASSERT_EQUAL_INT(-1, estop());
     press("0");
     TEST_ASSERT_TRUE(wakes(iwl_hal_estop_fd(&hal)));
@@ -299,7 +302,7 @@ static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
-static void test_estop_pulse_between_two_looks_is_an_edge(void) {
+static void test_local_estop_pulse_between_two_reads_is_an_edge(void) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     press("10");
@@ -309,14 +312,14 @@ static void test_estop_pulse_between_two_looks_is_an_edge(void) {
     TEST_ASSERT_TRUE(estop() > 0);
     TEST_ASSERT_TRUE(estop() > 0);
     press("0");
-    TEST_ASSERT_TRUE(estop() > 0); // The release is an edge too.
+    TEST_ASSERT_TRUE(estop() > 0); // The release is an edge, too.
     TEST_ASSERT_EQUAL_INT(0, estop());
-    press("100"); // Told twice that it is released.
+    press("100"); // The button reports "released" twice.
     TEST_ASSERT_TRUE(estop() > 0);
     TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
-static void test_estop_any_byte_but_zero_is_pressed(void) {
+static void test_local_estop_any_byte_but_zero_is_pressed(void) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     press("?");
@@ -324,7 +327,7 @@ static void test_estop_any_byte_but_zero_is_pressed(void) {
     TEST_ASSERT_TRUE(estop() > 0);
 }
 
-static void test_estop_connection_lost_and_back_released_was_unreadable_once(void) {
+static void test_local_estop_reconnected_is_unreadable_until_first_byte(void) {
     press("0");
     TEST_ASSERT_EQUAL_INT(0, estop());
     (void)close(button);
@@ -338,7 +341,7 @@ static void test_estop_connection_lost_and_back_released_was_unreadable_once(voi
     TEST_ASSERT_EQUAL_INT(0, hal.estop_last);
 }
 
-static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void) {
+static void test_local_names_without_a_backend_leave_no_descriptor_open(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     const int before = dup(0);
@@ -360,7 +363,7 @@ static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
+static void test_local_two_contacts_must_be_of_one_kind(void) {
     static iwl_hal_t other;
     static char second_name[200];
     const char *cause = NULL;
@@ -394,7 +397,7 @@ static void test_hal_opens_two_contacts_of_one_kind_or_none(void) {
     TEST_ASSERT_EQUAL_INT(before, after);
 }
 
-static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
+static void test_local_without_an_estop_is_released(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     TEST_ASSERT_EQUAL_INT(0, iwl_hal_open(&other, bus_name, &(iwl_estop_config_t){.name = "none"}, &cause));
@@ -426,7 +429,7 @@ static void come_back(void) {
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
-static void test_local_hub_that_stays_away_is_tried_less_and_less_often_each_time_it_goes(void) {
+static void test_local_lost_hub_is_retried_with_growing_intervals(void) {
     for (unsigned time = 0; time < 2U; time++) {
         (void)close(bus_listener);
         lose_hub();
@@ -435,7 +438,7 @@ static void test_local_hub_that_stays_away_is_tried_less_and_less_often_each_tim
     }
 }
 
-static void test_local_hub_that_was_never_there_is_tried_as_one_that_went(void) {
+static void test_local_hub_absent_at_start_is_retried_after_20_ms(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     char name[96];
@@ -446,7 +449,7 @@ static void test_local_hub_that_was_never_there_is_tried_as_one_that_went(void) 
     iwl_hal_close(&other);
 }
 
-static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
+static void test_local_bus_off_lasts_until_a_new_hub(void) {
     iw_can_frame_t heard;
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
     TEST_ASSERT_EQUAL_INT(0, receive(&heard));
@@ -461,7 +464,7 @@ static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
-static void test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time(void) {
+static void test_local_without_descriptors_open_fails_and_poll_retries(void) {
     static iwl_hal_t other;
     const char *cause = NULL;
     struct rlimit before;
@@ -481,7 +484,7 @@ static void test_local_without_a_descriptor_it_is_refused_and_later_tried_again_
     TEST_ASSERT_TRUE(hub >= 0);
 }
 
-static void test_local_bus_has_no_timing_and_an_echo_that_proves(void) {
+static void test_local_bus_has_no_timing_and_a_proven_echo(void) {
     const iwl_bus_link_t *link = iwl_hal_link(&hal);
     TEST_ASSERT_EQUAL_INT(IWL_LINK_LOCAL, link->presence);
     TEST_ASSERT_TRUE(link->is_virtual);
@@ -495,30 +498,30 @@ int main(void) {
     (void)snprintf(bus_name, sizeof bus_name, "unix:%s/bus", folder);
     (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
     UNITY_BEGIN();
-    RUN_TEST(test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark);
-    RUN_TEST(test_local_bus_has_no_timing_and_an_echo_that_proves);
-    RUN_TEST(test_local_hub_that_stays_away_is_tried_less_and_less_often_each_time_it_goes);
-    RUN_TEST(test_local_hub_that_was_never_there_is_tried_as_one_that_went);
-    RUN_TEST(test_local_bus_off_lasts_until_the_hub_is_another);
-    RUN_TEST(test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time);
-    RUN_TEST(test_local_every_frame_of_several_batches_comes_in_order);
-    RUN_TEST(test_local_formats_are_kept_apart);
-    RUN_TEST(test_local_messages_of_another_size_are_left_out);
-    RUN_TEST(test_local_hub_gone_and_back_before_anybody_asked_is_reported_once);
-    RUN_TEST(test_local_batch_half_taken_when_the_hub_goes_is_forgotten);
-    RUN_TEST(test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off);
-    RUN_TEST(test_local_error_frames_change_the_state_and_are_no_frames);
-    RUN_TEST(test_local_good_news_of_another_client_are_not_believed_and_bad_news_are_told_once);
-    RUN_TEST(test_local_restart_tells_of_a_loss_that_was_not_heard);
-    RUN_TEST(test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_loss);
-    RUN_TEST(test_local_full_hub_means_later_and_nothing_is_lost_or_blocked);
-    RUN_TEST(test_estop_is_unreadable_until_the_button_has_spoken);
-    RUN_TEST(test_estop_pulse_between_two_looks_is_an_edge);
-    RUN_TEST(test_estop_any_byte_but_zero_is_pressed);
-    RUN_TEST(test_estop_connection_lost_and_back_released_was_unreadable_once);
-    RUN_TEST(test_hal_refuses_names_without_a_backend_and_keeps_nothing_open);
-    RUN_TEST(test_hal_opens_two_contacts_of_one_kind_or_none);
-    RUN_TEST(test_hal_without_an_estop_is_released_and_watches_nothing);
+    RUN_TEST(test_local_frame_is_sent_unchanged_and_its_echo_has_the_mark);
+    RUN_TEST(test_local_bus_has_no_timing_and_a_proven_echo);
+    RUN_TEST(test_local_lost_hub_is_retried_with_growing_intervals);
+    RUN_TEST(test_local_hub_absent_at_start_is_retried_after_20_ms);
+    RUN_TEST(test_local_bus_off_lasts_until_a_new_hub);
+    RUN_TEST(test_local_without_descriptors_open_fails_and_poll_retries);
+    RUN_TEST(test_local_frames_of_several_batches_arrive_in_order);
+    RUN_TEST(test_local_frame_formats_differ);
+    RUN_TEST(test_local_messages_of_another_size_are_ignored);
+    RUN_TEST(test_local_hub_lost_and_back_between_reads_is_reported_once);
+    RUN_TEST(test_local_half_read_batch_is_dropped_when_the_hub_is_lost);
+    RUN_TEST(test_local_lost_hub_is_down_and_retried_at_the_back_off);
+    RUN_TEST(test_local_error_frames_change_only_the_state);
+    RUN_TEST(test_local_state_frames_of_clients_cannot_end_bus_off);
+    RUN_TEST(test_local_restart_reports_a_missed_bus_off);
+    RUN_TEST(test_local_purge_reconnects_to_the_hub_and_reports_a_loss);
+    RUN_TEST(test_local_full_hub_refuses_the_frame_and_stays_active);
+    RUN_TEST(test_local_estop_is_unreadable_until_the_first_byte);
+    RUN_TEST(test_local_estop_pulse_between_two_reads_is_an_edge);
+    RUN_TEST(test_local_estop_any_byte_but_zero_is_pressed);
+    RUN_TEST(test_local_estop_reconnected_is_unreadable_until_first_byte);
+    RUN_TEST(test_local_names_without_a_backend_leave_no_descriptor_open);
+    RUN_TEST(test_local_two_contacts_must_be_of_one_kind);
+    RUN_TEST(test_local_without_an_estop_is_released);
     const int failed = UNITY_END();
     (void)unlink(bus_name + 5);
     (void)unlink(estop_name + 5);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the kernel's description of an interface is read as, and how it is asked: the kernel's side is this file's own.
+// Requests to the kernel for the description of an interface, and the parser of the replies. This file replaces the
+// kernel.
 #include "netlink.h"
 
 #include "unity.h"
@@ -23,19 +24,19 @@ static struct nlmsghdr *message;
 static struct ifinfomsg *interface;
 static iwl_netlink_reading_t reading;
 
-/// The kernel behind the socket; shared with the process that restarts a link.
+/// The fake kernel behind the socket, in memory that is shared with the process that restarts a link.
 typedef struct {
     unsigned opened;
     unsigned closed;
     unsigned groups;
     pid_t port;
-    unsigned asked;    ///< Requests.
-    unsigned flags[8]; ///< Of each that sets an interface up or down.
-    int answer[8];     ///< To each of them: an errno.
+    unsigned asked;    ///< Number of requests.
+    unsigned flags[8]; ///< Flags of each request that sets an interface up or down.
+    int answer[8];     ///< Reply to each of those requests: an errno.
     unsigned slept;
-    uint32_t sequence; ///< Of the last.
+    uint32_t sequence; ///< Sequence number of the last request.
     bool bind_fails;
-    bool stale; ///< An answer to something else comes first.
+    bool stale; ///< A reply to another request arrives first.
 } kernel_t;
 
 static kernel_t *kernel;
@@ -58,7 +59,7 @@ int mnl_socket_bind(struct mnl_socket *socket, unsigned groups, pid_t port) {
 int mnl_socket_close(struct mnl_socket *socket) {
     TEST_ASSERT_EQUAL_PTR(kernel, socket);
     kernel->closed++;
-    errno = EBADF; // As any call may.
+    errno = EBADF; // Any call may set errno.
     return 0;
 }
 
@@ -138,7 +139,7 @@ static void parse_state(uint32_t state, iw_bus_state_t expected) {
     TEST_ASSERT_EQUAL(expected, reading.state);
 }
 
-static void test_controller_tells_all_it_is_asked_for(void) {
+static void test_netlink_controller_values_are_all_parsed(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625, .restart_ms = 100});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -153,7 +154,7 @@ static void test_controller_tells_all_it_is_asked_for(void) {
     TEST_ASSERT_EQUAL_UINT32(10, reading.link.queue_length);
 }
 
-static void test_controller_states(void) {
+static void test_netlink_controller_states_map_to_bus_states(void) {
     parse_state(CAN_STATE_ERROR_ACTIVE, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_WARNING, IW_BUS_ACTIVE);
     parse_state(CAN_STATE_ERROR_PASSIVE, IW_BUS_PASSIVE);
@@ -163,7 +164,7 @@ static void test_controller_states(void) {
     parse_state(99, IW_BUS_DOWN);
 }
 
-static void test_controller_modes_that_make_the_echo_a_lie_or_sending_impossible(void) {
+static void test_netlink_controller_modes_set_echo_proven_and_mute(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.mode = CAN_CTRLMODE_LOOPBACK});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -179,14 +180,14 @@ static void test_controller_modes_that_make_the_echo_a_lie_or_sending_impossible
     TEST_ASSERT_TRUE(reading.link.is_mute);
 }
 
-static void test_controller_without_the_echo_flag_proves_nothing(void) {
+static void test_netlink_controller_without_echo_flag_is_not_proven(void) {
     begin(IFF_UP);
     add_controller(&(controller_t){.bitrate = 1000000});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_interface_that_is_down_has_no_state_of_its_own(void) {
+static void test_netlink_interface_down_ignores_the_controller_state(void) {
     begin(IFF_ECHO);
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
     TEST_ASSERT_TRUE(iwl_netlink_parse(message, &reading));
@@ -194,7 +195,7 @@ static void test_interface_that_is_down_has_no_state_of_its_own(void) {
     TEST_ASSERT_EQUAL(IW_BUS_DOWN, reading.state);
 }
 
-static void test_virtual_interface_has_no_timing_and_is_active_while_up(void) {
+static void test_netlink_virtual_interface_is_active_without_timing(void) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "vcan");
@@ -206,7 +207,7 @@ static void test_virtual_interface_has_no_timing_and_is_active_while_up(void) {
     TEST_ASSERT_EQUAL_UINT32(0, reading.link.bitrate_hz);
 }
 
-static void test_interface_of_another_type_is_no_can_interface_whatever_it_tells(void) {
+static void test_netlink_interface_of_another_type_is_not_can(void) {
     begin(IFF_UP | IFF_ECHO);
     interface->ifi_type = ARPHRD_ETHER;
     add_controller(&(controller_t){.state = CAN_STATE_ERROR_ACTIVE});
@@ -216,7 +217,7 @@ static void test_interface_of_another_type_is_no_can_interface_whatever_it_tells
     TEST_ASSERT_FALSE(reading.link.echo_proven);
 }
 
-static void test_values_that_are_too_short_are_not_reported(void) {
+static void test_netlink_values_that_are_too_short_are_not_reported(void) {
     begin(IFF_UP | IFF_ECHO);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "can");
@@ -230,7 +231,7 @@ static void test_values_that_are_too_short_are_not_reported(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, reading.state);
 }
 
-static void test_a_kind_that_only_begins_like_a_controller_is_none(void) {
+static void test_netlink_kind_with_the_prefix_can_is_virtual(void) {
     begin(IFF_UP);
     struct nlattr *info = mnl_attr_nest_start(message, IFLA_LINKINFO);
     mnl_attr_put_strz(message, IFLA_INFO_KIND, "canary");
@@ -239,7 +240,7 @@ static void test_a_kind_that_only_begins_like_a_controller_is_none(void) {
     TEST_ASSERT_TRUE(reading.link.is_virtual);
 }
 
-static void test_messages_that_are_none_are_refused(void) {
+static void test_netlink_messages_of_another_kind_are_refused(void) {
     begin(IFF_UP);
     message->nlmsg_type = RTM_NEWADDR;
     TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
@@ -248,7 +249,7 @@ static void test_messages_that_are_none_are_refused(void) {
     TEST_ASSERT_FALSE(iwl_netlink_parse(message, &reading));
 }
 
-static void test_attributes_cut_short_anywhere_are_survived(void) {
+static void test_netlink_attributes_cut_anywhere_do_not_crash(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625});
     const uint32_t whole = message->nlmsg_len;
@@ -259,7 +260,7 @@ static void test_attributes_cut_short_anywhere_are_survived(void) {
     }
 }
 
-static void test_socket_is_bound_to_no_group_and_closed_once(void) {
+static void test_netlink_socket_has_no_group_and_is_closed_once(void) {
     iwl_netlink_t netlink;
     TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     TEST_ASSERT_EQUAL_UINT(0, kernel->groups);
@@ -273,7 +274,7 @@ static void test_socket_is_bound_to_no_group_and_closed_once(void) {
     TEST_ASSERT_EQUAL_UINT(2, kernel->closed);
 }
 
-static void test_request_has_the_answer_that_is_to_it(void) {
+static void test_netlink_request_reads_the_reply_with_its_sequence(void) {
     iwl_netlink_t netlink;
     TEST_ASSERT_EQUAL_INT(0, iwl_netlink_open(&netlink));
     kernel->answer[0] = EPERM;
@@ -285,7 +286,7 @@ static void test_request_has_the_answer_that_is_to_it(void) {
     iwl_netlink_close(&netlink);
 }
 
-/// Waits for the process that restarts a link; what it ended with.
+/// Waits for the process that restarts a link and returns its result.
 static int restarted(void) {
     pid_t process;
     int result = IWL_NETLINK_RESTART_RUNNING;
@@ -296,7 +297,7 @@ static int restarted(void) {
     return result;
 }
 
-static void test_restart_takes_the_link_down_and_up_and_tries_up_again_until_it_is(void) {
+static void test_netlink_restart_retries_up_until_the_link_is_up(void) {
     kernel->answer[1] = kernel->answer[2] = EBUSY;
     TEST_ASSERT_EQUAL_INT(0, restarted());
     TEST_ASSERT_EQUAL_UINT(4, kernel->asked);
@@ -305,7 +306,7 @@ static void test_restart_takes_the_link_down_and_up_and_tries_up_again_until_it_
     TEST_ASSERT_GREATER_THAN_UINT(1, kernel->slept);
 }
 
-static void test_restart_that_is_not_allowed_or_of_a_link_that_is_gone_says_so_at_once(void) {
+static void test_netlink_restart_refused_by_the_kernel_fails_immediately(void) {
     kernel->answer[0] = EPERM;
     TEST_ASSERT_EQUAL_INT(EPERM, restarted());
     TEST_ASSERT_EQUAL_UINT(1, kernel->asked);
@@ -315,7 +316,7 @@ static void test_restart_that_is_not_allowed_or_of_a_link_that_is_gone_says_so_a
     TEST_ASSERT_EQUAL_UINT(2, kernel->asked);
 }
 
-static void test_restart_that_was_killed_has_failed(void) {
+static void test_netlink_restart_process_that_was_killed_has_failed(void) {
     const pid_t process = fork();
     siginfo_t ended;
     if (process == 0) {
@@ -332,21 +333,21 @@ int main(void) {
         return 1;
     }
     UNITY_BEGIN();
-    RUN_TEST(test_controller_tells_all_it_is_asked_for);
-    RUN_TEST(test_controller_states);
-    RUN_TEST(test_controller_modes_that_make_the_echo_a_lie_or_sending_impossible);
-    RUN_TEST(test_controller_without_the_echo_flag_proves_nothing);
-    RUN_TEST(test_interface_that_is_down_has_no_state_of_its_own);
-    RUN_TEST(test_virtual_interface_has_no_timing_and_is_active_while_up);
-    RUN_TEST(test_interface_of_another_type_is_no_can_interface_whatever_it_tells);
-    RUN_TEST(test_values_that_are_too_short_are_not_reported);
-    RUN_TEST(test_a_kind_that_only_begins_like_a_controller_is_none);
-    RUN_TEST(test_messages_that_are_none_are_refused);
-    RUN_TEST(test_attributes_cut_short_anywhere_are_survived);
-    RUN_TEST(test_socket_is_bound_to_no_group_and_closed_once);
-    RUN_TEST(test_request_has_the_answer_that_is_to_it);
-    RUN_TEST(test_restart_takes_the_link_down_and_up_and_tries_up_again_until_it_is);
-    RUN_TEST(test_restart_that_is_not_allowed_or_of_a_link_that_is_gone_says_so_at_once);
-    RUN_TEST(test_restart_that_was_killed_has_failed);
+    RUN_TEST(test_netlink_controller_values_are_all_parsed);
+    RUN_TEST(test_netlink_controller_states_map_to_bus_states);
+    RUN_TEST(test_netlink_controller_modes_set_echo_proven_and_mute);
+    RUN_TEST(test_netlink_controller_without_echo_flag_is_not_proven);
+    RUN_TEST(test_netlink_interface_down_ignores_the_controller_state);
+    RUN_TEST(test_netlink_virtual_interface_is_active_without_timing);
+    RUN_TEST(test_netlink_interface_of_another_type_is_not_can);
+    RUN_TEST(test_netlink_values_that_are_too_short_are_not_reported);
+    RUN_TEST(test_netlink_kind_with_the_prefix_can_is_virtual);
+    RUN_TEST(test_netlink_messages_of_another_kind_are_refused);
+    RUN_TEST(test_netlink_attributes_cut_anywhere_do_not_crash);
+    RUN_TEST(test_netlink_socket_has_no_group_and_is_closed_once);
+    RUN_TEST(test_netlink_request_reads_the_reply_with_its_sequence);
+    RUN_TEST(test_netlink_restart_retries_up_until_the_link_is_up);
+    RUN_TEST(test_netlink_restart_refused_by_the_kernel_fails_immediately);
+    RUN_TEST(test_netlink_restart_process_that_was_killed_has_failed);
     return UNITY_END();
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A process that is killed while it sends pairs leaves no left setpoint alone: this kernel looks at no signal between two frames of one call.
+// If a process is killed while it sends pairs, no left setpoint stays without the right one: the kernel handles no
+// signal between two frames of one call.
 #include "socketcan_socket.h"
 
 #include "unit.h"
@@ -10,7 +11,7 @@
 #include <unistd.h>
 
 #define KILLS 300U
-#define BURST 60U   // Pairs that fit into a socket whatever its size.
+#define BURST 60U   // Number of pairs that fit into a socket of any size.
 #define US    1000L // ns
 
 static const iw_can_frame_t pair[IW_SIDES] = {{.id = IW_ID_LEFT_SETPOINT, .dlc = 5},
@@ -19,7 +20,8 @@ static const iw_can_frame_t pair[IW_SIDES] = {{.id = IW_ID_LEFT_SETPOINT, .dlc =
 void setUp(void);
 void tearDown(void);
 
-/// Until it is killed. After each burst it waits until all of it was received, so that no pair leaves in half for want of room.
+/// Sends until it is killed. After each burst it waits until all frames were received, so that no pair is cut for lack
+/// of buffer space.
 static _Noreturn void send_pairs(int fd) {
     static iwl_socketcan_socket_t bus;
     char go;
@@ -34,7 +36,7 @@ static _Noreturn void send_pairs(int fd) {
     _exit(1);
 }
 
-/// Receives until the other end is gone; how many frames of each side.
+/// Receives until the other end is closed, and counts the frames of each side.
 static void count_frames(int fd, unsigned count[IW_SIDES]) {
     struct can_frame frame;
     for (unsigned frames = 1; recv(fd, &frame, sizeof frame, 0) == (ssize_t)sizeof frame; frames++) {
@@ -54,7 +56,7 @@ static void live_and_die(long life_ns, unsigned count[IW_SIDES]) {
     if (child == 0) {
         send_pairs(end[1]);
     }
-    (void)close(end[1]); // The last one who has it is the child.
+    (void)close(end[1]); // The child has the last copy.
     const pid_t killer = fork();
     if (killer == 0) {
         const struct timespec life = {.tv_nsec = life_ns};
@@ -69,7 +71,7 @@ static void live_and_die(long life_ns, unsigned count[IW_SIDES]) {
     TEST_ASSERT_TRUE_MESSAGE(WIFSIGNALED(status), "it ended by itself");
 }
 
-TEST(test_pair_of_a_killed_process_left_whole_or_not_at_all) {
+TEST(test_pair_of_a_killed_process_is_sent_completely_or_not) {
     unsigned killed = 0;
     for (unsigned i = 0; i < KILLS; i++) {
         unsigned count[IW_SIDES] = {0, 0};

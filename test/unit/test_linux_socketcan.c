@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SocketCAN over an interface played by the test: states, losses, what is old, what is forged. No kernel, no time, no rights.
+// SocketCAN over a fake interface: states, losses, old frames, forged frames. It needs no kernel, no time and no
+// rights.
 #include "fake_interface.h"
 
 #include "iwheel_linux/backend.h"
@@ -16,9 +17,9 @@
 static const iw_can_frame_t setpoint = {.id = 266, .dlc = 5};
 static iwl_backend_store_t store;
 static iw_time_us_t now_us;
-static bool no_can; ///< This kernel.
+static bool no_can; ///< This kernel does not support CAN.
 
-/// `socket` is asked once, for looking at interfaces; this machine need not know CAN.
+/// The port calls `socket` once, to query interfaces. The machine of the test need not support CAN.
 int socket(int domain, int type, int protocol) {
     (void)domain;
     (void)type;
@@ -47,7 +48,7 @@ static int receive(iw_can_frame_t *out_frame) {
     return iwl_bus_receive(&store, out_frame);
 }
 
-/// Takes all there is; the number of frames.
+/// Reads all frames and returns their number.
 static unsigned drain(void) {
     iw_can_frame_t frame;
     unsigned count = 0;
@@ -77,7 +78,7 @@ void tearDown(void) {
     iwl_bus_close(&store);
 }
 
-TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once) {
+TEST(test_socketcan_bus_off_and_restart_in_one_batch_report_once) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
@@ -85,7 +86,7 @@ TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow) {
+TEST(test_socketcan_bus_off_between_frames_of_a_batch_is_reported) {
     for (unsigned i = 0; i < 10U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
@@ -98,28 +99,28 @@ TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_nothing_is_sent_between_a_bus_off_and_its_being_told) {
+TEST(test_socketcan_sends_nothing_before_a_bus_off_is_reported) {
     for (unsigned i = 0; i < IWL_SOCKETCAN_BATCH; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
     }
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state()); // Both are in the second batch.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state()); // Both error frames are in the second batch.
     (void)drain();
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-TEST(test_restart_tells_of_a_loss_that_was_not_heard) {
+TEST(test_socketcan_restart_reports_a_missed_bus_off) {
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back) {
+TEST(test_socketcan_bus_off_is_reported_until_the_carrier_returns) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
     wait_ms(20);
@@ -130,14 +131,14 @@ TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back) {
         wait_ms(20);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
     }
-    fake_interface.carrier = 1; // Its error frame was lost.
+    fake_interface.carrier = 1; // The error frame of the restart was lost.
     wait_ms(200);
     (void)state();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iwl_bus_next_us(&store));
 }
 
-TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once) {
+TEST(test_socketcan_forged_bus_off_is_reported_once_and_checked) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, MSG_DONTROUTE);
     wait_ms(1);
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.looks);
@@ -145,7 +146,7 @@ TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_good_news_that_were_forged_are_not_believed) {
+TEST(test_socketcan_forged_recovery_is_ignored) {
     fake_interface.carrier = 0;
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, MSG_DONTROUTE);
@@ -155,7 +156,7 @@ TEST(test_good_news_that_were_forged_are_not_believed) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off) {
+TEST(test_socketcan_active_frame_ends_passive_but_not_bus_off) {
     fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, 0);
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
@@ -173,7 +174,7 @@ TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again) {
+TEST(test_socketcan_frames_from_before_link_down_are_dropped) {
     iw_can_frame_t frame;
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
@@ -187,10 +188,10 @@ TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_agai
     fake_interface_put(&fake_interface.ours, 288, 4, MSG_CONFIRM);
     wait_ms(1);
     TEST_ASSERT_EQUAL_UINT(0, drain());
-    TEST_ASSERT_EQUAL_UINT(1, fake_interface.opened); // The same socket.
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.opened); // The socket is the same.
 }
 
-TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old) {
+TEST(test_socketcan_frames_during_the_link_check_are_dropped) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -203,7 +204,7 @@ TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old) {
     TEST_ASSERT_EQUAL_UINT(1, drain());
 }
 
-TEST(test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody) {
+TEST(test_socketcan_frames_while_the_link_is_down_are_drained) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -214,7 +215,7 @@ TEST(test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_no
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.others.count);
 }
 
-TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten) {
+TEST(test_socketcan_half_read_batch_is_dropped_at_link_down) {
     iw_can_frame_t frame;
     for (unsigned i = 0; i < 20U; i++) {
         fake_interface_put(&fake_interface.ours, 256, 4, 0);
@@ -229,16 +230,16 @@ TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten) {
     TEST_ASSERT_EQUAL_UINT(0, drain());
 }
 
-TEST(test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once) {
+TEST(test_socketcan_link_down_and_up_between_polls_reports_once) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
-    wait_ms(200); // It was up all along, as far as can be seen.
+    wait_ms(200); // As far as the port can see, the link was up all the time.
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets) {
+TEST(test_socketcan_recreated_interface_gets_new_sockets) {
     fake_interface.ours.error = ENODEV;
     fake_interface.presence = IWL_LINK_ABSENT;
     wait_ms(1);
@@ -253,14 +254,14 @@ TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets) {
     TEST_ASSERT_EQUAL_INT(1, send_setpoint());
 }
 
-TEST(test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets) {
+TEST(test_socketcan_recreated_same_index_gets_new_sockets) {
     fake_interface.ours.error = ENODEV;
     wait_ms(1);
     wait_ms(200);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.opened);
 }
 
-TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise) {
+TEST(test_socketcan_link_up_in_bus_off_waits_for_the_carrier) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
@@ -276,7 +277,7 @@ TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up) {
+TEST(test_socketcan_netlink_failure_leaves_the_interface_active) {
     fake_interface.ours.error = ENETDOWN;
     wait_ms(1);
     (void)state();
@@ -286,7 +287,7 @@ TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up) {
     TEST_ASSERT_FALSE(link_now()->echo_proven);
 }
 
-TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period) {
+TEST(test_socketcan_down_interface_is_read_once_per_period) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -300,7 +301,7 @@ TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period
     TEST_ASSERT_EQUAL_UINT(before + 1U, fake_interface.readings);
 }
 
-TEST(test_interface_that_stays_down_is_no_news) {
+TEST(test_socketcan_interface_that_stays_down_is_no_change) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -326,7 +327,7 @@ static void assert_not_opened(int error) {
     fake_interface.events_dead = false;
 }
 
-TEST(test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open) {
+TEST(test_socketcan_failed_open_returns_errno_and_leaks_nothing) {
     iwl_bus_close(&store);
     const unsigned before = descriptors();
     no_can = true;
@@ -343,7 +344,7 @@ TEST(test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open) {
     setUp();
 }
 
-TEST(test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing) {
+TEST(test_socketcan_down_at_start_is_reported_without_netlink) {
     iwl_bus_close(&store);
     fake_interface.presence = IWL_LINK_DOWN;
     fake_interface.netlink_fails = true;
@@ -352,7 +353,7 @@ TEST(test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
 }
 
-TEST(test_interface_without_sockets_is_down_until_it_has_some) {
+TEST(test_socketcan_interface_without_sockets_is_down) {
     iw_can_frame_t frame;
     iwl_bus_close(&store);
     fake_interface.sockets_fail = true;
@@ -366,13 +367,13 @@ TEST(test_interface_without_sockets_is_down_until_it_has_some) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_full_queue_is_no_loss) {
+TEST(test_socketcan_full_queue_is_no_loss) {
     fake_interface.send_result = 0;
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
-TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended) {
+TEST(test_socketcan_purge_restarts_once_and_reports_the_result) {
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
     TEST_ASSERT_EQUAL_INT(0, iwl_bus_purge(&store));
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
@@ -388,7 +389,7 @@ TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended) {
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
 }
 
-TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else) {
+TEST(test_socketcan_purge_result_survives_a_link_reading) {
     (void)iwl_bus_purge(&store);
     fake_interface.restart_result = 0;
     wait_ms(1);
@@ -400,7 +401,7 @@ TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else) {
     TEST_ASSERT_EQUAL_INT(IWL_LINK_PURGE_DONE, link_now()->purge);
 }
 
-TEST(test_load_counts_the_frames_of_ours_and_of_others) {
+TEST(test_socketcan_load_counts_all_frames) {
     wait_ms(1000);
     TEST_ASSERT_EQUAL_UINT32(0, link_now()->load_permille);
     for (unsigned i = 0; i < 20U; i++) {
@@ -421,7 +422,7 @@ TEST(test_load_counts_the_frames_of_ours_and_of_others) {
     TEST_ASSERT_EQUAL_UINT32(2U * ours, link_now()->load_permille);
 }
 
-TEST(test_purge_that_was_not_allowed_is_not_tried_again) {
+TEST(test_socketcan_purge_that_was_not_permitted_is_not_retried) {
     (void)iwl_bus_purge(&store);
     fake_interface.restart_result = EPERM;
     wait_ms(1);
@@ -430,7 +431,7 @@ TEST(test_purge_that_was_not_allowed_is_not_tried_again) {
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
 }
 
-TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone) {
+TEST(test_socketcan_purge_without_a_proven_echo_does_not_restart) {
     iwl_bus_close(&store);
     fake_interface_init();
     fake_interface.link.echo_proven = false;
@@ -439,7 +440,7 @@ TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone) {
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.restarts);
 }
 
-TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step) {
+TEST(test_socketcan_error_flood_is_bounded_in_a_step) {
     for (unsigned i = 0; i < 1000U; i++) {
         fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING, 0);
     }
@@ -449,15 +450,15 @@ TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step) {
     TEST_ASSERT_GREATER_THAN_UINT(600, fake_interface.ours.count);
 }
 
-TEST(test_lost_frames_are_counted_and_the_carrier_is_looked_at) {
+TEST(test_socketcan_lost_frames_are_counted_and_carrier_is_read) {
     fake_interface.ours.lost = 7;
-    fake_interface.carrier = 0; // The error frame that told was among them.
+    fake_interface.carrier = 0; // The error frame of the bus-off is among the lost frames.
     wait_ms(1);
     TEST_ASSERT_EQUAL_UINT32(7, link_now()->lost);
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
 }
 
-TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint) {
+TEST(test_socketcan_other_ids_come_after_ours_and_setpoints) {
     iw_can_frame_t frame;
     fake_interface_put(&fake_interface.others, 0x700, 4, 0);
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
@@ -485,7 +486,7 @@ TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint) {
     TEST_ASSERT_EQUAL_INT(1, receive(&frame));
 }
 
-TEST(test_echo_is_told_by_the_mark_of_the_message) {
+TEST(test_socketcan_echo_has_the_mark_of_the_message) {
     iw_can_frame_t frame;
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_CONFIRM | MSG_DONTROUTE);
     fake_interface_put(&fake_interface.ours, 266, 5, MSG_DONTROUTE);
@@ -496,7 +497,7 @@ TEST(test_echo_is_told_by_the_mark_of_the_message) {
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
 }
 
-TEST(test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again) {
+TEST(test_socketcan_buffer_size_survives_a_link_reading) {
     TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
     fake_interface.ours.error = ENETDOWN;
     fake_interface.link.restart_ms = 99;
@@ -506,7 +507,7 @@ TEST(test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again) {
     TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
 }
 
-TEST(test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus) {
+TEST(test_socketcan_events_are_read_only_after_a_wake_by_the_bus) {
     fake_interface.news = true;
     iwl_bus_waited(&store, false);
     wait_ms(1);
@@ -516,7 +517,7 @@ TEST(test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus) {
     TEST_ASSERT_FALSE(fake_interface.news);
 }
 
-TEST(test_interface_that_is_back_is_found_whatever_the_wait_has_told) {
+TEST(test_socketcan_interface_up_is_found_without_a_wake) {
     fake_interface.ours.error = ENETDOWN;
     fake_interface.presence = IWL_LINK_DOWN;
     wait_ms(1);
@@ -524,6 +525,6 @@ TEST(test_interface_that_is_back_is_found_whatever_the_wait_has_told) {
     fake_interface.news = true;
     iwl_bus_waited(&store, false);
     wait_ms(1);
-    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss, once.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss is reported once.
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }

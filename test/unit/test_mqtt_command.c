@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which commands by MQTT count, by their age on this machine's clock and their sender's count; and what is told of them.
+// Which MQTT commands are accepted, by their age on the clock of this machine and by the count of their sender, and
+// which events the bridge publishes about them.
 #include "mqtt_command.h"
 #include "mqtt_tell.h"
 
@@ -31,7 +32,7 @@ static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t no
     return order.verdict;
 }
 
-/// By `far`, with these fields of its own behind.
+/// Judges a command of `far` with these additional fields.
 static mqtt_verdict_t judge_it(const char *verb, uint64_t told_us, int seq, const char *fields, uint64_t now_us) {
     char text[512];
     (void)snprintf(text, sizeof text, "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":%llu,\"seq\":%d%s}",
@@ -39,7 +40,7 @@ static mqtt_verdict_t judge_it(const char *verb, uint64_t told_us, int seq, cons
     return judge_text(verb, text, now_us);
 }
 
-TEST(test_command_fresh_is_taken_as_the_gateways_request) {
+TEST(test_command_fresh_becomes_the_request_of_the_gateway) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 2, ",\"reason\":\"a \\\"b\\\"\"", NOW_US));
@@ -61,7 +62,7 @@ TEST(test_command_age_is_judged_to_the_microsecond) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 8, ",\"ttl_ms\":100", NOW_US + 100001U));
 }
 
-/// With what MQTT 5 carries beside it.
+/// Judges a command with properties of MQTT 5.
 static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t correlation_length) {
     static const char correlation[MQTT_CORRELATION_MAX + 1U] = "c\0d";
     char text[128];
@@ -76,7 +77,7 @@ static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t corr
     return order.verdict;
 }
 
-TEST(test_command_response_topic_counts_among_this_machines_replies_only) {
+TEST(test_command_response_topic_must_be_a_reply_of_this_machine) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 0));
     TEST_ASSERT_EQUAL_STRING("far", order.to);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, "iwheel/w1/reply/other", 0));
@@ -90,7 +91,7 @@ TEST(test_command_response_topic_counts_among_this_machines_replies_only) {
     }
 }
 
-TEST(test_command_correlation_data_is_kept_up_to_its_limit) {
+TEST(test_command_correlation_data_is_stored_up_to_its_limit) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 3));
     TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);
     TEST_ASSERT_EQUAL_MEMORY("c\0d", order.correlation, 3);
@@ -98,7 +99,7 @@ TEST(test_command_correlation_data_is_kept_up_to_its_limit) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled(3, NULL, MQTT_CORRELATION_MAX + 1U));
 }
 
-TEST(test_command_cannot_make_its_own_life_longer) {
+TEST(test_command_ttl_cannot_extend_its_age_limit) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 1, ",\"ttl_ms\":1000", NOW_US + 300001U));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
@@ -109,14 +110,14 @@ TEST(test_command_of_another_boot_is_dropped_before_its_age) {
     TEST_ASSERT_EQUAL(MQTT_OTHER_BOOT, judge_text("stop", text, NOW_US));
 }
 
-TEST(test_command_seq_must_rise) {
+TEST(test_command_seq_must_increase) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 5, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 5, "", NOW_US + 1U));
     TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 4, "", NOW_US + 1000000U));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 6, "", NOW_US + 1000000U));
 }
 
-/// Whoever writes another's name uses up its numbers, or all places: neither refuses a stop.
+/// A client that sends under another name can use up the numbers of that name, or all places. Neither refuses a stop.
 TEST(test_stop_never_needs_a_seq_that_rises_or_a_place) {
     char text[256];
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 1000, "", NOW_US));
@@ -131,7 +132,7 @@ TEST(test_stop_never_needs_a_seq_that_rises_or_a_place) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_text("stop", text, NOW_US + 1000001U));
 }
 
-TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive) {
+TEST(test_command_reset_needs_its_stop_and_the_drive_age_limit) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, ",\"stop\":\"4\"", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("reset", NOW_US, 2, ",\"stop\":4", NOW_US + 300000U));
@@ -139,7 +140,7 @@ TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("reset", NOW_US, 3, ",\"stop\":4", NOW_US + 300001U));
 }
 
-TEST(test_command_key_is_kept_apart_and_a_deflected_stick_is_seen) {
+TEST(test_command_key_is_separate_and_a_late_drive_reports_motion) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":0,\"key\":\"abc\"", NOW_US));
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":0}", order.request);
     TEST_ASSERT_EQUAL_STRING("abc", order.key);
@@ -153,7 +154,7 @@ TEST(test_command_key_is_kept_apart_and_a_deflected_stick_is_seen) {
                              order.request);
 }
 
-TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late) {
+TEST(test_command_seq_may_restart_only_after_all_earlier_are_late) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US));
     for (uint64_t later_us = 0; later_us <= 3000000U; later_us += 1000U) {
         TEST_ASSERT_NOT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US + later_us));
@@ -161,7 +162,7 @@ TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US + 1000001U, 1, "", NOW_US + 1000001U));
 }
 
-TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count) {
+TEST(test_command_of_one_sender_too_many_is_dropped) {
     char text[256];
     for (unsigned i = 0; i <= MQTT_SENDERS; i++) {
         (void)snprintf(text, sizeof text, "{\"from\":\"s%u\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}", i);
@@ -173,7 +174,7 @@ TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count) 
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("why", text, NOW_US + 1000001U));
 }
 
-TEST(test_command_retained_is_dropped_hello_too) {
+TEST(test_command_retained_is_dropped_including_hello) {
     const char *text = "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1}";
     static const char *const verbs[] = {"stop", "estop", "hello", "drive"};
     for (size_t i = 0; i < 4U; i++) {
@@ -184,12 +185,12 @@ TEST(test_command_retained_is_dropped_hello_too) {
     TEST_ASSERT_EQUAL_UINT64(4, judge.counts[MQTT_RETAINED]);
 }
 
-TEST(test_command_hello_needs_no_time) {
+TEST(test_command_hello_without_a_time_is_accepted) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("hello", "{\"from\":\"far\",\"seq\":1}", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_text("stop", "{\"from\":\"far\",\"seq\":2}", NOW_US));
 }
 
-TEST(test_command_that_drives_needs_the_right_stop_never) {
+TEST(test_command_that_drives_needs_the_right_and_stop_does_not) {
     static const char *const verbs[] = {"arm", "drive", "twist", "reset"};
     rules.may_drive = false;
     rules.may_reset = false;
@@ -229,7 +230,7 @@ TEST(test_command_garbled_is_dropped) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"takeover\":true", NOW_US));
 }
 
-TEST(test_command_too_long_is_not_looked_at) {
+TEST(test_command_too_long_is_garbled) {
     static char text[MQTT_COMMAND_MAX + 2U];
     memset(text, ' ', sizeof text);
     memcpy(text, "{\"from\":\"far\",\"seq\":1}", 22);
@@ -243,7 +244,7 @@ TEST(test_command_too_long_is_not_looked_at) {
 
 // ---- topics and messages ------------------------------------------------------------------------------------------
 
-TEST(test_topics_are_of_this_machine_only) {
+TEST(test_topics_of_other_machines_are_not_parsed) {
     char topic[MQTT_TOPIC_SIZE];
     mqtt_topic("w1", "event", "stop", topic);
     TEST_ASSERT_EQUAL_STRING("iwheel/w1/event/stop", topic);
@@ -255,7 +256,7 @@ TEST(test_topics_are_of_this_machine_only) {
     TEST_ASSERT_NULL(mqtt_topic_verb("w1", "iwheel/w1/cmd"));
 }
 
-TEST(test_messages_are_the_gateways_with_ours_before) {
+TEST(test_messages_of_the_gateway_follow_the_fields_of_the_bridge) {
     char text[256];
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
@@ -268,7 +269,7 @@ TEST(test_messages_are_the_gateways_with_ours_before) {
                                  text, length);
 }
 
-TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply) {
+TEST(test_reply_quotes_time_seq_and_reply_of_the_gateway) {
     char text[512];
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";
@@ -286,7 +287,7 @@ TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply) {
                                  text, length);
 }
 
-TEST(test_message_that_does_not_fit_is_none) {
+TEST(test_message_that_does_not_fit_is_not_written) {
     char text[64];
     const char *line = "{\"event\":\"fault\",\"t_us\":5}";
     const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
@@ -297,7 +298,7 @@ TEST(test_message_that_does_not_fit_is_none) {
     TEST_ASSERT_EQUAL_size_t(0, mqtt_tell_event(BOOT, 1, 1, &event, (mqtt_buffer_t){text, sizeof text}));
 }
 
-TEST(test_missed_stop_is_told_without_its_frames) {
+TEST(test_missed_stop_is_published_without_its_frames) {
     char text[1024];
     const char *line = "{\"id\":1,\"ok\":true,\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":77,\"at_us\":66,"
                        "\"sentence\":\"gone\",\"frames_before\":[1,2,3]}";
@@ -310,7 +311,7 @@ TEST(test_missed_stop_is_told_without_its_frames) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"recording\":null}"));
 }
 
-TEST(test_info_without_a_gateway_invents_nothing) {
+TEST(test_info_without_a_gateway_has_no_values_of_it) {
     char text[2048];
     mqtt_settings_t settings;
     const uint64_t counts[MQTT_VERDICTS] = {1, 2};
@@ -344,7 +345,7 @@ static unsigned errors_of(const char *text) {
     return report.errors;
 }
 
-TEST(test_settings_that_would_open_a_door_by_mistake_are_refused) {
+TEST(test_settings_that_are_unsafe_are_refused) {
     TEST_ASSERT_EQUAL_UINT(0, errors_of("[machine]\nid = w1\n"));
     TEST_ASSERT_EQUAL_UINT(1, errors_of("[broker]\nhost = broker.example\n"));
     TEST_ASSERT_EQUAL_UINT(0, errors_of("[broker]\nhost = broker.example\nca = /x.pem\n"));

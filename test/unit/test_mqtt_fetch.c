@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A recording asked for by MQTT, from a machine that a test plays itself: lost answers, one that was away, that began anew, that refuses, and
-// what is damaged.
+// Fetches a recording over MQTT from a fake machine: lost replies, a machine that is away, a bridge that restarts,
+// refusals and damaged pieces.
 #include "fetch.h"
 
 #include "unit.h"
@@ -9,7 +9,7 @@
 
 #define SECOND_US   1000000U
 #define PATIENCE_US (60U * SECOND_US)
-/// "123456789", as zlib.crc32 has it.
+/// "123456789" in base64, with its CRC-32 from zlib.crc32.
 #define DATA "\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780262"
 
 static fetch_t fetch;
@@ -33,7 +33,7 @@ static void must_ask(const char *which) {
     TEST_ASSERT_EQUAL_STRING(which, verb);
 }
 
-/// The answer to the command under way, with these fields.
+/// Sends the reply to the open command, with these fields.
 static fetch_news_t answer(const char *fields) {
     char text[1024];
     const int length = snprintf(text, sizeof text, "{\"boot\":\"%s\",\"t_us\":%llu,\"cmd\":\"%s\",\"seq\":%lld,%s}",
@@ -58,7 +58,7 @@ static void begin_fetching(void) {
     TEST_ASSERT_EQUAL(FETCH_FETCHING, fetch.stage);
 }
 
-TEST(test_fetch_list_has_the_machines_recordings_and_no_other_names) {
+TEST(test_fetch_list_has_only_recordings_of_the_machine) {
     list();
     TEST_ASSERT_EQUAL_size_t(2, fetch.count);
     TEST_ASSERT_EQUAL_STRING("stop-000017-wheel_lost", fetch.list[1].name);
@@ -68,7 +68,7 @@ TEST(test_fetch_list_has_the_machines_recordings_and_no_other_names) {
     TEST_ASSERT_FALSE(step());
 }
 
-TEST(test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece) {
+TEST(test_fetch_reads_pieces_and_quotes_the_newest_time) {
     begin_fetching();
     now_us += 1000U;
     must_ask("recording");
@@ -89,7 +89,7 @@ TEST(test_fetch_quotes_the_newest_answer_and_takes_piece_after_piece) {
     TEST_ASSERT_EQUAL_UINT64(0, fetch.again);
 }
 
-TEST(test_fetch_lost_answer_is_asked_again_with_a_new_time) {
+TEST(test_fetch_lost_reply_is_requested_again_with_a_new_time) {
     begin_fetching();
     must_ask("recording");
     now_us += 1999999U;
@@ -103,7 +103,7 @@ TEST(test_fetch_lost_answer_is_asked_again_with_a_new_time) {
     TEST_ASSERT_EQUAL_UINT64(1, fetch.again);
 }
 
-TEST(test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one) {
+TEST(test_fetch_late_reply_is_ignored) {
     begin_fetching();
     must_ask("recording");
     now_us += 2U * SECOND_US;
@@ -116,7 +116,7 @@ TEST(test_fetch_answer_that_comes_too_late_is_not_taken_for_a_later_one) {
     TEST_ASSERT_EQUAL_INT64(0, fetch.piece.next);
 }
 
-TEST(test_fetch_bridge_that_began_anew_goes_on_where_it_was) {
+TEST(test_fetch_continues_after_a_restart_of_the_bridge) {
     begin_fetching();
     must_ask("recording");
     (void)answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262");
@@ -132,7 +132,7 @@ TEST(test_fetch_bridge_that_began_anew_goes_on_where_it_was) {
     TEST_ASSERT_EQUAL(FETCH_DONE, fetch.stage);
 }
 
-TEST(test_fetch_machine_that_was_away_may_come_back_within_the_patience) {
+TEST(test_fetch_machine_back_within_the_patience_continues) {
     begin_fetching();
     (void)fetch_take(&fetch, "availability", "offline", 7, now_us);
     for (unsigned i = 0; i < 29U; i++) {
@@ -145,7 +145,7 @@ TEST(test_fetch_machine_that_was_away_may_come_back_within_the_patience) {
     TEST_ASSERT_EQUAL(FETCH_PIECE, answer("\"ok\":true,\"offset\":0,\"size\":9," DATA ",\"file_crc32\":3421780262"));
 }
 
-TEST(test_fetch_machine_that_stays_away_is_given_up_with_the_reason) {
+TEST(test_fetch_machine_that_stays_offline_fails_with_the_reason) {
     begin_fetching();
     (void)fetch_take(&fetch, "availability", "offline", 7, now_us);
     now_us += PATIENCE_US;
@@ -155,7 +155,7 @@ TEST(test_fetch_machine_that_stays_away_is_given_up_with_the_reason) {
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "w1 has not answered for 60 s and is offline"));
 }
 
-TEST(test_fetch_machine_that_nobody_knows_is_given_up_soon) {
+TEST(test_fetch_unknown_machine_fails_after_6_s) {
     must_ask("hello");
     now_us += 6U * SECOND_US;
     TEST_ASSERT_FALSE(step());
@@ -163,7 +163,7 @@ TEST(test_fetch_machine_that_nobody_knows_is_given_up_soon) {
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "no machine w1 is known"));
 }
 
-TEST(test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so) {
+TEST(test_fetch_damaged_piece_is_retried_then_fails) {
     begin_fetching();
     for (unsigned i = 0; i < 6U; i++) {
         TEST_ASSERT_EQUAL(FETCH_FETCHING, fetch.stage);
@@ -177,7 +177,7 @@ TEST(test_fetch_damaged_piece_is_asked_again_and_told_if_it_stays_so) {
     TEST_ASSERT_NOT_NULL(strstr(fetch.why, "stop-000017-wheel_lost.jsonl of w1 is not as its checksum says"));
 }
 
-TEST(test_fetch_file_that_is_not_whole_is_never_done) {
+TEST(test_fetch_incomplete_file_is_never_done) {
     begin_fetching();
     for (unsigned i = 0; i < 6U; i++) {
         must_ask("recording");
@@ -186,7 +186,7 @@ TEST(test_fetch_file_that_is_not_whole_is_never_done) {
     TEST_ASSERT_EQUAL(FETCH_FAILED, fetch.stage);
 }
 
-TEST(test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass) {
+TEST(test_fetch_permanent_refusal_fails_temporary_one_is_retried) {
     begin_fetching();
     must_ask("recording");
     (void)answer("\"ok\":false,\"error\":\"bad_value\",\"message\":\"no\\u001b such name\"");
@@ -208,7 +208,7 @@ TEST(test_fetch_refusal_is_told_at_once_or_after_it_had_time_to_pass) {
     TEST_ASSERT_EQUAL_INT(1, fetch.code);
 }
 
-TEST(test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so) {
+TEST(test_fetch_always_late_fails_with_the_last_reason) {
     begin_fetching();
     unsigned sent = 0;
     while (fetch.stage == FETCH_FETCHING) {
@@ -225,7 +225,7 @@ TEST(test_fetch_on_a_line_that_is_always_late_gives_up_and_says_so) {
     TEST_ASSERT_LESS_THAN_UINT(300, sent);
 }
 
-TEST(test_fetch_one_is_chosen_by_name_or_number) {
+TEST(test_fetch_recording_is_selected_by_name_or_number) {
     list();
     fetch_choose(&fetch, "3", now_us);
     TEST_ASSERT_EQUAL_size_t(0, fetch.chosen);
@@ -238,7 +238,7 @@ TEST(test_fetch_one_is_chosen_by_name_or_number) {
     TEST_ASSERT_EQUAL_STRING("w1 has no recording 18; it has: iwheel-fleet recordings w1", fetch.why);
 }
 
-TEST(test_fetch_of_a_machine_without_recordings_says_why) {
+TEST(test_fetch_without_recordings_fails_with_the_reason) {
     must_ask("hello");
     (void)answer("\"ok\":true");
     must_ask("recordings");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The console's rows, from what machines and anybody else say at the broker.
+// The rows of the fleet console, from messages of machines and of other clients at the broker.
 #include "fleet.h"
 
 #include "unit.h"
@@ -50,7 +50,7 @@ TEST(test_fleet_machines_are_sorted_and_counted) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "3 machines, 2 online\n"));
 }
 
-TEST(test_fleet_row_tells_state_battery_zero_and_what_is_unknown) {
+TEST(test_fleet_row_has_state_battery_zero_and_unknown_values) {
     take("iwheel/w1/availability", "online");
     take("iwheel/w1/state", state);
     const char *text = show(fleet_show);
@@ -68,7 +68,7 @@ TEST(test_fleet_contradictions_are_counted_across_machines) {
     TEST_ASSERT_NULL(strstr(shown, "track"));
 }
 
-TEST(test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal) {
+TEST(test_fleet_stop_has_its_cause_without_control_characters) {
     take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"wheel_\\u001b[2Jlost\",\"wall_us\":1760000000000000,"
                                  "\"sentence\":\"left wheel\"}");
     const char *text = show(fleet_show);
@@ -81,7 +81,7 @@ static const char *row(void) {
     return show(fleet_tell);
 }
 
-TEST(test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most) {
+TEST(test_fleet_last_stop_is_the_latest_received_one_first) {
     take("iwheel/w1/info", "{\"last_stop\":null}");
     TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_from\":null"));
     take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":2000,\"sentence\":\"s\"}}");
@@ -101,13 +101,13 @@ TEST(test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_cou
     TEST_ASSERT_EQUAL_UINT64(1, fleet.left_out);
 }
 
-TEST(test_fleet_table_says_who_told_the_last_stops) {
+TEST(test_fleet_table_names_the_source_of_the_last_stops) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of each machine's info"));
     fleet.stream = "n1";
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of the stream at n1"));
 }
 
-TEST(test_fleet_garbage_is_left_out_and_counted) {
+TEST(test_fleet_garbage_is_ignored_and_counted) {
     static const char *const topics[] = {"iwheel/", "iwheel//state", "iwheel/a b/state", "other/w1/state", "iwheel/w1"};
     for (size_t i = 0; i < sizeof topics / sizeof topics[0]; i++) {
         take(topics[i], state);
@@ -122,7 +122,7 @@ TEST(test_fleet_garbage_is_left_out_and_counted) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"state\":null"));
 }
 
-TEST(test_fleet_of_too_many_machines_is_counted_not_shown) {
+TEST(test_fleet_machines_beyond_the_limit_are_counted_only) {
     char topic[64];
     for (unsigned i = 0; i < FLEET_MACHINES + 5U; i++) {
         (void)snprintf(topic, sizeof topic, "iwheel/m%u/availability", i);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the stream has kept, told again: each event once, with what is missing, in the span that was asked for.
+// The events that the stream has stored: each event once, with the gaps, in the requested span.
 #include "history.h"
 
 #include "unit.h"
@@ -9,7 +9,7 @@
 #include <time.h>
 
 #define SECOND_US 1000000LL
-/// A wall clock: 2026-11-21 22:00:00 UTC.
+/// Wall clock: 2026-11-21 22:00:00 UTC.
 #define EVENING_US (1795298400LL * SECOND_US)
 
 static history_t history;
@@ -41,7 +41,8 @@ static const char *text(void) {
     return told;
 }
 
-/// A stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US when it was heard and when it was stored.
+/// Adds a stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US of receipt and of
+/// storage.
 static void stop(const char *boot, int number, int stop_number, int heard_s, int stored_s) {
     char payload[256];
     (void)snprintf(payload, sizeof payload,
@@ -58,7 +59,7 @@ static void other(const char *name, const char *payload) {
     TEST_ASSERT_TRUE(history_take(&history, topic, payload, strlen(payload), EVENING_US + SECOND_US));
 }
 
-TEST(test_history_stop_is_told_in_one_line_with_its_time_and_sentence) {
+TEST(test_history_stop_is_one_line_with_time_and_sentence) {
     begin((history_config_t){0});
     stop("a", 1, 1, 61, 62);
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
@@ -67,7 +68,7 @@ TEST(test_history_stop_is_told_in_one_line_with_its_time_and_sentence) {
         strstr(text(), "1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
 }
 
-TEST(test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge) {
+TEST(test_history_doubles_are_dropped_across_bridge_restarts) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 2, 2, 2, 2);
@@ -81,7 +82,7 @@ TEST(test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge) {
     TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
 }
 
-TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it) {
+TEST(test_history_gap_in_numbers_is_printed_before_the_next_event) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 2, 2, 2);
@@ -92,7 +93,7 @@ TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it) {
     TEST_ASSERT_EQUAL_UINT64(3, history.missing);
 }
 
-TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one) {
+TEST(test_history_gap_in_stops_is_printed_and_counts_from_restart) {
     begin((history_config_t){0});
     stop("a", 1, 7, 1, 1);
     stop("a", 2, 10, 2, 2);
@@ -103,7 +104,7 @@ TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from
     TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
 }
 
-TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop) {
+TEST(test_history_gap_among_hidden_events_is_printed_at_next_stop) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     other("fault",
@@ -113,7 +114,7 @@ TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_sto
     TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 events before this one are not in the stream"));
 }
 
-TEST(test_history_event_that_comes_late_is_no_double_and_no_gap) {
+TEST(test_history_late_event_is_no_double_and_closes_its_gap) {
     begin((history_config_t){0});
     stop("a", 1, 1, 1, 1);
     stop("a", 5, 5, 2, 2);
@@ -132,7 +133,7 @@ TEST(test_history_event_that_comes_late_is_no_double_and_no_gap) {
     TEST_ASSERT_EQUAL_UINT64(6, history.told);
 }
 
-/// `last_stop`, when it was in s after EVENING_US, and the counts of events.
+/// Adds an info message: `last_stop` with its time in seconds after EVENING_US, and the counts of events.
 static void info(const char *boot, int stop_number, int when_s, int last, int waiting, int dropped) {
     char payload[256];
     (void)snprintf(
@@ -156,7 +157,7 @@ TEST(test_history_gap_at_the_end_shows_by_info) {
     TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
 }
 
-TEST(test_history_gap_of_a_machine_without_any_event_shows_by_info) {
+TEST(test_history_gap_without_any_event_shows_by_info) {
     begin((history_config_t){0});
     info("a", 7, 30, 12, 0, 0);
     history_end(&history);
@@ -168,7 +169,7 @@ TEST(test_history_gap_of_a_machine_without_any_event_shows_by_info) {
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.unheard, "its last stop was before the span");
 }
 
-TEST(test_history_end_without_a_gap_says_nothing) {
+TEST(test_history_end_without_a_gap_prints_nothing) {
     begin((history_config_t){0});
     info("a", 4, 1, 6, 2, 0);
     stop("a", 4, 4, 1, 1);
@@ -177,7 +178,7 @@ TEST(test_history_end_without_a_gap_says_nothing) {
     TEST_ASSERT_EQUAL_size_t_MESSAGE(before, strlen(text()), "two events wait at the machine");
 }
 
-TEST(test_history_whose_end_is_not_checked_says_so) {
+TEST(test_history_with_an_unchecked_end_reports_it) {
     begin((history_config_t){0});
     history.has_info = false;
     history_end(&history);
@@ -185,7 +186,7 @@ TEST(test_history_whose_end_is_not_checked_says_so) {
     TEST_ASSERT_NOT_NULL(strstr(text(), "; its end is not checked"));
 }
 
-TEST(test_history_gap_has_its_cause) {
+TEST(test_history_gap_is_printed_with_its_cause) {
     begin((history_config_t){0});
     info("a", 4, 1, 9, 0, 5);
     stop("a", 1, 1, 1, 1);
@@ -198,7 +199,7 @@ TEST(test_history_gap_has_its_cause) {
     TEST_ASSERT_NOT_NULL(strstr(text(), "dropped from its full spool, or confirmed by the broker and not stored"));
 }
 
-TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew) {
+TEST(test_history_all_has_other_events_and_bridge_restarts) {
     begin((history_config_t){.all = true});
     stop("a", 1, 1, 1, 1);
     other("fault",
@@ -207,7 +208,7 @@ TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew) {
     TEST_ASSERT_NOT_NULL(strstr(told, "w1           fault  cause bus, present true\n"));
 }
 
-TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing) {
+TEST(test_history_span_accepts_either_clock_of_an_event) {
     begin((history_config_t){0});
     stop("a", 1, 1, -100, -90);
     stop("a", 2, 2, 3599, 9000);
@@ -221,7 +222,7 @@ TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing) {
         strstr(told, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
 }
 
-TEST(test_history_missed_stop_is_told_at_its_own_time_and_as_told_late) {
+TEST(test_history_missed_stop_has_its_own_time_and_a_late_mark) {
     begin((history_config_t){0});
     other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
                   "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
@@ -242,7 +243,7 @@ TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {
     TEST_ASSERT_NOT_NULL(strstr(told, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
 }
 
-TEST(test_history_garbage_is_counted_and_moves_no_terminal) {
+TEST(test_history_garbage_is_counted_and_prints_no_escape) {
     begin((history_config_t){.all = true});
     other("stop", "{");
     other("stop", "[]");
@@ -256,7 +257,7 @@ TEST(test_history_garbage_is_counted_and_moves_no_terminal) {
     TEST_ASSERT_NULL(strchr(text(), '\033'));
 }
 
-TEST(test_history_ends_when_nobody_reads_it) {
+TEST(test_history_ends_when_its_output_fails) {
     begin((history_config_t){0});
     FILE *full = fopen("/dev/full", "w");
     TEST_ASSERT_NOT_NULL(full);
@@ -269,7 +270,7 @@ TEST(test_history_ends_when_nobody_reads_it) {
     (void)fclose(full);
 }
 
-TEST(test_times_are_read_as_people_write_them_and_nothing_else) {
+TEST(test_history_times_and_spans_are_parsed_strictly) {
     int64_t us = 0;
     begin((history_config_t){0});
     static const char *const good[] = {"2026-11-21T22:00:00", "2026-11-21 22:00", "2026-11-21T22:00",

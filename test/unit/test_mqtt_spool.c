@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Events that wait for the broker: whole and in order whatever happens to file, process and disk.
+// Events that wait for the broker stay complete and in order, whatever happens to file, process and disk.
 #include "spool.h"
 
 #include "unit.h"
@@ -21,7 +21,7 @@ static char path[80];
 static mqtt_spool_t spool;
 
 void setUp(void) {
-    // In memory where there is such a place: each new file waits for the disk.
+    // In memory, where there is such a folder: each new file waits for the disk.
     (void)snprintf(folder, sizeof folder, "%s/iwheel-spool-XXXXXX",
                    (access("/dev/shm", W_OK) == 0) ? "/dev/shm" : "/tmp");
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
@@ -46,7 +46,7 @@ static void reopen(void) {
     TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
 }
 
-/// What waits is numbers `first` to `last`, each as it was added.
+/// The spool contains the numbers `first` to `last`, each as it was added.
 static void expect(unsigned first, unsigned last) {
     mqtt_spool_event_t event;
     uint64_t number = 0;
@@ -85,7 +85,7 @@ TEST(test_spool_new_is_empty) {
     expect(1, 0);
 }
 
-TEST(test_spool_events_outlive_the_process_in_order) {
+TEST(test_spool_events_survive_a_restart_in_order) {
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
@@ -97,7 +97,7 @@ TEST(test_spool_events_outlive_the_process_in_order) {
     TEST_ASSERT_EQUAL_UINT64(6, spool.mark);
 }
 
-TEST(test_spool_confirmed_events_do_not_come_back) {
+TEST(test_spool_confirmed_events_do_not_return) {
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
@@ -112,13 +112,13 @@ TEST(test_spool_confirmed_events_do_not_come_back) {
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.mark, "the mark stays");
 }
 
-TEST(test_spool_event_set_aside_stays_while_others_go) {
+TEST(test_spool_deferred_event_stays_while_others_are_confirmed) {
     mqtt_spool_event_t event;
     for (unsigned i = 1; i <= 5; i++) {
         add(i);
     }
     mqtt_spool_set_aside(&spool, 2);
-    mqtt_spool_set_aside(&spool, 9); // There is none.
+    mqtt_spool_set_aside(&spool, 9); // There is no event 9.
     mqtt_spool_confirm(&spool, 4);
     TEST_ASSERT_EQUAL_size_t(1, spool.aside);
     TEST_ASSERT_EQUAL_size_t(2, spool.waiting);
@@ -126,7 +126,7 @@ TEST(test_spool_event_set_aside_stays_while_others_go) {
     TEST_ASSERT_EQUAL_UINT64(2, event.number);
     TEST_ASSERT_TRUE(event.aside);
     mqtt_spool_confirm(&spool, 5);
-    for (unsigned i = 0; i < 2U; i++) { // The second time from a file that was written anew.
+    for (unsigned i = 0; i < 2U; i++) { // The second pass reads a file that was written again.
         reopen();
         TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.last, "numbers go on");
         TEST_ASSERT_EQUAL_size_t(1, spool.waiting);
@@ -142,7 +142,7 @@ TEST(test_spool_event_set_aside_stays_while_others_go) {
     expect(6, 6);
 }
 
-TEST(test_spool_full_drops_what_is_set_aside_first) {
+TEST(test_spool_full_drops_deferred_events_first) {
     mqtt_spool_event_t event;
     unsigned last = 1;
     add(last);
@@ -156,7 +156,7 @@ TEST(test_spool_full_drops_what_is_set_aside_first) {
     TEST_ASSERT_EQUAL_UINT64(2, event.number);
 }
 
-TEST(test_spool_of_others_is_refused) {
+TEST(test_spool_writable_by_others_or_linked_is_refused) {
     char second[96];
     TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
     TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0777));
@@ -173,7 +173,7 @@ TEST(test_spool_of_others_is_refused) {
     TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
 }
 
-TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut) {
+TEST(test_spool_file_cut_at_any_byte_has_all_events_before_it) {
     char bytes[1024];
     size_t ends[6] = {0};
     (void)mqtt_spool_close(&spool);
@@ -194,13 +194,13 @@ TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut) {
             whole++;
         }
         expect(1, whole);
-        add(whole + 1U); // And it goes on behind the cut.
+        add(whole + 1U); // New events follow after the cut.
         reopen();
         expect(1, whole + 1U);
     }
 }
 
-TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it) {
+TEST(test_spool_flipped_bit_loses_only_events_from_there_on) {
     char bytes[1024];
     for (unsigned i = 1; i <= 3; i++) {
         add(i);
@@ -223,7 +223,7 @@ TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it) {
     }
 }
 
-TEST(test_spool_half_written_new_file_is_of_no_account) {
+TEST(test_spool_half_written_new_file_is_ignored) {
     char fresh[96];
     add(1);
     (void)mqtt_spool_close(&spool);
@@ -237,7 +237,7 @@ TEST(test_spool_half_written_new_file_is_of_no_account) {
     TEST_ASSERT_NOT_EQUAL_INT(0, access(fresh, F_OK));
 }
 
-TEST(test_spool_number_that_no_event_can_have_is_damage) {
+TEST(test_spool_impossible_number_is_damage) {
     add(1);
     mqtt_spool_confirm(&spool, UINT64_MAX);
     reopen();
@@ -259,7 +259,7 @@ TEST(test_spool_full_drops_the_oldest_and_counts) {
     TEST_ASSERT_EQUAL_UINT64(last, event.number);
 }
 
-TEST(test_spool_file_stays_bounded_however_many_come_and_go) {
+TEST(test_spool_file_stays_bounded_over_5000_events) {
     char bytes[4U * SMALL];
     for (unsigned i = 1; i <= 5000; i++) {
         add(i);
@@ -280,7 +280,7 @@ TEST(test_spool_event_too_long_is_counted) {
     expect(1, 1);
 }
 
-TEST(test_spool_disk_full_at_every_byte_loses_nothing_and_recovers) {
+TEST(test_spool_disk_full_at_any_byte_loses_nothing) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
@@ -302,7 +302,7 @@ TEST(test_spool_disk_full_at_every_byte_loses_nothing_and_recovers) {
     }
 }
 
-TEST(test_spool_disk_full_and_killed_keeps_what_was_written_before) {
+TEST(test_spool_disk_full_and_killed_retains_written_events) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
@@ -313,12 +313,12 @@ TEST(test_spool_disk_full_and_killed_keeps_what_was_written_before) {
     add(3);
     TEST_ASSERT_TRUE(spool.behind);
     (void)setrlimit(RLIMIT_FSIZE, &before);
-    reopen(); // Closing writes nothing, as a kill.
+    reopen(); // Closing writes nothing, as a kill does.
     TEST_ASSERT_TRUE(spool.waiting >= 1U);
     expect(1, (unsigned)spool.waiting);
 }
 
-TEST(test_spool_sync_brings_to_the_disk_without_waiting) {
+TEST(test_spool_sync_writes_to_the_disk_without_waiting) {
     add(1);
     TEST_ASSERT_TRUE(spool.unsynced);
     mqtt_spool_sync(&spool);
@@ -328,7 +328,7 @@ TEST(test_spool_sync_brings_to_the_disk_without_waiting) {
     expect(1, 1);
 }
 
-TEST(test_spool_of_another_process_is_kept_out) {
+TEST(test_spool_open_in_another_process_is_refused) {
     mqtt_spool_t other;
     TEST_ASSERT_FALSE(mqtt_spool_open(&other, folder, SMALL));
     TEST_ASSERT_EQUAL_INT(EWOULDBLOCK, errno);

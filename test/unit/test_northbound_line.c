@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Lines on a serial wire: one spelling of each, whatever else comes is refused, and the next newline ends all trouble.
+// Lines on a serial line: each has one spelling, all other bytes are refused, and the receiver recovers at the next
+// newline.
 #include "iwheel_northbound/line.h"
 
 #include "unit.h"
@@ -28,13 +29,13 @@ static iwn_line_t stamped(uint8_t channel, uint64_t t_us, const char *json) {
     return made_line;
 }
 
-/// `text` as a line with the right CRC, without its newline: its length.
+/// Writes `text` as a line with the right CRC and without its newline; returns the length.
 static size_t checked(const char *text) {
     memcpy(bytes, text, strlen(text));
     return iwn_line_end(bytes, strlen(text), sizeof bytes) - 1U;
 }
 
-/// What the receiver says at last, and how many verdicts it gave.
+/// Returns the last verdict of the receiver, and the number of verdicts.
 static iwn_line_verdict_t put(const char *text, unsigned *out_verdicts) {
     iwn_line_verdict_t last = IWN_LINE_NOTHING;
     *out_verdicts = 0;
@@ -64,7 +65,7 @@ TEST(test_line_is_written_as_documented) {
     TEST_ASSERT_EQUAL_STRING_LEN("3 1250000 {\"ok\":true}*e0f15d9c\n", bytes, length);
 }
 
-TEST(test_line_of_any_channel_and_stamp_comes_back_as_it_was) {
+TEST(test_line_of_any_channel_and_stamp_is_read_back_unchanged) {
     static const uint64_t stamps[] = {0, 9, 10, 4294967296U, UINT64_MAX};
     for (uint8_t channel = 0; channel <= IWN_LINE_CHANNELS; channel++) {
         for (unsigned i = 0; i < sizeof stamps / sizeof stamps[0]; i++) {
@@ -92,7 +93,7 @@ TEST(test_line_that_does_not_fit_is_not_written_at_any_size) {
     TEST_ASSERT_EQUAL_UINT(0, iwn_line_write(&beyond, bytes, sizeof bytes));
 }
 
-TEST(test_line_with_any_bit_turned_is_refused) {
+TEST(test_line_with_any_flipped_bit_is_refused) {
     const iwn_line_t sent = stamped(3, 1250000, "{\"ok\":true}");
     const size_t length = iwn_line_write(&sent, bytes, sizeof bytes) - 1U;
     for (size_t bit = 0; bit < length * 8U; bit++) {
@@ -151,7 +152,7 @@ TEST(test_line_without_crc_or_with_upper_case_is_unchecked) {
     TEST_ASSERT_EQUAL_STRING("unknown", iwn_line_verdict_name(IWN_LINE_VERDICTS));
 }
 
-TEST(test_receiver_gives_each_line_once_and_passes_over_empty_ones) {
+TEST(test_receiver_returns_each_line_once_and_skips_empty_ones) {
     unsigned verdicts = 0;
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("\n\n0 {\"cmd\":\"link\"}*e2d27f9b\n\n", &verdicts));
     TEST_ASSERT_EQUAL_UINT(1, verdicts);
@@ -165,7 +166,7 @@ TEST(test_receiver_recovers_at_the_newline_after_half_a_line) {
     TEST_ASSERT_EQUAL_UINT(1, verdicts);
 }
 
-TEST(test_receiver_tells_one_long_line_once_and_recovers) {
+TEST(test_receiver_reports_a_long_line_once_and_recovers) {
     unsigned verdicts = 0;
     for (unsigned i = 0; i < 100U * sizeof buffer; i++) {
         TEST_ASSERT_EQUAL_INT(IWN_LINE_NOTHING, iwn_receiver_put(&receiver, 'x', &line));
@@ -175,7 +176,7 @@ TEST(test_receiver_tells_one_long_line_once_and_recovers) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
 }
 
-TEST(test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_more) {
+TEST(test_receiver_accepts_a_line_of_its_buffer_size_at_most) {
     char room[26];
     unsigned verdicts = 0;
     iwn_receiver_init(&receiver, room, sizeof room, false);
@@ -184,7 +185,7 @@ TEST(test_receiver_takes_a_line_that_fills_its_buffer_and_not_one_byte_more) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_BIG, put("0 {\"cmd\":\"link\"}*e2d27f9b\n", &verdicts));
 }
 
-TEST(test_receiver_throws_away_a_line_of_which_bytes_were_lost) {
+TEST(test_receiver_drops_a_line_with_lost_bytes) {
     unsigned verdicts = 0;
     (void)put("0 {\"cmd\":", &verdicts);
     iwn_receiver_spoil(&receiver);
@@ -194,7 +195,7 @@ TEST(test_receiver_throws_away_a_line_of_which_bytes_were_lost) {
 
 static const char drive[] = "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2}";
 
-TEST(test_quote_stands_before_the_fields_and_comes_off_again) {
+TEST(test_quote_is_written_before_the_fields_and_removed_again) {
     const iwn_quote_t quote = {.boot = "0123456789abcdef", .seq = 7, .t_us = 1250000};
     char *json = bytes;
     iwn_quote_t taken;
@@ -208,7 +209,7 @@ TEST(test_quote_stands_before_the_fields_and_comes_off_again) {
     TEST_ASSERT_TRUE(taken.seq == 7U && taken.t_us == 1250000U);
 }
 
-TEST(test_quote_of_the_largest_numbers_needs_no_more_than_its_size) {
+TEST(test_quote_of_the_largest_numbers_fits_its_size) {
     const iwn_quote_t quote = {.boot = "ffffffffffffffff", .seq = UINT64_MAX, .t_us = UINT64_MAX};
     const size_t needed = sizeof drive - 1U + IWN_QUOTE_SIZE;
     char *json = bytes;
@@ -220,7 +221,7 @@ TEST(test_quote_of_the_largest_numbers_needs_no_more_than_its_size) {
     TEST_ASSERT_EQUAL_STRING_LEN(drive, json, length);
 }
 
-TEST(test_quote_in_another_spelling_is_none_and_changes_nothing) {
+TEST(test_quote_in_another_spelling_is_not_read) {
     static const char *const wrong[] = {
         "{\"cmd\":\"drive\"}",
         "{\"boot\":\"0123456789ABCDEF\",\"seq\":1,\"t_us\":1,\"cmd\":\"drive\"}",

@@ -49,7 +49,7 @@ static void expect_no_line(void) {
     TEST_ASSERT_NULL(sock_client_line(&client, &length));
 }
 
-/// Everything that the other side can read now.
+/// Reads all bytes that the other side can read now.
 static size_t drain(char *text, size_t size) {
     size_t total = 0;
     ssize_t count = 1;
@@ -61,7 +61,7 @@ static size_t drain(char *text, size_t size) {
     return total;
 }
 
-TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline) {
+TEST(test_client_bytes_become_a_line_only_at_the_newline) {
     const char *text = "{\"cmd\":\"stop\"}";
     for (const char *c = text; *c != '\0'; c++) {
         const char byte[2] = {*c, '\0'};
@@ -73,7 +73,7 @@ TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline) {
     expect_no_line();
 }
 
-TEST(test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits) {
+TEST(test_client_lines_of_one_read_are_in_order_and_a_part_waits) {
     say("one\n\ntwo\nhal");
     expect_line("one");
     expect_line("");
@@ -83,7 +83,7 @@ TEST(test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits) 
     expect_line("half");
 }
 
-TEST(test_client_half_a_line_at_the_end_is_never_a_line) {
+TEST(test_client_part_of_a_line_at_the_end_is_no_line) {
     say("stop");
     (void)shutdown(peer, SHUT_WR);
     sock_client_read(&client);
@@ -104,7 +104,7 @@ TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long) {
     TEST_ASSERT_TRUE(sock_client_line_too_long(&client));
 }
 
-TEST(test_client_reply_goes_out_whole) {
+TEST(test_client_reply_is_sent_completely) {
     char text[64] = "";
     sock_client_reply(&client, "hello\n", 6);
     TEST_ASSERT_FALSE(sock_client_flushed(&client));
@@ -113,9 +113,9 @@ TEST(test_client_reply_goes_out_whole) {
     TEST_ASSERT_TRUE(sock_client_flushed(&client));
 }
 
-TEST(test_client_that_does_not_read_loses_events_and_is_told_how_many) {
+TEST(test_client_that_does_not_read_gets_the_count_of_lost_events) {
     unsigned sent = 0;
-    while (client.lost < 5U) { // Socket full, then our half full.
+    while (client.lost < 5U) { // First the socket is full, then half of the buffer.
         sock_client_event(&client, big, 1000);
         sock_client_flush(&client);
         TEST_ASSERT_LESS_THAN_UINT(10000, sent++);
@@ -129,7 +129,7 @@ TEST(test_client_that_does_not_read_loses_events_and_is_told_how_many) {
     TEST_ASSERT_EQUAL_UINT32(0, client.lost);
 }
 
-TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events) {
+TEST(test_client_space_for_the_longest_reply_is_reserved) {
     while (client.lost == 0U) {
         sock_client_event(&client, big, 1000);
     }
@@ -139,16 +139,16 @@ TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events) {
     TEST_ASSERT_TRUE(sock_client_is_broken(&client));
 }
 
-TEST(test_client_event_to_one_that_is_leaving_is_dropped) {
+TEST(test_client_event_to_a_closing_client_is_dropped) {
     sock_client_finish(&client, 1000);
     sock_client_event(&client, "x\n", 2);
     TEST_ASSERT_TRUE(sock_client_flushed(&client));
     TEST_ASSERT_EQUAL_UINT64(1000U + SOCK_CLOSING_US, client.close_us);
-    sock_client_finish(&client, 5000); // Only the first time counts.
+    sock_client_finish(&client, 5000); // Only the first call sets the time.
     TEST_ASSERT_EQUAL_UINT64(1000U + SOCK_CLOSING_US, client.close_us);
 }
 
-TEST(test_client_gone_is_noticed_when_written_to) {
+TEST(test_client_disconnected_is_detected_at_a_write) {
     (void)close(peer);
     sock_client_reply(&client, "x\n", 2);
     sock_client_flush(&client);
@@ -156,7 +156,7 @@ TEST(test_client_gone_is_noticed_when_written_to) {
     peer = -1;
 }
 
-TEST(test_log_line_is_plain_whatever_stands_in_it) {
+TEST(test_log_line_has_no_control_characters) {
     char line[256] = "";
     int ends[2];
     sock_log_t log;
@@ -174,7 +174,7 @@ TEST(test_log_line_is_plain_whatever_stands_in_it) {
     TEST_ASSERT_EQUAL_STRING("iwheel-gateway: info: from ?[2J????\xC3\xA9\n", line);
 }
 
-TEST(test_client_request_right_after_calm_was_sent_now) {
+TEST(test_client_request_within_25_ms_of_caught_up_was_sent_now) {
     say("{}\n");
     client.caught_up_us = 1000000;
     TEST_ASSERT_EQUAL_UINT64(1025000, sock_client_sent_us(&client, 1025000, 0));
@@ -182,7 +182,7 @@ TEST(test_client_request_right_after_calm_was_sent_now) {
     TEST_ASSERT_EQUAL_UINT64(1000000, sock_client_sent_us(&client, 1000001, 1000001));
 }
 
-TEST(test_client_with_a_line_left_is_not_caught_up) {
+TEST(test_client_with_an_unread_line_is_not_caught_up) {
     say("{}\n{}\n");
     sock_client_note_caught_up(&client, 5);
     expect_line("{}");
@@ -193,13 +193,13 @@ TEST(test_client_with_a_line_left_is_not_caught_up) {
     TEST_ASSERT_EQUAL_UINT64(7, client.caught_up_us);
 }
 
-TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time) {
+TEST(test_client_caught_up_time_never_decreases) {
     sock_client_check_caught_up(&client, 9);
     sock_client_note_caught_up(&client, 8);
     TEST_ASSERT_EQUAL_UINT64(9, client.caught_up_us);
 }
 
-TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up) {
+TEST(test_client_with_bytes_in_its_socket_is_not_caught_up) {
     TEST_ASSERT_EQUAL_INT(3, (int)send(peer, "{}\n", 3, MSG_NOSIGNAL));
     sock_client_check_caught_up(&client, 5);
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
@@ -209,7 +209,7 @@ TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up) {
     TEST_ASSERT_EQUAL_UINT64(6, client.caught_up_us);
 }
 
-TEST(test_client_that_filled_the_buffer_is_not_caught_up) {
+TEST(test_client_with_a_full_buffer_is_not_caught_up) {
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
     }
@@ -218,7 +218,7 @@ TEST(test_client_that_filled_the_buffer_is_not_caught_up) {
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
 }
 
-TEST(test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended) {
+TEST(test_client_full_or_closing_is_not_read) {
     const size_t room = sizeof client.in;
     while (client.in_length < room) {
         const size_t part = (room - client.in_length < sizeof big) ? room - client.in_length : sizeof big;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One line of a client: what is a request, and what is refused as a whole, with which name.
+// One line of a client: which lines are requests, and which are refused completely, with which error name.
 
 #include "iwheel_northbound/request.h"
 
@@ -52,7 +52,7 @@ TEST(test_request_each_command_with_its_fields_is_accepted) {
     accepted(" \t{ \"cmd\" : \"why\" } \r", IWN_CMD_WHY);
 }
 
-TEST(test_request_drive_takes_numbers_as_sent) {
+TEST(test_request_drive_numbers_are_read_exactly) {
     accepted("{\"cmd\":\"drive\",\"left_mm_s\":-32768,\"right_mm_s\":4294967496,\"left_mA\":-7,\"right_mA\":8}",
              IWN_CMD_DRIVE);
     TEST_ASSERT_EQUAL_INT64(-32768, request.left_mm_s);
@@ -64,7 +64,7 @@ TEST(test_request_drive_takes_numbers_as_sent) {
     TEST_ASSERT_FALSE(request.has_current);
 }
 
-TEST(test_request_id_is_repeated_whatever_else_is_wrong) {
+TEST(test_request_id_is_read_from_valid_json_with_other_errors) {
     accepted("{\"id\":-9007199254740993,\"cmd\":\"why\"}", IWN_CMD_WHY);
     TEST_ASSERT_EQUAL_INT(IWN_ID_NUMBER, request.id.kind);
     TEST_ASSERT_EQUAL_INT64(-9007199254740993, request.id.number);
@@ -89,7 +89,7 @@ TEST(test_request_id_of_another_kind_is_refused) {
             "{\"id\":\"aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa\",\"cmd\":\"why\"}");
 }
 
-TEST(test_request_confirm_takes_an_item_and_a_value_as_text_or_integer) {
+TEST(test_request_confirm_accepts_item_value_and_how) {
     accepted("{\"cmd\":\"confirm\",\"item\":\"wheel_radius\",\"value\":192}", IWN_CMD_CONFIRM);
     TEST_ASSERT_EQUAL_INT(IW_ASSUMPTION_WHEEL_RADIUS, request.item);
     TEST_ASSERT_EQUAL_STRING("192", request.value);
@@ -166,7 +166,7 @@ TEST(test_request_nul_byte_anywhere_is_bad_json) {
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
 }
 
-TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest) {
+TEST(test_request_nesting_beyond_the_limit_is_bad_json) {
     char line[IWN_LINE_MAX];
     size_t length = (size_t)snprintf(line, sizeof line, "{\"cmd\":\"arm\",\"name\":");
     memset(&line[length], '[', 3000);
@@ -178,7 +178,7 @@ TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_
     accepted("{\"cmd\":\"arm\",\"name\":\"\\\"[[[[[[[[[[[[{{{{{{\"}", IWN_CMD_ARM);
 }
 
-TEST(test_request_line_of_4096_bytes_is_taken_and_one_more_is_not) {
+TEST(test_request_line_of_4096_bytes_is_the_longest) {
     char line[IWN_LINE_MAX + 1U];
     memset(line, ' ', sizeof line);
     memcpy(line, "{\"cmd\":\"why\"}", 13);
@@ -187,7 +187,7 @@ TEST(test_request_line_of_4096_bytes_is_taken_and_one_more_is_not) {
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, refusal.error);
 }
 
-TEST(test_request_worst_lines_are_read_to_their_end) {
+TEST(test_request_with_the_most_values_has_a_defined_refusal) {
     static const char *const units[] = {"{},", "[],", "\"\",", "1,", "1.5,", "{\"a\":1},", "[1],", "\"\\u20ac\","};
     char line[IWN_LINE_MAX];
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
@@ -233,7 +233,7 @@ TEST(test_request_missing_field_is_named) {
     refused(IWN_MISSING_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"right_mA\":5}");
 }
 
-/// The refusal of the line has this name and says this.
+/// The refusal of the line has this error and this text.
 static void refused_with(iwn_error_t error, const char *says, const char *line) {
     refused(error, line);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, says), refusal.message);
@@ -271,7 +271,7 @@ TEST(test_request_command_must_be_a_known_text) {
     refused(IWN_BAD_VALUE, "{\"cmd\":null}");
 }
 
-TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all) {
+TEST(test_request_watch_topics_become_bits_unknown_is_refused) {
     accepted("{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\",\"state\"],\"rate_hz\":25}", IWN_CMD_WATCH);
     TEST_ASSERT_EQUAL_HEX8((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FRAME), request.topics);
     TEST_ASSERT_EQUAL_INT64(25, request.rate_hz);
@@ -312,7 +312,7 @@ TEST(test_request_texts_have_a_length_and_no_control_characters) {
     refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"takeover\":null}");
 }
 
-TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling) {
+TEST(test_request_texts_with_terminal_controls_are_refused) {
     static const char *const forms[] = {
         "{\"cmd\":\"arm\",\"name\":\"a%sb\"}",
         "{\"cmd\":\"estop\",\"reason\":\"a%sb\"}",
@@ -356,7 +356,7 @@ TEST(test_request_config_reads_stages_or_commits) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"config\",\"item\":\"track\"}");
 }
 
-TEST(test_request_time_and_stop_are_taken_as_sent) {
+TEST(test_request_time_and_stop_are_read_exactly) {
     accepted("{\"cmd\":\"arm\",\"t_us\":9223372036854775807}", IWN_CMD_ARM);
     TEST_ASSERT_TRUE(request.has_t_us);
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, request.t_us);
@@ -380,7 +380,7 @@ TEST(test_request_time_and_stop_are_taken_as_sent) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"t_us\":7}");
 }
 
-TEST(test_request_drive_takes_a_key_of_32_bytes) {
+TEST(test_request_drive_accepts_a_key_of_at_most_32_bytes) {
     accepted("{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":\"0123456789abcdef0123456789abcdef\"}",
              IWN_CMD_DRIVE);
     TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", request.lease_key);
@@ -396,7 +396,7 @@ TEST(test_request_drive_takes_a_key_of_32_bytes) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"key\":\"0\"}");
 }
 
-TEST(test_request_tare_takes_a_side_or_both) {
+TEST(test_request_tare_accepts_a_side_or_none) {
     accepted("{\"cmd\":\"tare\"}", IWN_CMD_TARE);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, request.sides);
     accepted("{\"cmd\":\"tare\",\"side\":\"left\"}", IWN_CMD_TARE);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is said of the wheels where there is no daemon: a machine without a clock of the day, without names of processes.
+// Replies and events of a machine without a daemon: it has no time of day and no process names.
 #include "gateway_rig.h"
 #include "unit.h"
 
@@ -36,7 +36,7 @@ static void assert_says(const char *words) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, words), words);
 }
 
-/// Closes the object: it is one, and it fits.
+/// Closes the object, which must be valid and fit.
 static void finish(void) {
     iwn_out_close(&json, '}');
     TEST_ASSERT_GREATER_THAN_size_t(0, iwn_out_finish(&json));
@@ -49,16 +49,16 @@ static void status(void) {
     finish();
 }
 
-TEST(test_status_of_a_machine_without_a_clock_of_the_day_says_null) {
+TEST(test_status_without_a_time_of_day_has_null) {
     status();
     assert_says("\"wall_us\":null");
     assert_says("\"version\":\"1.2.3\"");
-    assert_says("\"sample_point_permille\":null"); // Not reported is not 0.
+    assert_says("\"sample_point_permille\":null"); // A value that is not reported is null, not 0.
     assert_says("\"load_permille\":null");
     assert_says("\"warnings\":[]");
 }
 
-TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it) {
+TEST(test_status_before_telemetry_of_a_wheel_has_null_values) {
     status();
     assert_says("\"left\":{\"heard\":false,\"at_rest\":null,\"speed_rpm\":null,\"speed_mm_s\":null");
     assert_says("\"battery_dV\":null");
@@ -66,7 +66,7 @@ TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it) {
     assert_says("\"offset_age_ms\":null");
 }
 
-TEST(test_holder_without_name_or_process_is_told_by_its_number) {
+TEST(test_status_holder_without_name_or_process_has_its_number) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     around.holder = (iwn_holder_t){.client = HOLDER};
@@ -76,7 +76,7 @@ TEST(test_holder_without_name_or_process_is_told_by_its_number) {
     assert_says("\"commanded_mm_s\":300");
 }
 
-TEST(test_estop_tells_its_second_contact_only_if_it_has_one) {
+TEST(test_status_estop_has_its_second_contact_only_if_configured) {
     status();
     assert_says("\"estop\":{\"line\":\"PA0\",\"state\":\"released\",\"simulated\":false");
     around.estop.line2 = "PA1";
@@ -87,7 +87,7 @@ TEST(test_estop_tells_its_second_contact_only_if_it_has_one) {
     around.estop = (iwn_estop_t){.line = "PA0", .present = true};
 }
 
-TEST(test_warnings_are_told_in_their_order) {
+TEST(test_status_warnings_are_in_order) {
     around.warning[0] = "one";
     around.warning[1] = "two";
     around.warnings = 2;
@@ -95,7 +95,7 @@ TEST(test_warnings_are_told_in_their_order) {
     assert_says("\"warnings\":[\"one\",\"two\"]");
 }
 
-TEST(test_stop_without_a_clock_of_the_day_has_its_age) {
+TEST(test_stop_without_a_time_of_day_has_its_age) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
     gateway_rig_press(&rig, true);
@@ -109,7 +109,7 @@ TEST(test_stop_without_a_clock_of_the_day_has_its_age) {
     assert_says("\"age_ms\":499");
 }
 
-TEST(test_stop_that_never_was_has_nothing_but_its_number) {
+TEST(test_stop_that_never_happened_has_only_its_number) {
     const iwn_stop_note_t none = {.wall_us = IWN_WALL_UNKNOWN};
     iwn_tell_stop(&none, rig.now_us, &json);
     finish();
@@ -117,7 +117,7 @@ TEST(test_stop_that_never_was_has_nothing_but_its_number) {
     assert_says("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
 }
 
-TEST(test_lease_tells_whether_it_was_gained_moved_or_lost) {
+TEST(test_lease_event_has_gained_moved_or_lost) {
     const struct {
         iw_client_t holder;
         iw_client_t former;
@@ -134,7 +134,7 @@ TEST(test_lease_tells_whether_it_was_gained_moved_or_lost) {
     }
 }
 
-TEST(test_reply_that_does_not_fit_is_none) {
+TEST(test_reply_that_does_not_fit_is_empty) {
     const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 5};
     const iwn_refusal_t refusal = {.error = IWN_BUSY, .message = "somebody else drives"};
     char line[128];

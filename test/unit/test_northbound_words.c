@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The words of the protocol: the sentence of `why`, the names of the closed lists, and texts put together without stdio.
+// Strings of the protocol: the sentence of `why`, the names of the closed lists, and texts that are built without
+// stdio.
 #include "iwheel_northbound/refuse.h"
 #include "iwheel_northbound/text.h"
 #include "iwheel_northbound/why.h"
@@ -28,7 +29,7 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
     return text;
 }
 
-TEST(test_why_names_cause_numbers_time_and_cure) {
+TEST(test_why_names_cause_numbers_time_and_fix) {
     TEST_ASSERT_EQUAL_STRING(
         "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
         "check the wheel's power and cable, then: iwheelctl reset",
@@ -48,7 +49,7 @@ TEST(test_why_names_cause_numbers_time_and_cure) {
                                 "left wheel does not follow its command: the machine left its path by 61 mm"));
 }
 
-TEST(test_why_says_of_each_stop_whether_it_ramped) {
+TEST(test_why_reports_for_each_stop_whether_it_ramped) {
     iw_stop_t stop;
     char text[IWN_SENTENCE_SIZE];
     memset(&stop, 0, sizeof stop);
@@ -67,7 +68,7 @@ TEST(test_why_says_of_each_stop_whether_it_ramped) {
     TEST_ASSERT_NOT_NULL(strstr(text, "; zero at once at"));
 }
 
-TEST(test_why_after_a_crash_does_not_say_what_nobody_knows) {
+TEST(test_why_after_a_crash_has_no_unknown_values) {
     iw_stop_t stop;
     char text[IWN_SENTENCE_SIZE];
     memset(&stop, 0, sizeof stop);
@@ -93,7 +94,7 @@ TEST(test_why_has_a_sentence_and_a_name_for_every_cause) {
     TEST_ASSERT_EQUAL_STRING("unknown", iwn_cause_name((iw_cause_t)IW_CAUSES));
 }
 
-TEST(test_why_without_a_stop_says_so) {
+TEST(test_why_without_a_stop_reports_no_stop) {
     char text[IWN_SENTENCE_SIZE];
     iw_stop_t stop;
     memset(&stop, 0, sizeof stop);
@@ -137,7 +138,7 @@ TEST(test_why_shows_three_decimals_of_any_time) {
     }
 }
 
-TEST(test_why_that_does_not_fit_is_cut_and_ends) {
+TEST(test_why_that_does_not_fit_is_cut_and_terminated) {
     char text[24];
     const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_CLIENT_STOP};
     memset(text, 'x', sizeof text);
@@ -146,7 +147,7 @@ TEST(test_why_that_does_not_fit_is_cut_and_ends) {
     TEST_ASSERT_EQUAL_HEX8('x', text[20]);
 }
 
-TEST(test_text_is_put_together_and_ends_at_any_size) {
+TEST(test_text_is_built_and_terminated_at_any_size) {
     char buffer[16];
     for (size_t size = 1; size < sizeof buffer; size++) {
         memset(buffer, 'x', sizeof buffer);
@@ -162,7 +163,7 @@ TEST(test_text_is_put_together_and_ends_at_any_size) {
     }
 }
 
-TEST(test_text_of_every_code_point_reads_as_it_was_written) {
+TEST(test_text_of_any_code_point_is_read_back_unchanged) {
     for (uint32_t code_point = 1; code_point <= 0x10FFFFU; code_point++) {
         char bytes[5] = "";
         size_t read;
@@ -175,7 +176,8 @@ TEST(test_text_of_every_code_point_reads_as_it_was_written) {
     }
 }
 
-// ---- refusals ---------------------------------------------------------------------------------------------------------
+// ---- refusals
+// ---------------------------------------------------------------------------------------------------------
 
 static iw_codec_wheel_t told[IW_SIDES];
 static iw_config_t config = {.rest_rpm = 2, .rest_ms = 200};
@@ -194,7 +196,7 @@ static const char *not_at_rest(void) {
     return refusal.message;
 }
 
-TEST(test_refusal_right_after_the_last_turn_names_the_time_and_no_zeros) {
+TEST(test_refusal_at_standstill_names_the_time_and_no_speeds) {
     static const char turning[] = "the wheels turn or are told to: left ";
     TEST_ASSERT_EQUAL_STRING("the wheels are not at standstill for 200 ms yet; wait, then try again", not_at_rest());
     for (unsigned side = 0; side < IW_SIDES; side++) {

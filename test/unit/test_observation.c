@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What wheels tell by their motion, frame by frame: looks at snapshots made by hand, up to and beyond every limit.
+// Conclusions from the motion of the wheels, frame by frame: the tests build snapshots up to and beyond every limit.
 #include "fixture.h"
 #include "iwheel/gateway.h"
 #include "iwheel/observation.h"
@@ -8,12 +8,12 @@
 
 #include <string.h>
 
-/// 100 frames of 100 rpm, the longest that is no gap between them, are 1000 ticks: ticks moved are permille.
+/// 100 frames of 100 rpm with the longest interval that is no gap are 1000 ticks, so moved ticks are permille.
 #define RPM      100
 #define FRAMES   100U
 #define FRAME_US ((iw_time_us_t)IW_OBSERVATION_GAP_US)
 #define POSE_US  ((iw_time_us_t)2 * IW_OBSERVATION_GAP_US)
-/// The ratio in the middle of nowhere: neither fits nor fails.
+/// Ratio between the limits: it neither fits nor fails.
 #define BETWEEN 1200
 #define MISS    2000
 
@@ -81,7 +81,7 @@ static void begin_stretch(int16_t rpm) {
     status_of(IW_LEFT, 0);
 }
 
-/// Of 1000 ticks as the rpm say, and ends with a status frame.
+/// One stretch of 1000 ticks by the rpm; it ends with a status frame.
 static void stretch(int64_t moved) {
     speeds(RPM, FRAMES);
     status_of(IW_LEFT, moved);
@@ -104,7 +104,7 @@ static void assert_after_misses(int64_t moved, iw_assumption_state_t state, int3
     assert_ratio(state, figure);
 }
 
-TEST(test_evidence_a_ratio_within_twelve_percent_fits) {
+TEST(test_observation_ratio_within_12_percent_fits) {
     assert_after_one(1000, IW_CONFIRMED);
     assert_after_one(1120, IW_CONFIRMED);
     assert_after_one(880, IW_CONFIRMED);
@@ -112,7 +112,7 @@ TEST(test_evidence_a_ratio_within_twelve_percent_fits) {
     assert_after_one(879, IW_ASSUMED);
 }
 
-TEST(test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stretches) {
+TEST(test_observation_ratio_off_by_25_percent_fails_after_3_times) {
     assert_after_misses(1250, IW_ASSUMED, 0);
     assert_after_misses(750, IW_ASSUMED, 0);
     assert_after_misses(1251, IW_CONTRADICTED, 1251);
@@ -120,7 +120,7 @@ TEST(test_evidence_a_ratio_more_than_a_quarter_off_fails_after_three_stretches) 
     assert_after_misses(-1000, IW_CONTRADICTED, -1000);
 }
 
-TEST(test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest) {
+TEST(test_observation_ratio_beyond_the_range_is_the_maximum) {
     assert_after_misses(INT32_MAX / 2 + 1000, IW_CONTRADICTED, INT32_MAX / 2 + 1000);
     assert_after_misses(INT32_MAX / 2 + 1001, IW_CONTRADICTED, INT32_MAX);
     assert_after_misses(-(INT32_MAX / 2) + 1000, IW_CONTRADICTED, -(INT32_MAX / 2) + 1000);
@@ -128,7 +128,7 @@ TEST(test_evidence_a_ratio_beyond_any_figure_is_told_as_the_largest) {
     assert_after_misses(100000000000, IW_CONTRADICTED, INT32_MAX);
 }
 
-TEST(test_evidence_a_ratio_between_counts_neither_for_nor_against) {
+TEST(test_observation_ratio_between_the_limits_does_not_count) {
     begin_stretch(RPM);
     stretch(MISS);
     stretch(BETWEEN);
@@ -138,7 +138,7 @@ TEST(test_evidence_a_ratio_between_counts_neither_for_nor_against) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-TEST(test_evidence_a_fit_between_misses_begins_their_count_anew) {
+TEST(test_observation_fit_between_misses_restarts_their_count) {
     begin_stretch(RPM);
     stretch(MISS);
     stretch(MISS);
@@ -150,7 +150,7 @@ TEST(test_evidence_a_fit_between_misses_begins_their_count_anew) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-TEST(test_evidence_a_verdict_keeps_its_figure) {
+TEST(test_observation_verdict_retains_its_first_figure) {
     begin_stretch(RPM);
     stretch(1000);
     stretch(1010);
@@ -160,26 +160,26 @@ TEST(test_evidence_a_verdict_keeps_its_figure) {
     assert_ratio(IW_CONTRADICTED, MISS);
 }
 
-TEST(test_evidence_backwards_the_ticks_must_fall) {
+TEST(test_observation_ticks_must_fall_when_driving_backwards) {
     begin_stretch(-RPM);
     speeds(-RPM, FRAMES);
     status_of(IW_LEFT, -1050);
     assert_ratio(IW_CONFIRMED, 1050);
 }
 
-TEST(test_evidence_a_stretch_is_one_whole_rotor_turn_at_least) {
+TEST(test_observation_stretch_is_at_least_one_rotor_turn) {
     begin_stretch(10);
     speeds(10, 59);
     speed_of(IW_LEFT, 10, FRAME_US - 2U);
     speed_of(IW_LEFT, 28, 1U);
-    status_of(IW_LEFT, 60); // One millionth is missing.
+    status_of(IW_LEFT, 60); // One millionth of a tick is missing.
     assert_ratio(IW_ASSUMED, 0);
     speed_of(IW_LEFT, 28, 1U);
     status_of(IW_LEFT, 0);
     assert_ratio(IW_CONFIRMED, 1000);
 }
 
-TEST(test_evidence_turns_between_two_frames_are_their_mean) {
+TEST(test_observation_turns_between_two_frames_are_their_mean) {
     begin_stretch(RPM);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 3 * RPM : RPM, FRAME_US);
@@ -198,12 +198,12 @@ static void assert_with_gear(uint16_t turns, uint16_t per, bool of_rotor, int64_
     assert_ratio(IW_CONFIRMED, 1000);
 }
 
-TEST(test_evidence_rpm_of_the_wheel_count_with_the_gear_those_of_the_rotor_without) {
+TEST(test_observation_gear_applies_to_wheel_rpm_not_to_rotor_rpm) {
     assert_with_gear(5, 2, false, 2500);
     assert_with_gear(5, 2, true, 1000);
 }
 
-TEST(test_evidence_each_wheel_has_its_own_stretch) {
+TEST(test_observation_each_wheel_has_its_own_stretch) {
     begin_stretch(RPM);
     speed_of(IW_RIGHT, RPM, 1000);
     status_of(IW_RIGHT, 0);
@@ -236,7 +236,7 @@ static void reboot_untold(void) {
     seen.wheel[IW_LEFT].status_us = IW_NEVER;
 }
 
-/// Neither the whole stretch nor what comes behind the break is judged; the next one is.
+/// Neither the whole stretch nor the part after the break is judged; the next stretch is.
 static void assert_breaks(void (*event)(void)) {
     for (int64_t moved = 500; moved <= 1000; moved += 500) {
         begin_at(FIXTURE_START_US);
@@ -251,7 +251,7 @@ static void assert_breaks(void (*event)(void)) {
     }
 }
 
-TEST(test_evidence_a_break_begins_the_stretch_anew) {
+TEST(test_observation_break_restarts_the_stretch) {
     assert_breaks(gap);
     assert_breaks(slow_frame);
     assert_breaks(turn_back);
@@ -259,7 +259,7 @@ TEST(test_evidence_a_break_begins_the_stretch_anew) {
     assert_breaks(reboot_untold);
 }
 
-TEST(test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_nothing) {
+TEST(test_observation_reboot_in_the_status_frame_judges_nothing) {
     begin_stretch(RPM);
     speeds(RPM, FRAMES);
     reboot();
@@ -267,7 +267,7 @@ TEST(test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_nothing)
     assert_ratio(IW_ASSUMED, 0);
 }
 
-TEST(test_evidence_wheels_below_ten_rpm_say_nothing) {
+TEST(test_observation_wheel_below_10_rpm_gives_no_ratio) {
     begin_stretch(9);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 11 : 9, FRAME_US);
@@ -276,7 +276,7 @@ TEST(test_evidence_wheels_below_ten_rpm_say_nothing) {
     assert_ratio(IW_ASSUMED, 0);
 }
 
-TEST(test_evidence_looking_again_adds_nothing) {
+TEST(test_observation_same_snapshot_again_adds_nothing) {
     begin_stretch(12);
     for (unsigned i = 0; i < FRAMES; i++) {
         speed_of(IW_LEFT, (i % 2U == 0U) ? 9 : 12, FRAME_US);
@@ -296,7 +296,7 @@ static void assert_endless(int64_t turned, iw_assumption_state_t state) {
     TEST_ASSERT_EQUAL_INT(state, seen.assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
-TEST(test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begins_anew) {
+TEST(test_observation_stretch_without_status_ends_at_100000_ticks) {
     assert_endless(IW_OBSERVATION_TURNED_MAX, IW_CONFIRMED);
     assert_endless(IW_OBSERVATION_TURNED_MAX + 1, IW_ASSUMED);
     stretch(1000);
@@ -321,7 +321,7 @@ static void assert_type(iw_assumption_state_t state, int32_t figure) {
 }
 
 static void assert_drive(int16_t applied_mm_s, int32_t measured_mm_s, bool confirms) {
-    config.setpoint_type_set = false; // Else the configuration is already named as what it comes from.
+    config.setpoint_type_set = false; // Otherwise the configuration is already stored as the source.
     begin_at(FIXTURE_START_US);
     drive_side(IW_LEFT, applied_mm_s, measured_mm_s, IW_OBSERVATION_TYPE_US);
     if (confirms) {
@@ -331,7 +331,7 @@ static void assert_drive(int16_t applied_mm_s, int32_t measured_mm_s, bool confi
     }
 }
 
-TEST(test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told) {
+TEST(test_observation_speed_within_15_percent_and_1_rpm_matches) {
     assert_drive(1000, 1171, true);
     assert_drive(1000, 1172, false);
     assert_drive(1000, 829, true);
@@ -341,7 +341,7 @@ TEST(test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told) {
     assert_drive(-1000, 1000, false);
 }
 
-TEST(test_evidence_one_rpm_is_that_of_the_wheels_radius) {
+TEST(test_observation_one_rpm_depends_on_the_wheel_radius) {
     assert_drive(1000, 1172, false);
     seen.wheel[IW_LEFT].um_s_per_rpm = 21000;
     look();
@@ -350,7 +350,7 @@ TEST(test_evidence_one_rpm_is_that_of_the_wheels_radius) {
     assert_type(IW_CONFIRMED, 1172);
 }
 
-TEST(test_evidence_a_wheel_told_less_than_150_mm_s_says_nothing_of_the_type) {
+TEST(test_observation_command_below_150_mm_s_gives_no_type) {
     assert_drive(150, 150, true);
     assert_drive(-150, -150, true);
     assert_drive(149, 149, false);
@@ -367,12 +367,12 @@ static void assert_not_before_a_second(iw_side_t side) {
     assert_type(IW_CONFIRMED, 1050);
 }
 
-TEST(test_evidence_either_wheel_confirms_the_type_after_a_second) {
+TEST(test_observation_either_wheel_confirms_the_type_after_1_s) {
     assert_not_before_a_second(IW_LEFT);
     assert_not_before_a_second(IW_RIGHT);
 }
 
-TEST(test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type) {
+TEST(test_observation_type_needs_armed_state_and_telemetry) {
     assert_drive(200, 300, false);
     seen.wheel[IW_LEFT].speed_mm_s = 200;
     seen.state = IW_STATE_STOPPING;
@@ -388,7 +388,7 @@ TEST(test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type) {
     assert_type(IW_ASSUMED, 0);
 }
 
-TEST(test_evidence_another_speed_told_begins_the_second_anew) {
+TEST(test_observation_new_command_restarts_the_second) {
     config.setpoint_type_set = false;
     begin_at(FIXTURE_START_US);
     for (int16_t mm_s = 200; mm_s < 300; mm_s = (int16_t)(mm_s + 10)) {
@@ -406,7 +406,7 @@ static void pose(int x_mm, int y_mm, int psi_mrad, iw_time_us_t after_us) {
     look();
 }
 
-/// Steps from the origin, of 1, 2 and 3 times that.
+/// Poses from the origin in steps of `step`, 2 * `step` and 3 * `step`.
 static void walk(int step, int from, int to) {
     for (int i = from; i <= to; i++) {
         pose(step * i, step * 2 * i, step * 3 * i, POSE_US);
@@ -417,21 +417,21 @@ static void assert_pose(iw_assumption_state_t state, int32_t figure) {
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, state, figure);
 }
 
-TEST(test_evidence_a_pose_in_small_steps_is_the_right_way_round) {
+TEST(test_observation_pose_in_small_steps_confirms_byte_order) {
     walk(1, 0, 24);
     assert_pose(IW_ASSUMED, 0);
     walk(1, 25, 25);
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-TEST(test_evidence_a_pose_in_large_steps_is_the_wrong_way_round) {
+TEST(test_observation_pose_in_large_steps_contradicts_byte_order) {
     walk(256, 0, 24);
     assert_pose(IW_ASSUMED, 0);
     walk(256, 25, 25);
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-TEST(test_evidence_a_pose_that_says_neither_leaves_nothing_behind) {
+TEST(test_observation_undecided_pose_restarts_the_sums) {
     walk(257, 0, 25);
     for (int i = 1; i <= 25; i++) {
         assert_pose(IW_ASSUMED, 0);
@@ -440,7 +440,7 @@ TEST(test_evidence_a_pose_that_says_neither_leaves_nothing_behind) {
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-TEST(test_evidence_after_a_verdict_the_pose_is_looked_at_anew) {
+TEST(test_observation_pose_is_judged_again_after_a_verdict) {
     walk(1, 0, 25);
     for (int i = 1; i <= 25; i++) {
         assert_pose(IW_CONFIRMED, 256000);
@@ -449,29 +449,30 @@ TEST(test_evidence_after_a_verdict_the_pose_is_looked_at_anew) {
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-/// 25 steps to and fro whose sums are exactly 8192 and 65536: `low` and `lower` are 248 and 249, or both read the other way.
+/// 25 steps to and fro whose sums are exactly 8192 and 65536: `low` and `lower` are 248 and 249, or both with swapped
+/// bytes.
 static void shuttle(int low, int lower) {
     for (int i = 0; i <= 25; i++) {
         pose(i % 2 * low, (i <= 8) ? i % 2 * lower : 0, 0, POSE_US);
     }
 }
 
-TEST(test_evidence_of_the_pose_must_be_eightfold) {
+TEST(test_observation_pose_sums_must_differ_by_a_factor_of_8) {
     shuttle(248, 249);
     assert_pose(IW_CONFIRMED, 8000);
-    seen.at_us += 1U; // A gap: the way back is no step.
+    seen.at_us += 1U; // After this gap the way back is no step.
     shuttle(-2048, -1792);
     assert_pose(IW_CONTRADICTED, 125);
 }
 
-TEST(test_evidence_a_pose_wraps_the_shorter_way) {
+TEST(test_observation_pose_wraps_in_the_shorter_direction) {
     for (int i = 0; i <= 25; i++) {
         pose(32767 - 10 + i, 0, 0, POSE_US);
     }
     TEST_ASSERT_EQUAL_INT(IW_CONFIRMED, seen.assumed[IW_ASSUMPTION_POSE_BYTE_ORDER].state);
 }
 
-TEST(test_evidence_a_pose_that_stands_still_is_no_step) {
+TEST(test_observation_unchanged_pose_is_no_step) {
     walk(1, 0, 24);
     pose(24, 48, 72, POSE_US);
     look();
@@ -480,7 +481,7 @@ TEST(test_evidence_a_pose_that_stands_still_is_no_step) {
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-TEST(test_evidence_a_pose_after_a_gap_is_no_step) {
+TEST(test_observation_pose_after_a_gap_is_no_step) {
     walk(1, 0, 24);
     pose(25, 50, 75, POSE_US + 1U);
     assert_pose(IW_ASSUMED, 0);
@@ -488,14 +489,14 @@ TEST(test_evidence_a_pose_after_a_gap_is_no_step) {
     assert_pose(IW_CONFIRMED, 256000);
 }
 
-TEST(test_evidence_the_first_pose_is_no_step_even_right_after_the_clock_began) {
+TEST(test_observation_first_pose_at_clock_zero_is_no_step) {
     begin_at(0);
     pose(1, 0, 0, 100U);
     walk(1, 2, 25);
     assert_pose(IW_ASSUMED, 0);
 }
 
-TEST(test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps) {
+TEST(test_observation_jumping_pose_is_judged_after_11_steps) {
     for (int i = 0; i <= 10; i++) {
         pose(i % 2 * INT16_MIN, i % 2 * INT16_MIN, i % 2 * INT16_MIN, POSE_US);
         assert_pose(IW_ASSUMED, 0);
@@ -504,7 +505,7 @@ TEST(test_evidence_a_pose_that_jumps_is_judged_after_fewer_steps) {
     assert_pose(IW_CONTRADICTED, 3);
 }
 
-TEST(test_evidence_of_the_pose_may_add_up_to_its_limit) {
+TEST(test_observation_pose_is_judged_at_the_limit_of_its_sum) {
     pose(0, 0, 0, POSE_US);
     observation.moved = IW_OBSERVATION_POSE_FAR - 257;
     pose(1, 0, 0, POSE_US);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the wheels' own motion tells: the core and the simulated pair in virtual time, with wheels that are not as assumed.
+// Conclusions from the motion of wheels: the core with the simulated pair in virtual time, and wheels that differ from
+// the assumptions.
 #include "world_rig.h"
 
 #include "unit.h"
@@ -23,14 +24,14 @@ static int32_t figure(iw_assumption_item_t item) {
     return iw_assumption_entry(&rig.gateway.assumptions, item)->figure;
 }
 
-TEST(test_evidence_wheels_at_rest_say_nothing_of_ratio_pose_or_type) {
+TEST(test_observation_wheels_at_standstill_judge_no_assumption) {
     world_rig_run(&rig, 60000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-TEST(test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs) {
+TEST(test_observation_wheels_driving_confirm_ratio_pose_and_type) {
     world_rig_drive(&rig, 400, -400, 6000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
     TEST_ASSERT_INT32_WITHIN(60, 1000, figure(IW_ASSUMPTION_GEAR_RATIO));
@@ -44,7 +45,7 @@ TEST(test_evidence_wheels_driving_confirms_ratio_pose_type_and_signs) {
     assert_entry(IW_ASSUMPTION_CURRENT_ROLE, IW_ASSUMED);
 }
 
-TEST(test_evidence_wheels_from_crawling_wheels_is_not_taken) {
+TEST(test_observation_wheels_at_120_mm_s_confirm_no_ratio_or_type) {
     world_rig_drive(&rig, 120, 120, 20000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_ASSUMED);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
@@ -57,14 +58,14 @@ static void set_gear(uint16_t turns, bool rpm_of_rotor) {
     }
 }
 
-TEST(test_evidence_wheels_another_gear_than_configured_contradicts_the_ratio) {
+TEST(test_observation_wheels_with_another_gear_contradict_ratio) {
     set_gear(3, false);
     world_rig_drive(&rig, 300, 300, 16000);
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONTRADICTED);
     TEST_ASSERT_INT32_WITHIN(200, 3000, figure(IW_ASSUMPTION_GEAR_RATIO));
 }
 
-TEST(test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are) {
+TEST(test_observation_wheels_confirm_gear_of_rotor_or_wheel_rpm) {
     rig.config.gear_turns = 3;
     world_rig_begin(&rig, 0);
     set_gear(3, false);
@@ -77,7 +78,7 @@ TEST(test_evidence_wheels_the_right_gear_is_confirmed_whosever_the_rpm_are) {
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
 }
 
-TEST(test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio) {
+TEST(test_observation_wheels_rotor_rpm_as_wheel_rpm_contradicts) {
     rig.config.gear_turns = 2;
     rig.config.follow_mm_s = 500;
     world_rig_begin(&rig, 0);
@@ -87,7 +88,7 @@ TEST(test_evidence_wheels_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_r
     TEST_ASSERT_INT32_WITHIN(60, 500, figure(IW_ASSUMPTION_GEAR_RATIO));
 }
 
-TEST(test_evidence_wheels_one_odd_stretch_contradicts_no_ratio) {
+TEST(test_observation_wheels_one_bad_stretch_changes_no_verdict) {
     world_rig_drive(&rig, 400, 400, 4000);
     const iw_assumption_entry_t before = *iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO);
     rig.gateway.wheel[IW_LEFT].ticks += 70;
@@ -95,7 +96,7 @@ TEST(test_evidence_wheels_one_odd_stretch_contradicts_no_ratio) {
     TEST_ASSERT_EQUAL_INT(before.state, iw_assumption_entry(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO)->state);
 }
 
-TEST(test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio) {
+TEST(test_observation_wheels_isolated_bad_stretches_confirm_ratio) {
     for (unsigned times = 0; times < 5U; times++) {
         rig.gateway.wheel[IW_LEFT].ticks += 70;
         world_rig_drive(&rig, 400, 400, 12000);
@@ -103,7 +104,7 @@ TEST(test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_ratio) {
     assert_entry(IW_ASSUMPTION_GEAR_RATIO, IW_CONFIRMED);
 }
 
-TEST(test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing) {
+TEST(test_observation_wheels_changing_speeds_do_not_confirm_type) {
     world_rig_drive(&rig, 300, 300, 100);
     for (unsigned times = 0; times < 40U; times++) {
         const int32_t mm_s = (times % 2U == 0U) ? 330 : 300;
@@ -112,7 +113,7 @@ TEST(test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing) 
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-TEST(test_evidence_wheels_a_reboot_or_a_gap_begins_anew) {
+TEST(test_observation_wheels_reboot_or_gap_contradicts_no_ratio) {
     world_rig_drive(&rig, 400, 400, 3000);
     for (unsigned times = 0; times < 4U; times++) {
         sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
@@ -129,14 +130,14 @@ TEST(test_evidence_wheels_a_reboot_or_a_gap_begins_anew) {
     TEST_ASSERT_EQUAL_UINT32(4, rig.gateway.wheel[IW_LEFT].reboots);
 }
 
-TEST(test_evidence_wheels_a_pose_the_other_way_round_contradicts_its_byte_order) {
+TEST(test_observation_wheels_reversed_pose_contradicts_byte_order) {
     rig.world.pair.pose_reversed = true;
     world_rig_drive(&rig, 300, 350, 4000);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONTRADICTED);
     TEST_ASSERT_LESS_THAN_INT32(200, figure(IW_ASSUMPTION_POSE_BYTE_ORDER));
 }
 
-TEST(test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing) {
+TEST(test_observation_wheels_pose_that_jumps_once_stays_confirmed) {
     world_rig_drive(&rig, 300, 350, 2000);
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
     sim_world_reboot(&rig.world, rig.now_us, IW_RIGHT);
@@ -144,14 +145,14 @@ TEST(test_evidence_wheels_a_pose_that_jumps_once_contradicts_nothing) {
     assert_entry(IW_ASSUMPTION_POSE_BYTE_ORDER, IW_CONFIRMED);
 }
 
-TEST(test_evidence_wheels_a_type_that_the_wheels_do_not_obey_is_not_confirmed) {
+TEST(test_observation_wheels_blocked_do_not_confirm_the_type) {
     rig.world.pair.wheel[IW_LEFT].motion.blocked = true;
     rig.world.pair.wheel[IW_RIGHT].motion.blocked = true;
     world_rig_drive(&rig, 300, 300, 4000);
     assert_entry(IW_ASSUMPTION_SETPOINT_TYPE, IW_ASSUMED);
 }
 
-TEST(test_evidence_wheels_the_operators_word_is_not_replaced_by_a_fit) {
+TEST(test_observation_wheels_do_not_replace_the_operator_source) {
     iw_assumption_confirm(&rig.gateway.assumptions, IW_ASSUMPTION_GEAR_RATIO, IW_SOURCE_OPERATOR, 0);
     iw_assumption_contradict(&rig.gateway.assumptions, IW_ASSUMPTION_POSE_BYTE_ORDER, IW_SOURCE_OPERATOR, 0);
     world_rig_drive(&rig, 400, 400, 5000);

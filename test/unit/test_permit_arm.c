@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who is armed, and who is refused with which reason?
+// Which client is armed, and which client is refused for which reason.
 #include "permit_rig.h"
 #include "unit.h"
 
@@ -20,7 +20,7 @@ static void assert_arm_refused(iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-TEST(test_permit_begins_listening_in_silence) {
+TEST(test_permit_starts_listening_and_sends_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
@@ -30,7 +30,7 @@ TEST(test_permit_begins_listening_in_silence) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_time_that_begins_at_zero_reminds_of_nothing) {
+TEST(test_permit_arm_at_clock_zero_has_no_earlier_event) {
     rig.now_us = 0;
     iw_permit_init(&rig.permit, &rig.config, 0, false);
     permit_rig_step(&rig);
@@ -38,7 +38,7 @@ TEST(test_permit_time_that_begins_at_zero_reminds_of_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-TEST(test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven) {
+TEST(test_permit_arm_sends_zeros_and_is_armed_after_their_echoes) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -53,7 +53,7 @@ TEST(test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-TEST(test_permit_arm_does_not_need_an_operator_to_have_reset_anything) {
+TEST(test_permit_arm_after_a_reset_without_a_latch_is_accepted) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
@@ -72,7 +72,7 @@ TEST(test_permit_arm_without_echo_in_time_is_send_stalled) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not) {
+TEST(test_permit_arm_must_be_echoed_within_50_ms) {
     (void)permit_rig_arm(&rig, HOLDER);
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(50));
@@ -110,11 +110,11 @@ TEST(test_permit_arm_without_type_or_role_is_refused) {
 TEST(test_permit_arm_without_a_track_is_refused) {
     rig.config.track_mm = 0;
     assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
-    rig.config.setpoint_type_set = false; // What nobody can measure comes first.
+    rig.config.setpoint_type_set = false; // A value that cannot be measured is refused first.
     assert_arm_refused(IW_REFUSE_TYPE_NOT_SET);
     setUp();
     rig.config.track_mm = 0;
-    permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST); // What may pass by itself comes later.
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST); // A cause that may disappear on its own is refused later.
     assert_arm_refused(IW_REFUSE_TRACK_NOT_SET);
 }
 
@@ -197,7 +197,7 @@ TEST(test_permit_arm_while_latched_is_refused) {
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
-TEST(test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command) {
+TEST(test_permit_arm_after_a_drive_of_any_client_is_stale_command) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, true));
     permit_rig_wait(&rig, MS(500) - 1U);
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
@@ -207,7 +207,7 @@ TEST(test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-TEST(test_permit_arm_after_a_remembered_drive_is_a_stale_command) {
+TEST(test_permit_arm_after_a_noted_drive_is_stale_command) {
     iw_permit_remember(&rig.permit, rig.now_us, OTHER);
     permit_rig_wait(&rig, MS(499));
     assert_arm_refused(IW_REFUSE_STALE_COMMAND);
@@ -219,7 +219,7 @@ TEST(test_permit_arm_after_a_zero_drive_is_accepted) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-TEST(test_permit_drive_while_arming_is_refused_and_does_not_move) {
+TEST(test_permit_drive_while_arming_is_refused) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -241,7 +241,7 @@ TEST(test_permit_arm_repeated_does_not_prolong_arming) {
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
-TEST(test_permit_arming_is_ended_by_whatever_would_have_refused_it) {
+TEST(test_permit_arming_ends_by_each_cause_that_refuses_arm) {
     static const struct {
         iw_cause_t cause;
         iw_refusal_t refusal;
@@ -264,7 +264,7 @@ TEST(test_permit_arming_is_ended_by_whatever_would_have_refused_it) {
     }
 }
 
-TEST(test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect) {
+TEST(test_permit_arming_ends_by_stop_and_disconnect_of_its_client) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
@@ -284,7 +284,7 @@ TEST(test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_arm_in_stopping_waits_for_zero_and_rest) {
+TEST(test_permit_arm_in_stopping_needs_zero_and_standstill) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     permit_rig_wait(&rig, MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_arm(&rig, OTHER));
@@ -292,7 +292,7 @@ TEST(test_permit_arm_in_stopping_waits_for_zero_and_rest) {
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_arm(&rig, OTHER));
     rig.view.at_rest = true;
-    rig.view.can_send = false; // A zero of the hold is on its way: arm need not wait for its echo.
+    rig.view.can_send = false; // A zero of the hold is under way: arm does not wait for its echo.
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     rig.view.proven = true;
@@ -302,7 +302,7 @@ TEST(test_permit_arm_in_stopping_waits_for_zero_and_rest) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 
-TEST(test_permit_arming_in_stopping_never_sends_anything_but_zero) {
+TEST(test_permit_arming_in_stopping_sends_only_zero) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(600));
     (void)permit_rig_arm(&rig, OTHER);
@@ -310,7 +310,7 @@ TEST(test_permit_arming_in_stopping_never_sends_anything_but_zero) {
                      iw_permit_demand(&rig.permit) == IW_DEMAND_BRAKE);
 }
 
-TEST(test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold) {
+TEST(test_permit_arming_failed_in_stopping_continues_the_hold) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     const iw_time_us_t zero_us = rig.now_us;
     rig.view.settled = true;

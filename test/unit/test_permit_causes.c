@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every cause in every situation: what it does, what it leaves behind, what it refuses.
+// Every cause in every situation: its effect, its lasting state and its refusals.
 #include "permit_rig.h"
 #include "unit.h"
 
@@ -9,10 +9,10 @@ void setUp(void) {
     permit_rig_init(&rig);
 }
 
-/// What a cause does.
+/// Effect of a cause.
 typedef enum { NOTHING, LATCH, LATCH_SILENT, RAMP, CUT, END_ARMING } effect_t;
 
-/// Indexed by permit_situation_t.
+/// The effects are indexed by permit_situation_t.
 typedef struct {
     iw_cause_t cause;
     effect_t effect[PERMIT_SITUATIONS];
@@ -90,7 +90,7 @@ static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t
     TEST_ASSERT_TRUE(effect == NOTHING || rig.permit.holder == IW_CLIENT_NONE);
 }
 
-TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once) {
+TEST(test_permit_each_cause_acts_immediately_in_each_situation) {
     for (size_t i = 0; i < ROWS; i++) {
         for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
             permit_rig_begin(&rig, (permit_situation_t)situation);
@@ -104,7 +104,7 @@ TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once) {
     }
 }
 
-TEST(test_permit_cause_told_in_every_step_counts_as_one_stop) {
+TEST(test_permit_cause_raised_in_every_step_counts_as_one_stop) {
     for (size_t i = 0; i < ROWS; i++) {
         permit_rig_begin(&rig, PERMIT_ARMED);
         permit_rig_raise(&rig, rows[i].cause);
@@ -138,7 +138,7 @@ TEST(test_permit_latch_after_a_stop_is_a_new_stop) {
     TEST_ASSERT_EQUAL_UINT32(number + 1U, rig.permit.stop.number);
 }
 
-TEST(test_permit_latched_while_listening_sends_nothing_however_long) {
+TEST(test_permit_latched_while_listening_never_sends) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     for (uint32_t n = 0; n < 20; n++) {
         permit_rig_wait(&rig, MS(700));
@@ -149,7 +149,7 @@ TEST(test_permit_latched_while_listening_sends_nothing_however_long) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-TEST(test_permit_late_loop_leaves_no_ramp_tail) {
+TEST(test_permit_late_loop_cuts_the_ramp) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
@@ -173,7 +173,7 @@ TEST(test_permit_stop_after_a_cut_one_ramps_again) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
 }
 
-TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows) {
+TEST(test_permit_cut_stop_stays_cut_after_a_ramping_cause) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
@@ -181,7 +181,7 @@ TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
 }
 
-TEST(test_permit_cause_of_no_wheel_is_told_as_such) {
+TEST(test_permit_stop_stores_sides_detail_and_client_of_its_cause) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX, IW_REACT_BY_CAUSE};
     iw_permit_raise(&rig.permit, &lost, rig.now_us);
@@ -190,7 +190,7 @@ TEST(test_permit_cause_of_no_wheel_is_told_as_such) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
 }
 
-TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second) {
+TEST(test_permit_present_has_raised_levels_and_events_for_1_s) {
     static const iw_cause_t levels[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_DISAGREES, IW_CAUSE_BUS_DOWN,
                                         IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_LOST};
     static const iw_cause_t events[] = {IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED,
@@ -216,7 +216,7 @@ TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second) {
     }
 }
 
-TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told) {
+TEST(test_permit_unjudged_step_retains_levels_and_adds_causes) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     permit_rig_wait(&rig, MS(1000));
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
@@ -230,14 +230,14 @@ TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_to
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
 }
 
-TEST(test_permit_present_does_not_tell_what_does_not_latch) {
+TEST(test_permit_present_has_no_cause_that_does_not_latch) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
     TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
 }
 
-TEST(test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told) {
+TEST(test_permit_is_quiet_without_a_present_cause) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     TEST_ASSERT_TRUE(rig.permit.quiet);
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);

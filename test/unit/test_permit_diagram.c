@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT
-// The diagram in permit.h, walked: every event in every phase takes the arrow that is drawn, and where none is drawn it stays.
+// The diagram in permit.h: every event in every phase follows the drawn arrow. Without an arrow the phase stays.
 #include "permit_rig.h"
 
 #include "unit.h"
 
 #include <stdio.h>
 
-/// What can happen. Where time passes, the holder drives on and the wheels are not at rest, unless it says otherwise.
+/// Events. Where time passes, the holder drives on and the wheels move, unless the event states otherwise.
 typedef enum {
     ARM,
-    TAKEOVER, ///< Somebody else asks for the lease.
+    TAKEOVER, ///< Another client requests the lease.
     DRIVE,
     CONFIRMED,     ///< The arming pair was echoed.
-    NOT_IN_TIME,   ///< The time for that is over.
+    NOT_IN_TIME,   ///< The time for the confirmation is over.
     LEASE_LOST,    ///< The time of the lease is over without a drive command.
-    STOP,          ///< Of a client, or disarm.
-    DISCONNECT,    ///< Of the holder.
+    STOP,          ///< Stop of a client, or disarm.
+    DISCONNECT,    ///< Disconnect of the holder.
     CAUSE_STOPS,   ///< A cause that only stops.
-    CAUSE_LATCHES, ///< One that latches while setpoints are sent.
-    CAUSE_ALWAYS,  ///< One that latches in every state.
+    CAUSE_LATCHES, ///< A cause that latches while setpoints are sent.
+    CAUSE_ALWAYS,  ///< A cause that latches in every state.
     STRANGER,      ///< A foreign setpoint.
-    STRANGERS,     ///< More of them than a process that died can have left behind.
+    STRANGERS,     ///< More foreign setpoints than a process that died can have left in its controller.
     OUTPUT_ZERO,
-    HELD, ///< The time of the hold is over, and the wheels stand.
+    HELD, ///< The time of the hold is over, and the wheels are at standstill.
     RESET,
     EVENTS,
 } event_t;
 
-/// Where a walk begins: a phase, or REARMING by an arm that came before the hold had begun.
+/// Start of a walk: a phase, or REARMING by an arm before the hold has begun.
 #define REARMING_EARLY IW_PHASES
 #define BEGINNINGS     (IW_PHASES + 1)
 
@@ -58,7 +58,7 @@ static const struct {
     {IW_PHASE_ARMING, STRANGER, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, STRANGERS, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, CAUSE_ALWAYS, IW_PHASE_CUT},
-    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold takes longer than the confirmation may.
+    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold takes longer than the limit of the confirmation.
 
     {IW_PHASE_ARMED, LEASE_LOST, IW_PHASE_BRAKING},
     {IW_PHASE_ARMED, STOP, IW_PHASE_BRAKING},
@@ -126,7 +126,7 @@ static void arm_and_confirm(void) {
     (void)permit_rig_drive(&rig, HOLDER, false);
 }
 
-/// Latched long enough for a reset, the cause being gone; the wheels were not settled yet.
+/// Latched long enough for a reset, and the cause is gone. The wheels were not settled yet.
 static void latch(void) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_SOFTWARE);
     rig.view.settled = false;
@@ -260,7 +260,7 @@ static void happen(event_t event) {
     }
 }
 
-/// Where the diagram leads: along its arrow, or nowhere.
+/// Returns the phase after the event: the end of its arrow, or the same phase.
 static iw_phase_t led_to(unsigned beginning, event_t event) {
     for (size_t i = 0; i < sizeof arrows / sizeof arrows[0]; i++) {
         if (arrows[i].from == beginning && arrows[i].event == event) {
@@ -270,7 +270,7 @@ static iw_phase_t led_to(unsigned beginning, event_t event) {
     return (beginning == REARMING_EARLY) ? IW_PHASE_REARMING : (iw_phase_t)beginning;
 }
 
-TEST(test_permit_in_every_phase_every_event_leads_where_the_diagram_says) {
+TEST(test_permit_each_event_in_each_phase_follows_the_diagram) {
     unsigned moved = 0;
     for (unsigned beginning = 0; beginning < BEGINNINGS; beginning++) {
         for (unsigned event = 0; event < EVENTS; event++) {
@@ -287,7 +287,7 @@ TEST(test_permit_in_every_phase_every_event_leads_where_the_diagram_says) {
                                    "an arrow is there twice, or leads nowhere");
 }
 
-TEST(test_permit_is_told_as_four_states_and_sends_as_its_phase_demands) {
+TEST(test_permit_each_phase_has_its_state_and_its_demand) {
     static const struct {
         iw_state_t state;
         iw_demand_t demand;
@@ -311,7 +311,7 @@ TEST(test_permit_is_told_as_four_states_and_sends_as_its_phase_demands) {
     }
 }
 
-TEST(test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so) {
+TEST(test_permit_cause_latches_when_armed_if_iw_cause_latches) {
     unsigned latching = 0;
     for (unsigned cause = IW_CAUSE_NONE + 1U; cause < IW_CAUSES; cause++) {
         char what[32];
@@ -320,7 +320,8 @@ TEST(test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so) {
         permit_rig_raise(&rig, (iw_cause_t)cause);
         const bool latched = iw_permit_state(&rig.permit) == IW_STATE_LATCHED;
         TEST_ASSERT_EQUAL_INT_MESSAGE(iw_cause_latches((iw_cause_t)cause), latched, what);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(cause <= IW_CAUSE_INTERNAL, latched, what); // They come first.
+        // The causes that latch are first in the list.
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cause <= IW_CAUSE_INTERNAL, latched, what);
         TEST_ASSERT_EQUAL_INT_MESSAGE(latched ? IW_PHASE_CUT : IW_PHASE_BRAKING, rig.permit.phase, what);
         latching += latched ? 1U : 0U;
     }

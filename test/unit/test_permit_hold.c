@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How zeros are held, how a latch is left, how a gateway begins after a crash, and when it must be called.
+// How zeros are held, how a latch ends, how a gateway starts after a crash, and when the permission must be stepped.
 #include "permit_rig.h"
 #include "unit.h"
 #include <string.h>
@@ -10,7 +10,7 @@ void setUp(void) {
     permit_rig_init(&rig);
 }
 
-/// Latched while armed; now the wheels stand and the cause is long gone.
+/// Latched while armed. Now the wheels are at standstill and the cause has ended long ago.
 static void latch_and_calm(iw_cause_t cause) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, cause);
@@ -59,7 +59,7 @@ TEST(test_permit_hold_waits_for_settled_wheels) {
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
 }
 
-TEST(test_permit_hold_ends_after_a_minute_and_tells_of_moving_wheels) {
+TEST(test_permit_hold_ends_after_60_s_and_counts_moving_wheels) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     assert_holding_until(MS(60000), IW_STATE_LISTENING);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
@@ -81,8 +81,8 @@ TEST(test_permit_longest_hold_follows_the_configuration) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-/// Zeros between another master's setpoints only make the wheels jerk.
-TEST(test_permit_second_master_is_fought_for_ten_seconds) {
+/// Zeros between the setpoints of another master would only jerk the wheels.
+TEST(test_permit_hold_against_a_second_master_ends_after_10_s) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(3000));
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
@@ -97,10 +97,10 @@ TEST(test_permit_second_master_is_fought_for_ten_seconds) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it) {
+TEST(test_permit_second_master_before_the_hold_does_not_count) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
-    permit_rig_wait(&rig, MS(2000)); // Long gone.
+    permit_rig_wait(&rig, MS(2000)); // The event of the second master has ended long ago.
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     rig.view.proven = true;
     permit_rig_step(&rig);
@@ -111,7 +111,7 @@ TEST(test_permit_second_master_of_before_the_hold_does_not_shorten_it) {
     assert_holding_until(MS(60000), IW_STATE_LISTENING);
 }
 
-TEST(test_permit_end_of_zeros_is_told_five_seconds_before) {
+TEST(test_permit_end_of_zeros_is_reported_5_s_before) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(55000) - 1U);
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us));
@@ -129,8 +129,8 @@ TEST(test_permit_end_of_zeros_is_told_five_seconds_before) {
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(100000)));
 }
 
-/// Asked between two steps, and late: the next step ends what time is enough for.
-TEST(test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first) {
+/// A late query between two steps: the next step ends the hold whose time is over.
+TEST(test_permit_end_of_zeros_is_not_reported_for_a_short_hold) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     rig.view.settled = true;
     permit_rig_step(&rig);
@@ -141,7 +141,7 @@ TEST(test_permit_end_of_zeros_is_not_told_where_no_wheel_must_stand_first) {
     TEST_ASSERT_FALSE(iw_permit_ending(&rig.permit, rig.now_us + MS(59999)));
 }
 
-TEST(test_permit_hold_of_a_cut_stop_begins_at_once) {
+TEST(test_permit_hold_of_a_cut_stop_begins_immediately) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     rig.view.settled = true;
@@ -149,7 +149,7 @@ TEST(test_permit_hold_of_a_cut_stop_begins_at_once) {
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
-TEST(test_permit_latched_holds_zeros_as_stopping_does) {
+TEST(test_permit_latched_holds_zeros_like_stopping) {
     permit_rig_begin(&rig, PERMIT_LATCHED);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     rig.view.settled = true;
@@ -170,7 +170,7 @@ TEST(test_permit_latch_during_the_hold_begins_a_new_hold) {
     assert_holding_until(MS(1500), IW_STATE_LATCHED);
 }
 
-TEST(test_permit_reset_leaves_the_latch_in_silence) {
+TEST(test_permit_reset_ends_the_latch_without_setpoints) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
@@ -180,7 +180,7 @@ TEST(test_permit_reset_leaves_the_latch_in_silence) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
 }
 
-TEST(test_permit_reset_while_latched_from_listening_works_as_well) {
+TEST(test_permit_reset_of_a_latch_from_listening_is_accepted) {
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
@@ -189,7 +189,7 @@ TEST(test_permit_reset_while_latched_from_listening_works_as_well) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing) {
+TEST(test_permit_reset_while_not_latched_changes_nothing) {
     for (int situation = 0; situation < PERMIT_LATCHED; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
         const iw_permit_t before = rig.permit;
@@ -200,7 +200,7 @@ TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing) {
     }
 }
 
-TEST(test_permit_reset_held_counts_once) {
+TEST(test_permit_reset_repeated_does_not_clear_a_new_latch) {
     latch_and_calm(IW_CAUSE_ESTOP_SOFTWARE);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
@@ -246,7 +246,7 @@ TEST(test_permit_reset_within_a_second_of_an_event_is_refused) {
     }
 }
 
-TEST(test_permit_reset_needs_wheels_heard_and_at_rest) {
+TEST(test_permit_reset_needs_telemetry_and_standstill) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     rig.view.heard = false;
     permit_rig_step(&rig);
@@ -261,7 +261,7 @@ TEST(test_permit_reset_needs_wheels_heard_and_at_rest) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
 }
 
-TEST(test_permit_reset_while_somebody_still_commands_is_refused) {
+TEST(test_permit_reset_after_a_drive_of_any_client_is_refused) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, permit_rig_drive(&rig, OTHER, true));
     permit_rig_wait(&rig, MS(500) - 1U);
@@ -272,7 +272,7 @@ TEST(test_permit_reset_while_somebody_still_commands_is_refused) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
 }
 
-TEST(test_permit_after_reset_the_old_holder_holds_nothing) {
+TEST(test_permit_after_reset_the_old_holder_has_no_lease) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     (void)permit_rig_reset(&rig);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
@@ -280,7 +280,7 @@ TEST(test_permit_after_reset_the_old_holder_holds_nothing) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_stop_after_a_reset_is_told_as_not_latched) {
+TEST(test_permit_stop_after_a_reset_is_not_latched) {
     latch_and_calm(IW_CAUSE_INTERNAL);
     TEST_ASSERT_TRUE(rig.permit.stop.latched);
     (void)permit_rig_reset(&rig);
@@ -302,7 +302,7 @@ TEST(test_permit_restarted_sends_zeros_before_listening) {
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
-TEST(test_permit_restarted_without_any_wheel_ends_as_well) {
+TEST(test_permit_restarted_without_any_wheel_ends_the_hold) {
     permit_rig_init_restarted(&rig);
     rig.view.heard = false;
     rig.view.at_rest = false;
@@ -313,7 +313,7 @@ TEST(test_permit_restarted_without_any_wheel_ends_as_well) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(1500));
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
-    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving); // Nobody knows whether they move.
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving); // It is unknown whether the wheels move.
 }
 
 static void hear_foreign(uint8_t sides) {
@@ -321,12 +321,12 @@ static void hear_foreign(uint8_t sides) {
     iw_permit_raise(&rig.permit, &foreign, rig.now_us);
 }
 
-TEST(test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint) {
+TEST(test_permit_restarted_ends_zeros_at_the_5th_foreign_setpoint) {
     static const uint8_t sides[] = {IW_SIDES_LEFT, IW_SIDES_RIGHT};
     for (size_t i = 0; i < 2; i++) {
         permit_rig_init_restarted(&rig);
         for (unsigned frame = 0; frame < 2; frame++) {
-            hear_foreign(IW_SIDES_LEFT); // What the dead process left in its controller.
+            hear_foreign(IW_SIDES_LEFT); // Frames that the dead process left in its controller.
             hear_foreign(IW_SIDES_RIGHT);
             TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
             TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
@@ -347,7 +347,7 @@ TEST(test_permit_restarted_latches_on_estop) {
     }
 }
 
-TEST(test_permit_restarted_cannot_be_armed_before_the_hold_is_over) {
+TEST(test_permit_restarted_arm_before_the_end_of_hold_is_refused) {
     permit_rig_init_restarted(&rig);
     permit_rig_wait(&rig, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, permit_rig_arm(&rig, HOLDER));
@@ -362,7 +362,7 @@ static void assert_restarted_silent(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
 }
 
-TEST(test_permit_restarted_without_leave_to_send_stays_silent) {
+TEST(test_permit_restarted_without_permission_sends_nothing) {
     rig.config.listen_only = true;
     assert_restarted_silent();
     setUp();
@@ -373,8 +373,8 @@ TEST(test_permit_restarted_without_leave_to_send_stays_silent) {
     assert_restarted_silent();
 }
 
-/// No stop depends on it: an update may bring the need of a track to a machine in motion.
-TEST(test_permit_restarted_without_a_track_sends_zeros_all_the_same) {
+/// No stop depends on the track: after an update a moving machine may have none.
+TEST(test_permit_restarted_without_a_track_sends_zeros) {
     for (int hold = 0; hold < 2; hold++) {
         setUp();
         rig.config.track_mm = 0;
@@ -390,14 +390,14 @@ TEST(test_permit_restarted_without_a_track_sends_zeros_all_the_same) {
     }
 }
 
-/// What can be seen from outside.
+/// The state that is visible from outside.
 static uint32_t outside(const iw_permit_t *permit) {
     return (uint32_t)iw_permit_state(permit) | (uint32_t)iw_permit_demand(permit) << 4 |
            (uint32_t)iw_permit_arming(permit) << 8 | (uint32_t)(permit->phase == IW_PHASE_CUT) << 9 |
            permit->holder << 10 | (uint32_t)permit->arm_refusal << 16 | permit->stop.number << 22;
 }
 
-/// A step at `next_us` changes something, a step before it nothing.
+/// A step at `next_us` changes the state; a step before it does not.
 static void assert_next_is_right(void) {
     const iw_permit_t now = rig.permit;
     const iw_time_us_t next_us = iw_permit_next_us(&rig.permit);
@@ -437,7 +437,7 @@ static void random_input(fixture_random_t *random) {
     }
 }
 
-TEST(test_permit_next_us_is_right_in_twenty_thousand_random_situations) {
+TEST(test_permit_next_us_is_exact_in_20000_random_situations) {
     fixture_random_t random;
     fixture_random_init(&random, 6);
     uint32_t seen[4] = {0, 0, 0, 0};

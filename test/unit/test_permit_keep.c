@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// after_stop = hold: zeros after a stop or a latch end by release, arm, another master or the end of the gateway, and by nothing else.
+// after_stop = hold: zeros after a stop or a latch end by release, arm, another master or the end of the gateway, and
+// by no other event.
 #include "permit_rig.h"
 #include "unit.h"
 
@@ -39,7 +40,7 @@ static void release(void) {
     permit_rig_step(&rig);
 }
 
-TEST(test_permit_keep_zeros_have_no_end_with_standing_and_with_moving_wheels) {
+TEST(test_permit_keep_zeros_never_end_at_standstill_or_in_motion) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
     assert_held_for_a_day(IW_STATE_STOPPING);
@@ -61,7 +62,7 @@ TEST(test_permit_keep_begins_when_the_ramp_has_ended) {
     TEST_ASSERT_TRUE(iw_permit_holding(&rig.permit));
 }
 
-TEST(test_permit_keep_is_not_there_unless_configured) {
+TEST(test_permit_keep_is_off_unless_configured) {
     rig.config.hold = false;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
@@ -82,8 +83,9 @@ TEST(test_permit_keep_ends_by_release) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-/// As without a hold: first the wheels' own second is over, and they stand.
-TEST(test_permit_keep_released_early_ends_as_without_it) {
+/// The same times as without after_stop = hold: the watchdog second of the wheels must be over, and they must be at
+/// standstill.
+TEST(test_permit_keep_released_early_ends_at_the_normal_time) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     release();
@@ -101,7 +103,7 @@ TEST(test_permit_keep_released_early_ends_as_without_it) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-TEST(test_permit_keep_released_late_gives_a_wheel_that_turns_its_time) {
+TEST(test_permit_keep_released_late_waits_60_s_for_moving_wheels) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     permit_rig_wait(&rig, MS(120000));
     release();
@@ -116,7 +118,7 @@ TEST(test_permit_keep_released_late_gives_a_wheel_that_turns_its_time) {
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
 }
 
-TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms) {
+TEST(test_permit_keep_release_while_driving_or_arming_is_refused) {
     static const permit_situation_t refused[] = {PERMIT_ARMING, PERMIT_ARMED, PERMIT_STOPPING};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         permit_rig_begin(&rig, refused[i]);
@@ -131,7 +133,7 @@ TEST(test_permit_keep_release_is_refused_while_somebody_drives_or_arms) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, iw_permit_release(&rig.permit));
 }
 
-TEST(test_permit_keep_release_in_silence_changes_nothing) {
+TEST(test_permit_keep_release_without_setpoints_changes_nothing) {
     release();
     assert_silent(IW_STATE_LISTENING);
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
@@ -141,7 +143,7 @@ TEST(test_permit_keep_release_in_silence_changes_nothing) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-TEST(test_permit_keep_latch_out_of_silence_is_silent) {
+TEST(test_permit_keep_latch_while_listening_sends_nothing) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(2000));
@@ -164,7 +166,7 @@ TEST(test_permit_keep_reset_ends_the_latch_and_not_the_hold) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-/// Whoever released the zeros of a stop did not know of the button that is pressed since.
+/// The client that released the zeros of a stop did not know of a button that was pressed later.
 TEST(test_permit_keep_latch_after_release_is_held_again) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
@@ -179,7 +181,7 @@ TEST(test_permit_keep_latch_after_release_is_held_again) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-TEST(test_permit_keep_latch_after_release_is_not_held_unless_configured) {
+TEST(test_permit_keep_latch_is_not_held_unless_configured) {
     rig.config.hold = false;
     permit_rig_begin(&rig, PERMIT_HOLDING);
     release();
@@ -189,7 +191,7 @@ TEST(test_permit_keep_latch_after_release_is_not_held_unless_configured) {
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
 }
 
-TEST(test_permit_keep_no_other_request_ends_it) {
+TEST(test_permit_keep_is_not_ended_by_any_other_request) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -201,7 +203,7 @@ TEST(test_permit_keep_no_other_request_ends_it) {
     assert_held_for_a_day(IW_STATE_STOPPING);
 }
 
-TEST(test_permit_keep_ends_by_arm_and_comes_back_if_arming_fails) {
+TEST(test_permit_keep_ends_by_arm_and_returns_if_arming_fails) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -233,8 +235,8 @@ TEST(test_permit_keep_ends_with_the_gateway) {
     assert_silent(IW_STATE_LISTENING);
 }
 
-/// Of a gateway that did not end after all.
-TEST(test_permit_keep_comes_back_with_arm_after_the_gateways_end) {
+/// The gateway did not end after all.
+TEST(test_permit_keep_returns_with_arm_after_a_shutdown) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     iw_permit_stop(&rig.permit, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
@@ -246,7 +248,7 @@ TEST(test_permit_keep_comes_back_with_arm_after_the_gateways_end) {
     assert_held_for_a_day(IW_STATE_LATCHED);
 }
 
-TEST(test_permit_keep_gives_way_to_a_second_master) {
+TEST(test_permit_keep_ends_by_a_second_master) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     calm();
     permit_rig_wait(&rig, MS(5000));
@@ -264,7 +266,7 @@ TEST(test_permit_keep_gives_way_to_a_second_master) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-TEST(test_permit_keep_lasts_through_every_other_fault) {
+TEST(test_permit_keep_continues_through_every_other_fault) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,     IW_CAUSE_BUS_DOWN,   IW_CAUSE_SEND_STALLED,
                                         IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_OVERSPEED};
     for (size_t i = 0; i < sizeof causes / sizeof causes[0]; i++) {
@@ -292,13 +294,13 @@ static void hear_strangers(unsigned frames) {
 TEST(test_permit_keep_is_resumed_by_a_restart) {
     begin_restarted();
     TEST_ASSERT_FALSE(iw_permit_holding(&rig.permit));
-    hear_strangers(4); // What the dead process had left in its controller.
+    hear_strangers(4); // Frames that the dead process had left in its controller.
     permit_rig_wait(&rig, MS(1500));
     assert_held_for_a_day(IW_STATE_STOPPING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }
 
-TEST(test_permit_keep_resumed_gives_way_to_a_second_master) {
+TEST(test_permit_keep_resumed_ends_by_a_second_master) {
     begin_restarted();
     hear_strangers(5);
     assert_silent(IW_STATE_LISTENING);
@@ -310,7 +312,7 @@ TEST(test_permit_keep_resumed_gives_way_to_a_second_master) {
     assert_silent(IW_STATE_LATCHED);
 }
 
-TEST(test_permit_keep_resumed_can_be_released_at_once) {
+TEST(test_permit_keep_resumed_can_be_released_immediately) {
     begin_restarted();
     release();
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The lease: what feeds it, when it ends, who takes it over.
+// The lease: which requests extend it, when it ends, and which client can take it over.
 #include "permit_rig.h"
 #include "unit.h"
 
@@ -9,7 +9,7 @@ void setUp(void) {
     permit_rig_init(&rig);
 }
 
-/// Armed just now, at rest, no drive yet.
+/// Armed just now, at standstill, no drive command yet.
 static void arm(void) {
     permit_rig_begin(&rig, PERMIT_LISTENING);
     (void)permit_rig_arm(&rig, HOLDER);
@@ -41,7 +41,7 @@ TEST(test_permit_lease_after_arm_lasts_a_second) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-TEST(test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time) {
+TEST(test_permit_lease_lost_in_a_long_stall_saturates_its_detail) {
     arm();
     permit_rig_wait(&rig, MS(4294967) + 295U);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.permit.stop.cause);
@@ -69,7 +69,7 @@ TEST(test_permit_lease_follows_the_configuration) {
     }
 }
 
-TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one) {
+TEST(test_permit_lease_is_extended_by_each_accepted_drive) {
     arm();
     for (uint32_t n = 0; n < 100; n++) {
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, (n & 1U) != 0U));
@@ -80,7 +80,7 @@ TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_lease_is_fed_by_nothing_else) {
+TEST(test_permit_lease_is_extended_by_no_other_request) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     permit_rig_wait(&rig, MS(150));
@@ -95,7 +95,7 @@ TEST(test_permit_lease_is_fed_by_nothing_else) {
     assert_lost_after(MS(50), IW_CAUSE_LEASE_LOST);
 }
 
-TEST(test_permit_drive_at_or_after_the_end_does_not_revive_the_lease) {
+TEST(test_permit_drive_at_or_after_the_lease_end_is_refused) {
     static const uint32_t late_us[] = {0, 1, 1000, 1000000};
     for (size_t i = 0; i < 4; i++) {
         arm();
@@ -110,7 +110,7 @@ TEST(test_permit_drive_at_or_after_the_end_does_not_revive_the_lease) {
     }
 }
 
-TEST(test_permit_drive_just_before_the_end_keeps_the_lease) {
+TEST(test_permit_drive_just_before_the_lease_end_extends_it) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     rig.now_us += MS(200) - 1U;
@@ -135,7 +135,7 @@ TEST(test_permit_drive_is_refused_in_every_state_but_armed) {
     }
 }
 
-TEST(test_permit_drive_refusals_name_what_the_client_can_mend) {
+TEST(test_permit_drive_refusals_name_the_cause) {
     rig.config.listen_only = true;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LISTEN_ONLY, permit_rig_drive(&rig, HOLDER, true));
     setUp();
@@ -148,7 +148,7 @@ TEST(test_permit_drive_refusals_name_what_the_client_can_mend) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, true));
 }
 
-TEST(test_permit_refused_drive_changes_nothing_but_the_memory_of_it) {
+TEST(test_permit_refused_drive_changes_only_the_stale_command) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     iw_permit_t before = rig.permit;
     (void)permit_rig_drive(&rig, OTHER, false);
@@ -165,7 +165,7 @@ TEST(test_permit_arm_of_another_client_is_busy) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-TEST(test_permit_takeover_at_rest_moves_the_lease) {
+TEST(test_permit_takeover_at_standstill_moves_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, false);
     permit_rig_wait(&rig, MS(100));
@@ -185,9 +185,9 @@ TEST(test_permit_takeover_makes_only_later_commands_fresh) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_drive(&rig.permit, rig.now_us, OTHER, true));
 }
 
-TEST(test_permit_takeover_while_armed_does_not_wait_for_room_to_send) {
+TEST(test_permit_takeover_while_armed_does_not_wait_for_an_echo) {
     arm();
-    rig.view.can_send = false; // A pair of ours is on its way, as in every other step.
+    rig.view.can_send = false; // A pair of this gateway is under way, as in every other step.
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
 }
@@ -204,20 +204,20 @@ TEST(test_permit_takeover_in_motion_is_refused) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-TEST(test_permit_takeover_from_a_holder_who_wants_to_move_is_stale) {
+TEST(test_permit_takeover_after_a_drive_of_the_holder_is_stale) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_takeover(&rig, OTHER));
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
 
-TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm) {
+TEST(test_permit_takeover_without_a_holder_is_an_ordinary_arm) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
     TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion) {
+TEST(test_permit_takeover_after_the_lease_end_ends_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, false);
     rig.now_us += MS(200);
@@ -226,7 +226,7 @@ TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion) {
     TEST_ASSERT_TRUE(rig.permit.holder != HOLDER);
 }
 
-TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once) {
+TEST(test_permit_disconnect_of_the_holder_ends_the_lease) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
@@ -239,14 +239,14 @@ TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
-TEST(test_permit_drive_after_another_stop_is_blocked_for_nobody) {
+TEST(test_permit_drive_after_a_client_stop_is_not_armed) {
     for (iw_client_t client = 1; client < 9U; client++) {
         permit_rig_begin(&rig, PERMIT_STOPPING);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, client, true));
     }
 }
 
-TEST(test_permit_disconnect_of_anybody_else_changes_nothing) {
+TEST(test_permit_disconnect_of_another_client_changes_nothing) {
     for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
         const iw_permit_t before = rig.permit;
@@ -255,7 +255,7 @@ TEST(test_permit_disconnect_of_anybody_else_changes_nothing) {
     }
 }
 
-TEST(test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after) {
+TEST(test_permit_latch_survives_disconnect_of_every_client) {
     static const iw_time_us_t after_us[] = {0, MS(1), MS(1000), MS(1600), MS(12000), MS(62000)};
     const iw_event_t estop = {IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, (uint32_t)OTHER, IW_REACT_BY_CAUSE};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
@@ -301,7 +301,7 @@ TEST(test_permit_stop_needs_no_lease_and_ramps) {
     }
 }
 
-TEST(test_permit_stop_elsewhere_changes_nothing) {
+TEST(test_permit_stop_while_not_sending_changes_nothing) {
     static const permit_situation_t situations[] = {PERMIT_LISTENING, PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
     for (size_t i = 0; i < 4; i++) {
         permit_rig_begin(&rig, situations[i]);
@@ -311,7 +311,7 @@ TEST(test_permit_stop_elsewhere_changes_nothing) {
     }
 }
 
-TEST(test_permit_moving_again_after_stop_needs_arm_and_pause) {
+TEST(test_permit_arm_after_a_stop_needs_500_ms_without_a_drive) {
     permit_rig_begin(&rig, PERMIT_HOLDING);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_arm(&rig, HOLDER));
     permit_rig_wait(&rig, MS(500));

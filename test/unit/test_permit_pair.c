@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the pair and one wheel offline ask of the permission: a ramp or zero at once, the third time latches, the client is refused by name.
+// Reactions of the permission to a diverging pair and to one wheel offline: a ramp or an immediate zero, a latch at the
+// third time, a refusal with its own name.
 #include "permit_rig.h"
 
 #include "unit.h"
@@ -19,7 +20,7 @@ static iw_demand_t demand(void) {
     return iw_permit_demand(&rig.permit);
 }
 
-/// From STOPPING, with everything at rest, until ARMED again.
+/// Arms again from STOPPING, with everything at standstill.
 static void arm_again(void) {
     rig.view.output_zero = true;
     rig.view.at_rest = true;
@@ -32,7 +33,7 @@ static void arm_again(void) {
     rig.view.output_zero = false;
 }
 
-TEST(test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latch) {
+TEST(test_permit_diverging_pair_stops_without_a_latch) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
@@ -47,7 +48,7 @@ TEST(test_permit_diverging_pair_stops_as_its_event_says_and_does_not_latch) {
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
-TEST(test_permit_diverging_pair_in_a_stop_changes_only_the_reaction) {
+TEST(test_permit_diverging_pair_in_a_stop_changes_only_the_ramp) {
     permit_rig_begin(&rig, PERMIT_STOPPING);
     const iw_stop_t before = rig.permit.stop;
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_RIGHT, IW_REACT_RAMP);
@@ -60,7 +61,7 @@ TEST(test_permit_diverging_pair_in_a_stop_changes_only_the_reaction) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
 }
 
-TEST(test_permit_client_of_a_diverging_pair_is_refused_with_it_until_the_hold_ends) {
+TEST(test_permit_diverging_pair_refuses_its_client_until_hold_end) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, IW_REACT_RAMP);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_PAIR_DIVERGES, permit_rig_drive(&rig, HOLDER, false));
@@ -127,7 +128,7 @@ TEST(test_permit_one_wheel_offline_latches_with_the_ramp) {
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
 
-TEST(test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline) {
+TEST(test_permit_ramp_of_one_wheel_offline_ends_by_other_causes) {
     static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE,    IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,
                                         IW_CAUSE_SECOND_MASTER, IW_CAUSE_SEND_STALLED,   IW_CAUSE_WHEEL_REBOOTED,
                                         IW_CAUSE_FEEDBACK_SIGN, IW_CAUSE_OVERSPEED,      IW_CAUSE_LOOP_HUNG,
@@ -147,8 +148,8 @@ TEST(test_permit_whatever_allows_no_ramp_ends_that_of_one_wheel_offline) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
 }
 
-/// What an earlier stop did must not turn this ramp into zero at once.
-TEST(test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp) {
+/// The reaction of an earlier stop must not turn this ramp into an immediate zero.
+TEST(test_permit_one_wheel_offline_after_a_cut_stop_ramps) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand());
@@ -158,7 +159,7 @@ TEST(test_permit_ramp_of_one_wheel_offline_after_a_cut_stop_is_a_ramp) {
     TEST_ASSERT_FALSE(rig.permit.stop.at_once);
 }
 
-/// The clock of a board begins at zero: that is no divergence.
+/// The clock of a board starts at zero, which does not count as a divergence.
 TEST(test_permit_first_divergences_after_power_on_do_not_latch) {
     iw_permit_init(&rig.permit, &rig.config, 0, false);
     for (unsigned i = 0; i < 2U; i++) {
@@ -169,7 +170,7 @@ TEST(test_permit_first_divergences_after_power_on_do_not_latch) {
     }
 }
 
-TEST(test_permit_zeros_for_a_process_that_died_are_told_as_at_once) {
+TEST(test_permit_stop_of_a_restart_is_marked_as_immediate) {
     permit_rig_init_restarted(&rig);
     TEST_ASSERT_TRUE(rig.permit.stop.at_once);
 }
@@ -191,7 +192,7 @@ TEST(test_permit_hold_after_the_latched_ramp_begins_at_its_end) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
 }
 
-TEST(test_permit_hold_of_a_latch_without_ramp_begins_at_once) {
+TEST(test_permit_hold_of_a_latch_without_ramp_begins_immediately) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     rig.view.settled = true;
     rig.view.output_zero = false; // Nothing could be sent yet: the bus is down.
@@ -204,7 +205,7 @@ TEST(test_permit_reset_waits_for_the_end_of_the_latched_ramp) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     raise(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, IW_REACT_RAMP);
     rig.view.output_zero = false;
-    rig.view.at_rest = true; // It is slower than what counts as rest.
+    rig.view.at_rest = true; // The speed is below the limit of standstill.
     permit_rig_step(&rig);
     permit_rig_wait(&rig, MS(600));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_reset(&rig));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What moves a terminal: refused where it comes in, and never printed raw.
+// Characters that control a terminal are refused at input, and never printed raw.
 
 #include "iwheel_northbound/text.h"
 
@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/// The first and last of each range that moves a terminal, between their neighbours that do not.
+/// The first and the last code point of each range that controls a terminal, with their plain neighbours.
 static const struct {
     uint32_t code_point;
     bool plain;
@@ -24,7 +24,7 @@ static const struct {
 };
 #define ROWS (sizeof table / sizeof table[0])
 
-/// As UTF-8, with a zero byte behind.
+/// Encodes as UTF-8 and appends a zero byte.
 static size_t encode(uint32_t code_point, char out[5]) {
     size_t length = 0;
     if (code_point < 0x80U) {
@@ -90,7 +90,7 @@ static const char *const broken[] = {
     "\xFE",
 };
 
-TEST(test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time) {
+TEST(test_plain_invalid_utf8_is_broken_byte_by_byte) {
     for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
         size_t bytes = 0;
         char copy[16];
@@ -125,7 +125,7 @@ static void assert_json(const char *line, const char *wanted, size_t piece_size)
     TEST_ASSERT_EQUAL_STRING(wanted, whole);
 }
 
-TEST(test_plain_json_shows_by_number_what_moves_a_terminal_in_pieces_of_any_size) {
+TEST(test_plain_json_escapes_terminal_controls_at_any_piece_size) {
     for (size_t size = 12; size <= 64; size++) {
         assert_json("{\"a\":\"b\xC2\x9B"
                     "2J\x7F\xE2\x80\xAE\xE2\x82\xAC\"}",

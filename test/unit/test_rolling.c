@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Wheels that turn although nothing is sent to them: when that begins, when it ends, and when it is a fault.
+// Wheels that turn without setpoints: when this begins, when it ends, and when it is a fault.
 #include "fixture.h"
 #include "iwheel/private/rolling.h"
 #include "unit.h"
@@ -34,7 +34,7 @@ TEST(test_rolling_begins_after_300_ms_and_ends_after_300_ms) {
     TEST_ASSERT_FALSE(rolling.is_fault);
 }
 
-TEST(test_rolling_pushes_shorter_than_300_ms_do_not_add_up) {
+TEST(test_rolling_pulses_shorter_than_300_ms_do_not_add_up) {
     for (uint32_t i = 0; i < 20U; i++) {
         run(true, 290);
         run(false, 1);
@@ -48,7 +48,7 @@ TEST(test_rolling_pushes_shorter_than_300_ms_do_not_add_up) {
     }
 }
 
-/// Nor is it where the clock has just begun, as a board's does.
+/// It is no fault either when the clock has just started, as that of a board does.
 TEST(test_rolling_without_setpoints_before_is_no_fault) {
     static const iw_time_us_t begin_us[] = {0, FIXTURE_START_US};
     for (size_t i = 0; i < 2U; i++) {
@@ -61,7 +61,7 @@ TEST(test_rolling_without_setpoints_before_is_no_fault) {
     }
 }
 
-TEST(test_rolling_that_begins_within_10_s_of_a_setpoint_is_a_fault) {
+TEST(test_rolling_within_10_s_after_a_setpoint_is_a_fault) {
     static const struct {
         uint32_t after_ms;
         bool fault;

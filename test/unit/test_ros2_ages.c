@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How old a command or request from ROS is: writers of this machine by its clock, others by what their samples teach.
+// The age of a command or request from ROS: by the clock for writers of this machine, by earlier samples for other
+// writers.
 #include "ages.h"
 
 #include "unit.h"
@@ -9,7 +10,7 @@
 #define SECOND 1000000LL
 #define WALL   (1700000000LL * SECOND)
 #define EVERY  (SECOND / 20)
-#define OTHER  (3600LL * SECOND) // How far the clock of another machine is ahead.
+#define OTHER  (3600LL * SECOND) // The clock of the other machine is ahead by this time.
 
 static ros_ages_t ages;
 static int64_t mono_us;
@@ -36,7 +37,7 @@ void setUp(void) {
     begin(true, false);
 }
 
-/// A command of this writer, sent so long ago by its clock.
+/// A command of this writer that was sent `ago_us` ago by its clock.
 static ros_age_t command_of(uint64_t source, int64_t ago_us) {
     return ros_ages_command(&ages, source, wall_us - ago_us, now(), &age_us);
 }
@@ -45,7 +46,7 @@ static ros_age_t other(int64_t ago_us) {
     return command_of(9, ago_us - OTHER);
 }
 
-/// The writer of another machine sends for so long without delay; the verdict on the last one.
+/// The writer of another machine sends for this time without delay; returns the verdict on the last sample.
 static ros_age_t other_sends(int64_t for_us) {
     ros_age_t age = ROS_AGE_UNKNOWN;
     for (int64_t t = 0; t < for_us; t += EVERY) {
@@ -55,7 +56,8 @@ static ros_age_t other_sends(int64_t for_us) {
     return age;
 }
 
-// ---- this machine -----------------------------------------------------------------------------------------------------
+// ---- this machine
+// -----------------------------------------------------------------------------------------------------
 
 TEST(test_ages_first_sample_of_a_minute_ago_is_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(7, 60 * SECOND));
@@ -86,18 +88,18 @@ TEST(test_ages_overtaken_sample_is_refused) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(8, 2000));
 }
 
-TEST(test_ages_stream_that_is_held_back_evenly_is_late) {
+TEST(test_ages_stream_with_a_constant_delay_is_late) {
     for (unsigned i = 0; i < 100U; i++) {
         pass(EVERY);
         TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(7, ROS_OLD_US + EVERY));
     }
 }
 
-TEST(test_ages_clock_set_back_makes_nothing_old_young) {
+TEST(test_ages_clock_set_back_makes_no_old_sample_fresh) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 1000));
     const int64_t held_us = wall_us;
     pass(60 * SECOND);
-    wall_us -= 60 * SECOND; // What was sent a minute ago is of now.
+    wall_us -= 60 * SECOND; // A sample that was sent a minute ago has the present time.
     TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, ros_ages_command(&ages, 8, held_us, now(), &age_us));
     TEST_ASSERT_EQUAL_INT(ROS_AGE_DOUBTED, ros_ages_request(&ages, held_us, now(), &age_us));
     pass(60 * SECOND + ROS_OLD_US - 1);
@@ -107,7 +109,7 @@ TEST(test_ages_clock_set_back_makes_nothing_old_young) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(8, 0));
 }
 
-TEST(test_ages_clock_set_back_twice_is_doubted_until_the_later_end) {
+TEST(test_ages_clock_set_back_twice_is_doubted_until_the_last_end) {
     wall_us -= 60 * SECOND;
     (void)command_of(7, 0);
     wall_us -= SECOND;
@@ -126,7 +128,7 @@ TEST(test_ages_after_a_clock_set_back_a_stream_is_known_again) {
     }
 }
 
-TEST(test_ages_clock_set_forward_only_refuses) {
+TEST(test_ages_clock_set_forward_makes_earlier_samples_late) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, command_of(7, 0));
     const int64_t sent_us = wall_us;
     wall_us += 60 * SECOND;
@@ -142,7 +144,8 @@ TEST(test_ages_clock_that_is_slewed_is_not_doubted) {
     }
 }
 
-// ---- other machines ---------------------------------------------------------------------------------------------------
+// ---- other machines
+// ---------------------------------------------------------------------------------------------------
 
 TEST(test_ages_other_writer_is_known_after_a_second) {
     begin(false, false);
@@ -152,26 +155,26 @@ TEST(test_ages_other_writer_is_known_after_a_second) {
     }
 }
 
-TEST(test_ages_held_back_burst_teaches_nothing) {
+TEST(test_ages_delayed_burst_does_not_make_a_writer_known) {
     for (unsigned count = 2; count <= 100U; count++) {
         begin(false, false);
         for (unsigned i = 0; i < count; i++) {
             TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(60 * SECOND - (int64_t)i * EVERY));
             pass(1000);
         }
-        for (int64_t t = 0; t < ROS_LEARN_US; t += EVERY) { // And what goes on as late.
+        for (int64_t t = 0; t < ROS_LEARN_US; t += EVERY) { // The stream continues with the same delay.
             TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(60 * SECOND - (int64_t)count * EVERY));
             pass(EVERY);
         }
     }
 }
 
-TEST(test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is) {
+TEST(test_ages_burst_after_a_gap_is_late_then_the_stream_is_fresh) {
     for (unsigned count = 2; count <= 100U; count++) {
         begin(false, false);
         TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
         pass((int64_t)count * EVERY);
-        for (unsigned i = 1; i <= count; i++) { // The last one is as old as fresh ones are.
+        for (unsigned i = 1; i <= count; i++) { // The last sample is as old as fresh ones are.
             const ros_age_t age = other((int64_t)(count - i) * EVERY + 1000);
             TEST_ASSERT_TRUE(age != ROS_AGE_FRESH || (age_us <= ROS_LATE_US && count <= 20U));
         }
@@ -179,7 +182,7 @@ TEST(test_ages_burst_after_a_gap_is_not_fresh_and_the_stream_then_is) {
     }
 }
 
-TEST(test_ages_known_writer_late_by_the_limit_passes_and_by_more_not) {
+TEST(test_ages_known_writer_passes_up_to_the_limit) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
     pass(300000);
@@ -191,7 +194,7 @@ TEST(test_ages_known_writer_late_by_the_limit_passes_and_by_more_not) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, ros_ages_command(&ages, 9, sent_us - 1, now(), &age_us));
 }
 
-TEST(test_ages_gap_by_either_clock_begins_anew) {
+TEST(test_ages_gap_by_either_clock_restarts_the_measurement) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
     pass(ROS_GAP_US);
@@ -202,10 +205,10 @@ TEST(test_ages_gap_by_either_clock_begins_anew) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(1000 - ROS_GAP_US - 1));
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_FRESH, other_sends(2 * SECOND));
-    TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(2 * SECOND)); // Its clock was set back.
+    TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, other(2 * SECOND)); // The clock of the writer was set back.
 }
 
-TEST(test_ages_clock_that_runs_otherwise_is_never_known) {
+TEST(test_ages_clock_off_by_12_percent_is_never_known) {
     static const int per_cent[] = {88, 112};
     for (unsigned i = 0; i < 2U; i++) {
         begin(false, false);
@@ -216,7 +219,7 @@ TEST(test_ages_clock_that_runs_otherwise_is_never_known) {
     }
 }
 
-TEST(test_ages_clocks_that_drift_apart_for_a_day_pass) {
+TEST(test_ages_clock_drift_of_50_ppm_for_a_day_passes) {
     begin(false, false);
     for (int64_t t = 0; t < 86400 * SECOND; t += SECOND) {
         const ros_age_t age = ros_ages_command(&ages, 9, t - t / 20000, now(), &age_us); // 50 ppm slow.
@@ -225,7 +228,7 @@ TEST(test_ages_clocks_that_drift_apart_for_a_day_pass) {
     }
 }
 
-TEST(test_ages_faster_way_later_becomes_the_measure) {
+TEST(test_ages_shorter_delay_becomes_the_reference) {
     begin(false, false);
     for (int64_t t = 0; t < 2 * SECOND; t += EVERY) {
         (void)other(90000);
@@ -236,7 +239,7 @@ TEST(test_ages_faster_way_later_becomes_the_measure) {
     TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, other(1000 + ROS_LATE_US + 100));
 }
 
-TEST(test_ages_request_of_another_machine_needs_synchronised_clocks) {
+TEST(test_ages_request_of_another_machine_needs_synchronised_time) {
     begin(false, false);
     TEST_ASSERT_EQUAL_INT(ROS_AGE_UNKNOWN, ros_ages_request(&ages, wall_us, now(), &age_us));
     begin(false, true);
@@ -257,7 +260,7 @@ TEST(test_ages_command_with_synchronised_clocks_needs_both) {
     }
 }
 
-TEST(test_ages_more_writers_than_places_forget_the_longest_silent) {
+TEST(test_ages_new_writer_replaces_the_longest_idle_one) {
     begin(false, false);
     for (uint64_t source = 1; source <= ROS_SOURCES; source++) {
         for (int64_t t = 0; t <= ROS_LEARN_US; t += ROS_LEARN_US) {
@@ -268,7 +271,7 @@ TEST(test_ages_more_writers_than_places_forget_the_longest_silent) {
     pass(1000);
     TEST_ASSERT_EQUAL_UINT64(ROS_SOURCES, ages.sources[ROS_SOURCES - 1U].source);
     (void)command_of(1, 0);
-    (void)command_of(ROS_SOURCES + 1U, 0); // In the place of 2.
+    (void)command_of(ROS_SOURCES + 1U, 0); // The new source replaces source 2.
     TEST_ASSERT_EQUAL_UINT64(1, ages.sources[0].source);
     TEST_ASSERT_EQUAL_UINT64(ROS_SOURCES + 1U, ages.sources[1].source);
 }

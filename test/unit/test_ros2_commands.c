@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which commands from ROS pass: numbers, and when the bridge may arm by itself.
+// Which commands from ROS pass: numbers, and when the bridge may arm automatically.
 #include "commands.h"
 
 #include "unit.h"
@@ -29,7 +29,7 @@ TEST(test_twist_metres_and_radians_become_thousandths) {
     TEST_ASSERT_EQUAL_INT32(-1000, twist.yaw_mrad_s);
 }
 
-TEST(test_twist_what_is_no_number_anywhere_is_refused_whole) {
+TEST(test_twist_with_any_value_not_finite_is_refused_completely) {
     const double bad[] = {NAN, INFINITY, -INFINITY};
     for (unsigned i = 0; i < 3U; i++) {
         for (unsigned place = 0; place < 6U; place++) {
@@ -51,22 +51,22 @@ TEST(test_twist_beyond_every_range_is_refused) {
     TEST_ASSERT_EQUAL(ROS_TWIST_GOOD, read_twist(32.767, -32.767, &twist));
 }
 
-// ---- arming by itself ---------------------------------------------------------------------------------------------
+// ---- automatic arming ---------------------------------------------------------------------------------------------
 
-TEST(test_auto_arm_command_after_silence_asks_once) {
+TEST(test_auto_arm_first_command_after_a_pause_requests_once) {
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US - 1));
     setUp();
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, ROS_QUIET_US));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US + 20000));
 }
 
-TEST(test_auto_arm_zeros_for_long_enough_ask) {
+TEST(test_auto_arm_zeros_for_the_quiet_time_request_the_lease) {
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, 100000));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US - 1));
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US));
 }
 
-TEST(test_auto_arm_stream_that_never_rests_never_asks) {
+TEST(test_auto_arm_stream_without_zeros_never_requests) {
     for (int64_t t = 0; t < 60LL * SECOND; t += 100000) {
         TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, t));
     }
@@ -80,7 +80,7 @@ TEST(test_auto_arm_foreign_stop_waits_for_the_service) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3LL * SECOND));
 }
 
-/// Commands at 20 Hz for so long; how many of them ask for the lease.
+/// Sends commands at 20 Hz in this time; returns how many of them request the lease.
 static unsigned stream(int64_t from_us, int64_t until_us) {
     unsigned asks = 0;
     for (int64_t t = from_us; t < until_us; t += SECOND / 20) {
@@ -89,22 +89,22 @@ static unsigned stream(int64_t from_us, int64_t until_us) {
     return asks;
 }
 
-TEST(test_auto_arm_stream_after_a_persons_stop_does_not_ask) {
+TEST(test_auto_arm_stream_after_an_operator_stop_does_not_request) {
     ros_auto_person_stopped(&automatic);
-    TEST_ASSERT_EQUAL_UINT(0, stream(5LL * SECOND, 65LL * SECOND)); // Also after silence: the stop came last.
+    TEST_ASSERT_EQUAL_UINT(0, stream(5LL * SECOND, 65LL * SECOND)); // Also after a pause: the stop came last.
     TEST_ASSERT_EQUAL_UINT(0, stream(65LL * SECOND + ROS_SILENT_US - 50000 - 1, 70LL * SECOND));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 70LL * SECOND));
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, 70LL * SECOND + ROS_SILENT_US));
 }
 
-TEST(test_auto_arm_persons_stop_ends_by_the_service) {
+TEST(test_auto_arm_operator_stop_ends_by_the_service) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     ros_auto_told(&automatic);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 2LL * SECOND + 50000));
 }
 
-TEST(test_auto_arm_persons_stop_again_begins_anew) {
+TEST(test_auto_arm_second_operator_stop_restarts_the_wait) {
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     ros_auto_person_stopped(&automatic);
@@ -112,24 +112,24 @@ TEST(test_auto_arm_persons_stop_again_begins_anew) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 6LL * SECOND));
 }
 
-TEST(test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service) {
+TEST(test_auto_arm_operator_stop_does_not_end_the_service_wait) {
     ros_auto_stopped(&automatic, false);
     ros_auto_person_stopped(&automatic);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
     setUp();
     ros_auto_person_stopped(&automatic);
-    ros_auto_stopped(&automatic, false); // The gateway's word on it: the wheels turned.
+    ros_auto_stopped(&automatic, false); // The event of the gateway on it: the wheels turned.
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
 }
 
-TEST(test_auto_arm_silence_of_its_own_source_keeps_the_trust) {
+TEST(test_auto_arm_own_lease_lost_needs_no_service) {
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
 }
 
-TEST(test_auto_arm_refused_by_the_gateway_asks_again_only_later) {
+TEST(test_auto_arm_refused_by_the_gateway_requests_again_later) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US - 1));
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What new writers of Fast DDS wrote first: heartbeats on their way in, ACKNACKs on their way out.
+// First messages of new Fast DDS writers: incoming heartbeats, outgoing ACKNACKs.
 #include "firsts.h"
 
 #include "unit.h"
@@ -36,7 +36,7 @@ static void put_sequence(int64_t number, bool little) {
     length += 8U;
 }
 
-/// A message of a participant with this last byte.
+/// Begins a message of the participant with this last byte.
 static void begin_message(uint8_t participant) {
     const uint8_t header[HEAD] = {'R', 'T', 'P', 'S', 2, 3, 1, 15, 1, 15, 0, 0, 0, 0, 0, 0, 0, 0, 0, participant};
     length = 0;
@@ -62,7 +62,7 @@ static void put_heartbeat(bool little, uint8_t writer_kind, int64_t first, int64
     put_number(9, 4, little);
 }
 
-/// Leaves the message as it is. 0: nothing would change.
+/// Does not change the message. Returns 0 if there is nothing to add.
 static size_t await_in(int64_t now_us, size_t count, size_t room) {
     memset(out, 0xA5, sizeof out);
     memcpy(out, message, count);
@@ -81,15 +81,15 @@ static size_t await_at(int64_t now_us) {
 
 // ---- heartbeats -----------------------------------------------------------------------------------------------------
 
-TEST(test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer) {
+TEST(test_firsts_new_writer_gets_an_empty_heartbeat_first) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         begin_message(1);
-        put_part(0x09, (uint8_t)(little | 2U), 0); // A time without one.
+        put_part(0x09, (uint8_t)(little | 2U), 0); // An INFO_TS submessage without a time.
         put_heartbeat(little == 1U, 3, 0x200000005LL, 0x200000007LL);
         put_part(0x01, 1, 4);
         put_number(0x01020304U, 4, true);
-        message[HEAD + 4U + 1U] |= 8U; // It tells of a group, which the one before does not.
+        message[HEAD + 4U + 1U] |= 8U; // Sets the group flag, which the added heartbeat does not have.
         TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(0));
         TEST_ASSERT_EQUAL_MEMORY(message, out, HEAD + 4U);
         TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 4U, out + HEAD + 4U + BEAT, length - HEAD - 4U);
@@ -97,7 +97,7 @@ TEST(test_firsts_nothing_yet_stands_before_the_heartbeat_of_a_new_writer) {
         TEST_ASSERT_EQUAL_HEX8(7, added[0]);
         TEST_ASSERT_EQUAL_HEX8(little | 2U, added[1]);
         TEST_ASSERT_EQUAL_UINT32(28, rtps_read(added + 2, 2, little == 1U));
-        TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 4U + 4U, added + 4, 16); // Ids, and the first.
+        TEST_ASSERT_EQUAL_MEMORY(message + HEAD + 4U + 4U, added + 4, 16); // Entity ids and the first sequence number.
         TEST_ASSERT_EQUAL_INT64(0x200000004LL, rtps_read_sequence(added + 20, little == 1U));
         TEST_ASSERT_EQUAL_UINT32(8, rtps_read(added + 28, 4, little == 1U));
     }
@@ -109,13 +109,13 @@ TEST(test_firsts_writer_is_new_for_five_seconds) {
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000));
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000 + FIRSTS_NEW_US - 1));
     TEST_ASSERT_EQUAL_size_t(0, await_at(1000 + FIRSTS_NEW_US));
-    message[HEAD + 10U] = 9; // Another writer of it,
+    message[HEAD + 10U] = 9; // Another writer of the participant,
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000 + FIRSTS_NEW_US));
-    message[HEAD - 1U] = 2; // and of another participant.
+    message[HEAD - 1U] = 2; // and a writer of another participant.
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(1000 + 2LL * FIRSTS_NEW_US));
 }
 
-TEST(test_firsts_of_many_writers_the_oldest_is_forgotten) {
+TEST(test_firsts_table_full_replaces_the_oldest_writer) {
     for (uint8_t i = 0; i < FIRSTS_WRITERS; i++) {
         begin_message(i);
         put_heartbeat(true, 3, 1, 1);
@@ -139,7 +139,7 @@ TEST(test_firsts_of_many_writers_the_oldest_is_forgotten) {
     TEST_ASSERT_GREATER_THAN_size_t(0, await_at(FIRSTS_NEW_US));
 }
 
-TEST(test_firsts_all_else_is_left_alone) {
+TEST(test_firsts_other_messages_are_unchanged) {
     static const struct {
         const char *what;
         int64_t first, last;
@@ -169,7 +169,7 @@ TEST(test_firsts_all_else_is_left_alone) {
     TEST_ASSERT_EQUAL_size_t(length + BEAT, await_at(0));
 }
 
-TEST(test_firsts_damaged_message_or_small_room_is_left_alone) {
+TEST(test_firsts_damaged_message_or_small_buffer_is_unchanged) {
     begin_message(1);
     put_heartbeat(true, 3, 1, 2);
     put_part(0x01, 1, 4);
@@ -187,12 +187,12 @@ TEST(test_firsts_damaged_message_or_small_room_is_left_alone) {
     TEST_ASSERT_EQUAL_size_t(0, await_at(0));
 }
 
-TEST(test_firsts_several_heartbeats_of_a_message_each_have_their_own) {
+TEST(test_firsts_each_heartbeat_of_a_message_gets_its_own) {
     begin_message(1);
     put_heartbeat(true, 3, 1, 1);
     put_heartbeat(true, 0xC3, 1, 1);
     put_heartbeat(false, 2, 5, 6);
-    message[length - 30U] = 0; // The last one reaches to the end.
+    message[length - 30U] = 0; // Length 0: the last submessage extends to the end.
     message[length - 29U] = 0;
     TEST_ASSERT_EQUAL_size_t(length + 2 * BEAT, await_at(0));
     TEST_ASSERT_EQUAL_MEMORY(message + HEAD, out + HEAD + BEAT, 2 * BEAT);
@@ -209,7 +209,7 @@ static void put_destination(uint8_t vendor, uint16_t rest) {
     put(prefix, rest);
 }
 
-/// Returns where it begins.
+/// Returns the offset of the submessage.
 static size_t put_acknack(bool little, int64_t base, uint32_t bits, uint32_t count) {
     const size_t at = length;
     put_part(6, little ? 1 : 0, (uint16_t)(24U + (bits + 31U) / 32U * 4U));
@@ -231,7 +231,7 @@ static uint32_t count_before(size_t end) {
     return rtps_read(message + end - 4U, 4, true);
 }
 
-TEST(test_firsts_first_acknack_is_that_of_fast_dds) {
+TEST(test_firsts_first_acknack_asks_from_sequence_zero) {
     for (unsigned little = 0; little < 2U; little++) {
         begin_message(1);
         put_destination(15, 12);
@@ -265,7 +265,7 @@ TEST(test_firsts_later_acknacks_count_one_more) {
     TEST_ASSERT_EQUAL_INT64_MESSAGE(1, base_at(at), "it asks for a sample");
 }
 
-TEST(test_firsts_only_what_is_for_fast_dds_changes) {
+TEST(test_firsts_only_acknacks_to_fast_dds_change) {
     begin_message(1);
     const size_t none = put_acknack(true, 1, 0, 0);
     put_destination(16, 12);
@@ -286,7 +286,7 @@ TEST(test_firsts_only_what_is_for_fast_dds_changes) {
     TEST_ASSERT_EQUAL_INT64(1, base_at(last));
 }
 
-TEST(test_firsts_damaged_acknack_is_left_alone) {
+TEST(test_firsts_damaged_acknack_is_unchanged) {
     begin_message(1);
     put_destination(15, 12);
     const size_t at = put_acknack(true, 1, 256, 5);
@@ -296,15 +296,15 @@ TEST(test_firsts_damaged_acknack_is_left_alone) {
     }
     rtps_write(257, 4, true, message + at + 20U);
     put_number(0, 4, true);
-    message[at + 2U] = (uint8_t)(message[at + 2U] + 4U); // There would be room for so many.
+    message[at + 2U] = (uint8_t)(message[at + 2U] + 4U); // The set would have space for as many bits.
     TEST_ASSERT_FALSE(rtps_ask_firsts(message, length));
     rtps_write(0xFFFFFFFFU, 4, true, message + at + 20U);
     TEST_ASSERT_FALSE(rtps_ask_firsts(message, length));
     memcpy(message, out, sizeof out);
     length -= 4U;
-    message[at + 2U] = 52; // Shorter than its set.
+    message[at + 2U] = 52; // Shorter than the set of the submessage.
     TEST_ASSERT_FALSE(rtps_ask_firsts(message, at + 56U));
-    message[at + 2U] = 20; // Shorter than any.
+    message[at + 2U] = 20; // Shorter than any ACKNACK.
     memset(message + at + 20U, 0, 4);
     TEST_ASSERT_FALSE(rtps_ask_firsts(message, at + 24U));
     memcpy(message, out, sizeof out);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the bridge to ROS makes of a snapshot: odometry with its doubt, diagnostics, state.
+// Output of the ROS bridge for a snapshot: odometry with its uncertainty, diagnostics, state.
 #include "diagnosis.h"
 #include "odometry.h"
 
@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SECOND 1000000
+#define SECOND INT64_C(1000000)
 #define TRACK  540
 
 static ros_odometry_t odometry;
@@ -36,7 +36,7 @@ static void go(int64_t t_us, int64_t left_mm, int64_t right_mm) {
     ros_odometry_step(&odometry, &ways, &(ros_measures_t){.tick_m = 0.0201, .track_m = TRACK / 1000.0});
 }
 
-/// Unity's own may be built without doubles.
+/// The macro of Unity may be built without doubles.
 static void expect_near(double within, double expected, double actual) {
     char words[80];
     (void)snprintf(words, sizeof words, "%g expected, not %g", expected, actual);
@@ -45,7 +45,7 @@ static void expect_near(double within, double expected, double actual) {
 
 // ---- odometry -----------------------------------------------------------------------------------------------------
 
-TEST(test_odometry_first_ways_are_the_origin) {
+TEST(test_odometry_first_distances_are_the_origin) {
     go(0, 123456, -98765);
     TEST_ASSERT_TRUE(odometry.begun);
     expect_near(1e-12, 0.0, odometry.x_m);
@@ -53,7 +53,7 @@ TEST(test_odometry_first_ways_are_the_origin) {
     TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
 }
 
-TEST(test_odometry_straight_way_is_x) {
+TEST(test_odometry_straight_path_is_x) {
     for (int i = 0; i <= 100; i++) {
         go(i * SECOND / 50, 10 * i, 10 * i);
     }
@@ -62,7 +62,7 @@ TEST(test_odometry_straight_way_is_x) {
     expect_near(1e-9, 1.0, odometry.path_m);
 }
 
-TEST(test_odometry_turn_to_the_left_is_positive_and_does_not_drift) {
+TEST(test_odometry_turn_to_the_left_is_positive_without_drift) {
     for (int i = 0; i <= 1000; i++) {
         go(i * SECOND / 50, -17 * i / 10, 17 * i / 10);
     }
@@ -70,7 +70,7 @@ TEST(test_odometry_turn_to_the_left_is_positive_and_does_not_drift) {
     expect_near(0.01, 0.0, odometry.x_m);
 }
 
-TEST(test_odometry_quarter_circle_ends_where_it_must) {
+TEST(test_odometry_quarter_circle_has_the_exact_pose) {
     const double radius_mm = 1000.0;
     for (int i = 0; i <= 1000; i++) {
         const double angle = M_PI / 2.0 * i / 1000.0;
@@ -81,14 +81,14 @@ TEST(test_odometry_quarter_circle_ends_where_it_must) {
     expect_near(0.003, M_PI / 2.0, odometry.yaw_rad);
 }
 
-TEST(test_odometry_messages_lost_on_a_straight_way_lose_no_way) {
+TEST(test_odometry_lost_messages_lose_no_distance) {
     go(0, 0, 0);
     go(2 * SECOND, 1900, 1900);
     expect_near(1e-9, 1.9, odometry.x_m);
     TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
 }
 
-TEST(test_odometry_ways_that_jump_start_anew) {
+TEST(test_odometry_jump_of_a_distance_restarts_at_the_origin) {
     go(0, 0, 0);
     go(SECOND, 900, 900);
     go(SECOND + 20000, 0, 900);
@@ -99,7 +99,7 @@ TEST(test_odometry_ways_that_jump_start_anew) {
     TEST_ASSERT_EQUAL_UINT(1, odometry.restarts);
 }
 
-TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed) {
+TEST(test_doubt_grows_with_the_path_and_less_if_confirmed) {
     const ros_measures_t assumed = {false, false, 0.02, 0.54};
     const ros_measures_t confirmed = {true, true, 0.02, 0.54};
     go(0, 0, 0);
@@ -112,11 +112,11 @@ TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed) {
     expect_near(1e-9, 0.29 * 0.02, at_start.x_m);
     TEST_ASSERT_TRUE(later.x_m > 4.1 * 0.0447 && later.yaw_rad > at_start.yaw_rad);
     TEST_ASSERT_TRUE(better.x_m < later.x_m && better.yaw_rad < later.yaw_rad && better.v_m_s < later.v_m_s);
-    TEST_ASSERT_TRUE(better.x_m > 4.1 * 0.0223); // Slip stays.
+    TEST_ASSERT_TRUE(better.x_m > 4.1 * 0.0223); // The share of slip stays.
 }
 
-/// Whole ticks, those of the wheels half a tick apart, 4.7 m at 0.5 m/s.
-TEST(test_doubt_on_a_straight_way_ignores_tick_jitter) {
+/// Whole ticks, with the two wheels half a tick apart, for 4.7 m at 0.5 m/s.
+TEST(test_doubt_on_a_straight_path_ignores_tick_jitter) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     for (int i = 0; i <= 470; i++) {
         const double way_mm = 10.0 * i;
@@ -127,8 +127,9 @@ TEST(test_doubt_on_a_straight_way_ignores_tick_jitter) {
     TEST_ASSERT_TRUE(doubt.x_m > 4.7 * 0.0447 && doubt.x_m < 4.7 * 0.05);
 }
 
-/// The largest growth on each metre of a straight way of 50 m is 5 % of it; on the spot a turn makes the heading uncertain, not the place.
-TEST(test_doubt_grows_by_5_percent_of_a_straight_way) {
+/// The growth on each metre of a straight path of 50 m is at most 5 % of it. A turn on the spot makes the heading
+/// uncertain, not the position.
+TEST(test_doubt_grows_by_5_percent_of_a_straight_path) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     double place_m = 0.0;
     double yaw_rad = 0.0;
@@ -146,7 +147,7 @@ TEST(test_doubt_grows_by_5_percent_of_a_straight_way) {
     }
 }
 
-TEST(test_doubt_of_the_heading_grows_with_turning_up_to_half_a_turn) {
+TEST(test_doubt_of_the_heading_grows_by_turning_up_to_pi) {
     const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
     double before_rad = 0.0;
     for (int i = 0; i <= 4000; i++) {
@@ -189,7 +190,7 @@ TEST(test_snapshot_is_read_and_unknown_stays_unknown) {
     iwc_free(gateway);
 }
 
-TEST(test_ledger_gives_measures_and_what_is_contradicted) {
+TEST(test_snapshot_assumptions_set_measures_and_contradiction) {
     const iwc_message_t message = snapshot();
     ros_facts_read_assumptions(&message, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
@@ -202,8 +203,8 @@ TEST(test_ledger_gives_measures_and_what_is_contradicted) {
     TEST_ASSERT_TRUE(facts.machine.setpoint_current);
 }
 
-/// An invented one would turn the machine on every map.
-TEST(test_track_that_is_not_configured_is_none) {
+/// An invented track would turn the machine on every map.
+TEST(test_snapshot_track_not_configured_is_none) {
     static const char unset[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"value\":\"192\"},\"track\":{\"value\":null}}}";
     const iwc_message_t seen = {.text = unset, .length = sizeof unset - 1U, .is_event = true};
@@ -212,7 +213,7 @@ TEST(test_track_that_is_not_configured_is_none) {
     TEST_ASSERT_EQUAL_INT64(0, facts.machine.track_mm);
 }
 
-TEST(test_configuration_stands_for_the_values_that_a_board_has_not) {
+TEST(test_configuration_replaces_values_missing_on_a_board) {
     static const char board[] =
         "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"state\":\"assumed\",\"value\":null},"
         "\"track\":{\"state\":\"confirmed\",\"value\":null},\"gear_ratio\":{\"value\":null}}}";
@@ -233,7 +234,7 @@ TEST(test_configuration_stands_for_the_values_that_a_board_has_not) {
     TEST_ASSERT_TRUE(facts.machine.setpoint_current && facts.machine.measures.track_confirmed);
     expect_near(1e-9, 2.0 * M_PI * 0.15 / 60.0 / 2.5, facts.machine.measures.tick_m);
     const iwc_message_t cut = {.text = config, .length = 60};
-    ros_facts_read_config(&cut, &facts.machine); // A reply that is none: what is known stays.
+    ros_facts_read_config(&cut, &facts.machine); // The reply is no valid JSON: the known values stay.
     ros_facts_read_assumptions(&whole, &facts.machine);
     TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
 }
@@ -248,14 +249,14 @@ static void expect(ros_tells_t which, ros_level_t level, const char *part) {
     }
 }
 
-TEST(test_diagnosis_button_never_seen_to_work_is_a_warning) {
+TEST(test_diagnosis_button_never_pressed_is_a_warning) {
     facts.machine.estop_tried = false;
     expect(ROS_TELLS_ESTOP, ROS_WARN, "never seen to work");
     facts.machine.estop_simulated = true;
     expect(ROS_TELLS_ESTOP, ROS_OK, "released");
 }
 
-TEST(test_diagnosis_all_in_order_is_ok) {
+TEST(test_diagnosis_without_a_fault_is_ok) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&facts, (ros_tells_t)i, &status);
         TEST_ASSERT_EQUAL_MESSAGE(ROS_OK, status.level, status.message);
@@ -264,7 +265,7 @@ TEST(test_diagnosis_all_in_order_is_ok) {
     expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
 }
 
-TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale) {
+TEST(test_diagnosis_gateway_offline_is_an_error_others_stale) {
     facts.link = ROS_LINK_GONE;
     (void)snprintf(facts.trouble, sizeof facts.trouble, "nobody listens");
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "nobody listens");
@@ -274,7 +275,7 @@ TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale) {
     expect(ROS_TELLS_ESTOP, ROS_STALE, "does not answer");
 }
 
-TEST(test_diagnosis_each_stop_has_its_sentence_and_cure) {
+TEST(test_diagnosis_each_stop_has_its_sentence_and_fix) {
     facts.machine.now.machine = IWC_LATCHED;
     (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "the left wheel was lost");
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
@@ -312,7 +313,7 @@ TEST(test_diagnosis_each_stop_has_its_sentence_and_cure) {
     expect(ROS_REPORTS_ASSUMPTIONS, ROS_ERROR, "track: no");
 }
 
-TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving) {
+TEST(test_diagnosis_commands_report_why_they_do_not_drive) {
     facts.commands.late = 3;
     expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late");
     (void)snprintf(facts.commands.refusal, sizeof facts.commands.refusal, "arm first");
@@ -334,7 +335,7 @@ TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving) {
     expect(ROS_TELLS_COMMANDS, ROS_OK, "watching only");
 }
 
-TEST(test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix) {
+TEST(test_diagnosis_unmatched_publisher_is_named_with_the_fix) {
     ros_unmatched_t *unmatched = &facts.commands.unmatched;
     *unmatched =
         (ros_unmatched_t){.count = 1, .topic = "/w1/cmd_vel", .policy = "", .wanted = "geometry_msgs/msg/Twist"};
@@ -350,7 +351,7 @@ TEST(test_diagnosis_publisher_that_is_not_received_is_named_with_the_fix) {
     expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
 }
 
-TEST(test_type_name_of_a_stranger_stays_within_its_size_and_characters) {
+TEST(test_type_name_from_outside_is_cut_and_escaped) {
     char name[16];
     ros_facts_type_name("a::msg::dds_::B\x07\"_", name, sizeof name);
     TEST_ASSERT_EQUAL_STRING("a/msg/B??", name);
@@ -368,7 +369,7 @@ static void expect_estop(ros_link_t link, const char *state, ros_estop_t expecte
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected, ros_facts_estop(&facts), state);
 }
 
-TEST(test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line) {
+TEST(test_estop_unreadable_is_pressed_and_none_is_no_line) {
     expect_estop(ROS_LINK_UP, "released", ROS_ESTOP_RELEASED);
     expect_estop(ROS_LINK_UP, "pressed", ROS_ESTOP_PRESSED);
     expect_estop(ROS_LINK_UP, "unreadable", ROS_ESTOP_PRESSED);
@@ -380,7 +381,7 @@ TEST(test_estop_that_cannot_be_read_counts_as_pressed_and_none_is_no_line) {
     expect_estop(ROS_LINK_GONE, "none", ROS_ESTOP_NO_LINE);
 }
 
-TEST(test_diagnosis_values_that_are_not_known_are_empty) {
+TEST(test_diagnosis_unknown_values_are_empty) {
     ros_diagnose(&facts, ROS_TELLS_LEFT, &status);
     TEST_ASSERT_EQUAL_STRING("speed_mm_s", status.values[0].key);
     TEST_ASSERT_EQUAL_STRING("", status.values[0].text);
@@ -388,7 +389,7 @@ TEST(test_diagnosis_values_that_are_not_known_are_empty) {
 
 // ---- iwheel/state -------------------------------------------------------------------------------------------------
 
-TEST(test_state_texts_from_others_stay_within_their_quotes) {
+TEST(test_state_texts_from_outside_are_escaped) {
     char json[2048];
     facts.machine.now.holder.known = true;
     (void)snprintf(facts.machine.holder, sizeof facts.machine.holder, "a\"b\\\\u0007");
@@ -399,7 +400,7 @@ TEST(test_state_texts_from_others_stay_within_their_quotes) {
     TEST_ASSERT_NOT_NULL(strstr(json, "\"cause\":null"));
 }
 
-TEST(test_state_gateway_gone_tells_nothing_old) {
+TEST(test_state_gateway_offline_has_no_old_values) {
     char json[2048];
     facts.link = ROS_LINK_GONE;
     ros_state_json(&facts, json, sizeof json);

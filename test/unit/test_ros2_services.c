@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Requests and replies of services as the vendors of ROS send them, and what is added to an RTPS message on its way out.
+// Requests and replies of services as the ROS vendors send them, and the additions to an outgoing RTPS message.
 #include "services.h"
 
 #include "unit.h"
@@ -37,7 +37,7 @@ static void begin_message(void) {
     put(PREFIX, sizeof PREFIX);
 }
 
-/// A DATA submessage of WRITER with this number, this inline QoS (NULL: none) and a payload of 8 bytes.
+/// Adds a DATA submessage of WRITER with this number, this inline QoS (NULL: none) and a payload of 8 bytes.
 static void put_data(bool little, uint8_t number, const uint8_t *qos, size_t qos_size) {
     const uint8_t rest = (uint8_t)(20U + qos_size + 8U);
     const uint8_t header[8] = {0x15,
@@ -78,7 +78,7 @@ TEST(test_service_request_of_fast_dds_has_one_byte) {
     TEST_ASSERT_EQUAL_INT(ROS_FORM_IDENTITY, caller.form);
 }
 
-TEST(test_service_request_of_cyclonedds_has_a_header_of_either_order) {
+TEST(test_service_request_of_cyclonedds_has_either_byte_order) {
     const uint8_t guid[8] = {1, 2, 3, 4, 5, 6, 7, 8};
     const uint8_t little[24] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0, 1};
     const uint8_t big[24] = {0, 0, 0, 0, 8, 7, 6, 5, 4, 3, 2, 1, 0, 0, 0, 1, 0, 0, 0, 9};
@@ -109,7 +109,7 @@ TEST(test_service_request_of_another_type_is_unreadable) {
 
 // ---- sample identity ------------------------------------------------------------------------------------------------
 
-TEST(test_service_identity_is_the_writers_and_the_number) {
+TEST(test_service_identity_is_the_writer_and_the_number) {
     for (unsigned little = 0; little < 2U; little++) {
         setUp();
         begin_message();
@@ -121,11 +121,11 @@ TEST(test_service_identity_is_the_writers_and_the_number) {
     }
 }
 
-TEST(test_service_identity_is_the_one_that_inline_qos_names) {
+TEST(test_service_identity_in_inline_qos_has_priority) {
     static const uint8_t kinds[2][2] = {{0x83, 0}, {0x0F, 0x80}};
     for (unsigned i = 0; i < 2U; i++) {
         uint8_t qos[40] = {0x71, 0, 4, 0, 0, 0, 0, 1, kinds[i][0], kinds[i][1], 24, 0, 'c', 'l', 'i', 'e', 'n', 't'};
-        qos[36] = 1; // The end.
+        qos[36] = 1; // End of the list of parameters.
         setUp();
         begin_message();
         put_data(true, 6, qos, sizeof qos);
@@ -146,11 +146,12 @@ TEST(test_service_identity_of_a_damaged_message_is_none) {
     TEST_ASSERT_TRUE(ros_service_identify(message, length, 20, &caller));
     TEST_ASSERT_EQUAL_MEMORY(PREFIX, caller.guid, sizeof PREFIX);
     TEST_ASSERT_FALSE(ros_service_identify(message, length, 0, &caller));
-    message[26] = 0xFF; // Its inline QoS would be behind its end.
+    message[26] = 0xFF; // The inline QoS would start after the end of the message.
     TEST_ASSERT_FALSE(ros_service_identify(message, length, 20, &caller));
 }
 
-// ---- replies ----------------------------------------------------------------------------------------------------------
+// ---- replies
+// ----------------------------------------------------------------------------------------------------------
 
 TEST(test_service_reply_of_fast_dds_is_flag_and_text) {
     const uint8_t wanted[] = {0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'o', 'k', 0};
@@ -181,7 +182,8 @@ TEST(test_service_reply_that_does_not_fit_is_cut) {
     }
 }
 
-// ---- what is added ------------------------------------------------------------------------------------------------------
+// ---- additions
+// --------------------------------------------------------------------------------------------------------
 
 static void note(ros_form_t form, uint8_t last) {
     ros_caller_t of = {.form = form, .number = 0x100000002LL};
@@ -202,16 +204,17 @@ TEST(test_service_mark_names_the_caller_in_the_reply) {
         put_data(little == 1U, 1, NULL, 0);
         put_heartbeat();
         TEST_ASSERT_EQUAL_size_t(length + ROS_MARK_SIZE, mark());
-        TEST_ASSERT_EQUAL_MEMORY(message, out, 53);                         // Up to the flags,
-        TEST_ASSERT_EQUAL_HEX8(message[53] | 2U, out[53]);                  // which tell of it now,
-        TEST_ASSERT_EQUAL_HEX8(28U + ROS_MARK_SIZE, out[little ? 54 : 55]); // and a length.
+        TEST_ASSERT_EQUAL_MEMORY(message, out, 53);                         // Bytes before the flags are equal,
+        TEST_ASSERT_EQUAL_HEX8(message[53] | 2U, out[53]);                  // the flags have the bit of inline QoS,
+        TEST_ASSERT_EQUAL_HEX8(28U + ROS_MARK_SIZE, out[little ? 54 : 55]); // and the length has grown.
         TEST_ASSERT_TRUE(ros_service_identify(out, length + ROS_MARK_SIZE, 52, &caller));
         TEST_ASSERT_EACH_EQUAL_HEX8(0x77, caller.guid, ROS_GUID_SIZE);
         const uint8_t little_number[8] = {1, 0, 0, 0, 2, 0, 0, 0};
         const uint8_t big_number[8] = {0, 0, 0, 1, 0, 0, 0, 2};
         TEST_ASSERT_EQUAL_MEMORY(little ? little_number : big_number, out + 52 + 24 + 20, 8);
         TEST_ASSERT_EQUAL_MEMORY(little ? little_number : big_number, out + 52 + 24 + 28 + 20, 8);
-        TEST_ASSERT_EQUAL_MEMORY(message + 76, out + 76 + ROS_MARK_SIZE, 8U + 32U); // Payload and what follows.
+        // Payload and later bytes are equal.
+        TEST_ASSERT_EQUAL_MEMORY(message + 76, out + 76 + ROS_MARK_SIZE, 8U + 32U);
     }
 }
 
@@ -221,11 +224,11 @@ TEST(test_service_mark_reads_submessages_without_a_length) {
     begin_message();
     put(without_time, sizeof without_time);
     put_data(true, 1, NULL, 0);
-    message[26] = 0; // The last one reaches to the end.
+    message[26] = 0; // Length 0: the last submessage extends to the end.
     TEST_ASSERT_EQUAL_size_t(length + ROS_MARK_SIZE, mark());
 }
 
-TEST(test_service_mark_leaves_inline_qos_that_is_there) {
+TEST(test_service_mark_retains_existing_inline_qos) {
     const uint8_t qos[12] = {0x71, 0, 4, 0, 0, 0, 0, 1, 1, 0, 0, 0};
     note(ROS_FORM_UNREADABLE, 0x77);
     begin_message();
@@ -236,7 +239,7 @@ TEST(test_service_mark_leaves_inline_qos_that_is_there) {
     TEST_ASSERT_EACH_EQUAL_HEX8(0x77, caller.guid, ROS_GUID_SIZE);
 }
 
-TEST(test_service_mark_leaves_all_else_alone) {
+TEST(test_service_mark_does_not_change_other_messages) {
     begin_message();
     put_data(true, 1, NULL, 0);
     TEST_ASSERT_EQUAL_size_t_MESSAGE(0, mark(), "nothing was noted");
@@ -258,7 +261,7 @@ TEST(test_service_mark_leaves_all_else_alone) {
     TEST_ASSERT_EQUAL_size_t_MESSAGE(0, mark(), "no RTPS");
 }
 
-TEST(test_service_mark_forgets_what_dds_does_not_keep) {
+TEST(test_service_mark_is_stored_for_the_newest_callers_only) {
     for (uint8_t i = 1; i <= ROS_MARKS + 2U; i++) {
         note(ROS_FORM_IDENTITY, i);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The configuration file of the bridge to ROS 2: each error with its line and cure.
+// The configuration file of the bridge to ROS 2: each error with its line and fix.
 #include "ros_settings.h"
 
 #include "unit.h"
@@ -53,7 +53,7 @@ TEST(test_settings_all_keys_are_read) {
     TEST_ASSERT_EQUAL_STRING("w1/odom", settings.odometry.odom_frame);
 }
 
-TEST(test_settings_each_error_names_line_and_cure) {
+TEST(test_settings_each_error_names_line_and_fix) {
     const struct {
         const char *text;
         const char *words;
@@ -77,7 +77,7 @@ TEST(test_settings_each_error_names_line_and_cure) {
     }
 }
 
-TEST(test_settings_what_is_printed_reads_back_the_same) {
+TEST(test_settings_printed_file_is_read_back_unchanged) {
     char *printed = NULL;
     size_t size = 0;
     TEST_ASSERT_EQUAL_INT(0, read_text("[ros]\nnamespace = w1\n[drive]\nauto_arm = yes\n"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The sender alone: whole pairs, both or none, what it counts and how it begins.
+// The sender alone: complete pairs, both frames or none, its counters and its initial state.
 #include "fake_bus.h"
 #include "iwheel/private/transmit.h"
 #include "unit.h"
@@ -33,7 +33,7 @@ static void echo(iw_side_t side) {
     iw_confirmation_echo(&sender.confirmation, side, &bus.last[side]);
 }
 
-/// A whole pair of zeros, echoed.
+/// Sends a complete pair of zeros and its echoes.
 static void send_whole(iw_time_us_t after_us) {
     now_us += after_us;
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
@@ -41,7 +41,7 @@ static void send_whole(iw_time_us_t after_us) {
     echo(IW_RIGHT);
 }
 
-TEST(test_sender_begins_with_nothing_sent_and_nothing_under_way) {
+TEST(test_sender_starts_with_zero_counters_and_no_pending_frame) {
     TEST_ASSERT_TRUE(iw_sender_ready(&sender, false));
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&sender.confirmation) == IW_NEVER);
     TEST_ASSERT_EQUAL_UINT32(0, sender.confirmation.stray);
@@ -54,14 +54,14 @@ TEST(test_sender_begins_with_nothing_sent_and_nothing_under_way) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender.verdict);
 }
 
-TEST(test_sender_first_pair_ends_no_gap) {
+TEST(test_sender_first_pair_has_no_gap) {
     send_whole(0);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
     TEST_ASSERT_EQUAL_UINT32(1, sender.sent.pairs);
 }
 
-TEST(test_sender_keeps_the_largest_gap_until_the_next_silence) {
+TEST(test_sender_retains_the_largest_gap_until_it_rests) {
     send_whole(0);
     send_whole(MS(20));
     send_whole(MS(10));
@@ -73,13 +73,13 @@ TEST(test_sender_keeps_the_largest_gap_until_the_next_silence) {
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
 }
 
-TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair) {
+TEST(test_sender_zero_to_one_wheel_only_is_no_complete_pair) {
     static const iw_side_t blocked[] = {IW_LEFT, IW_RIGHT};
     for (size_t i = 0; i < 2; i++) {
         setUp();
         const iw_side_t free = (blocked[i] == IW_LEFT) ? IW_RIGHT : IW_LEFT;
         TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
-        TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0)); // Behind the un-echoed ones: no third may follow.
+        TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0)); // After the pairs without echo: no third one may follow.
         echo(free);
         TEST_ASSERT_TRUE(iw_sender_ready(&sender, true));
         TEST_ASSERT_FALSE(iw_sender_ready(&sender, false));
@@ -89,7 +89,7 @@ TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair) {
     }
 }
 
-TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left) {
+TEST(test_sender_zero_is_sent_right_when_the_port_refuses_left) {
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
     TEST_ASSERT_EQUAL_UINT32(1, bus.sent);
@@ -97,14 +97,14 @@ TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left) 
     TEST_ASSERT_EQUAL_UINT32(0, sender.sent.pairs);
 }
 
-TEST(test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one) {
+TEST(test_sender_motion_is_sent_to_both_wheels_or_none) {
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(1, 1));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
     TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
 }
 
-TEST(test_sender_pair_leaves_in_one_call) {
+TEST(test_sender_pair_is_sent_in_one_call) {
     send_whole(0);
     TEST_ASSERT_EQUAL_UINT32(1, bus.calls);
     TEST_ASSERT_EQUAL_UINT32(2, bus.call_frames);
@@ -113,7 +113,8 @@ TEST(test_sender_pair_leaves_in_one_call) {
     TEST_ASSERT_EQUAL_UINT32(2, bus.call_frames);
 }
 
-/// The port accepts the left frame and refuses the right one: the left one is in the account, and nothing is tried again.
+/// The port accepts the left frame and refuses the right one. The left frame is counted as pending, and the sender
+/// retries nothing.
 TEST(test_sender_one_accepted_of_two_is_a_refused_pair) {
     static const int16_t speeds_mm_s[] = {0, 1};
     for (size_t i = 0; i < 2; i++) {
@@ -132,25 +133,25 @@ TEST(test_sender_one_accepted_of_two_is_a_refused_pair) {
     }
 }
 
-TEST(test_sender_pair_that_the_port_refuses_whole_is_in_no_account) {
+TEST(test_sender_pair_refused_by_the_port_is_not_pending) {
     bus.send_result[IW_LEFT] = -1;
     bus.send_result[IW_RIGHT] = -1;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
-    TEST_ASSERT_EQUAL_UINT32(2, bus.calls); // The right zero alone, too.
+    TEST_ASSERT_EQUAL_UINT32(2, bus.calls); // The right zero alone is tried, too.
     TEST_ASSERT_EQUAL_UINT32(2, sender.sent.later);
     TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT8(0, sender.confirmation.pending[IW_RIGHT]);
 }
 
-TEST(test_sender_port_that_claims_more_than_two_frames_has_accepted_two) {
+TEST(test_sender_port_that_reports_7_frames_has_accepted_two) {
     bus.boast = 7;
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(1, 1));
     TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT8(1, sender.confirmation.pending[IW_RIGHT]);
 }
 
-/// Not ready, and asked all the same: behind two frames that wait for their echo no third one leaves.
-TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port) {
+/// Not ready, but called: after two frames that wait for their echo, no third frame is sent.
+TEST(test_sender_pair_blocked_for_both_wheels_is_not_sent) {
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
     TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
     TEST_ASSERT_FALSE(iw_sender_ready(&sender, true));
@@ -158,7 +159,7 @@ TEST(test_sender_pair_that_neither_wheel_may_have_reaches_no_port) {
     TEST_ASSERT_EQUAL_UINT32(2, bus.calls);
 }
 
-TEST(test_sender_remembers_why_the_gate_stopped_a_pair) {
+TEST(test_sender_stores_the_verdict_of_the_last_stopped_pair) {
     const int16_t fast_mm_s = (int16_t)(config.max_speed_mm_s + 1);
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, fast_mm_s)); // The pair is judged first.
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_YAW, sender.verdict);
@@ -170,7 +171,7 @@ TEST(test_sender_remembers_why_the_gate_stopped_a_pair) {
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, sender.verdict);
 }
 
-TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did) {
+TEST(test_sender_purge_clears_pending_only_if_the_port_confirms) {
     static const int results[] = {-1, 0, 1};
     for (size_t i = 0; i < 3; i++) {
         setUp();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the relay knows of the board: which start of it, which stamp was heard when, and what came that was not understood.
+// State of the board at the relay: its start, the stamps with their times of receipt, and bytes that the relay could
+// not parse.
 #include "serial_link.h"
 
 #include "unit.h"
@@ -18,7 +19,7 @@ void setUp(void) {
     serial_link_init(&state, 0);
 }
 
-/// The last news of these bytes.
+/// Returns the last event of these bytes.
 static serial_news_t hear_raw(const char *bytes, uint64_t now_us) {
     serial_news_t news = SERIAL_NEWS_NONE;
     for (const char *c = bytes; *c != '\0'; c++) {
@@ -45,7 +46,7 @@ static uint64_t stamp_at(uint64_t then_us) {
     return serial_link_stamp(&state, then_us, &t_us) ? t_us : UINT64_MAX;
 }
 
-TEST(test_link_is_there_from_its_event_on) {
+TEST(test_link_is_up_from_its_event_on) {
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_NONE, hear(1, 1, "{\"ok\":true}", 10));
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(BOOT, 5, 20));
     TEST_ASSERT_EQUAL_STRING(BOOT, state.boot);
@@ -54,7 +55,7 @@ TEST(test_link_is_there_from_its_event_on) {
     TEST_ASSERT_EQUAL_UINT(1, line.channel);
 }
 
-TEST(test_link_another_boot_is_another_board) {
+TEST(test_link_another_boot_is_a_new_link) {
     (void)hear_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 6000000, 20));
     TEST_ASSERT_EQUAL_STRING(OTHER, state.boot);
@@ -62,7 +63,7 @@ TEST(test_link_another_boot_is_another_board) {
     TEST_ASSERT_EQUAL_UINT64(6000000, stamp_at(20));
 }
 
-TEST(test_link_stamp_that_falls_is_a_start_whatever_is_said) {
+TEST(test_link_stamp_that_decreases_is_a_restart) {
     (void)hear_link(BOOT, 5000000, 10);
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LOST, hear(2, 4000, "{\"event\":\"state\"}", 20));
     TEST_ASSERT_EQUAL(SERIAL_SILENT, state.state);
@@ -70,7 +71,7 @@ TEST(test_link_stamp_that_falls_is_a_start_whatever_is_said) {
     TEST_ASSERT_EQUAL_INT(SERIAL_NEWS_LINKED, hear_link(OTHER, 5000, 30));
 }
 
-TEST(test_link_stamp_is_the_newest_heard_by_then) {
+TEST(test_link_stamp_is_the_newest_received_by_that_time) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 100U; i++) {
         (void)hear(1, 100U + i * 20000U, "{}", 1000U + i * 20000U);
@@ -78,10 +79,10 @@ TEST(test_link_stamp_is_the_newest_heard_by_then) {
     TEST_ASSERT_EQUAL_UINT64(100U + 100U * 20000U, stamp_at(1000U + 100U * 20000U));
     TEST_ASSERT_EQUAL_UINT64(100U + 99U * 20000U, stamp_at(999U + 100U * 20000U));
     TEST_ASSERT_EQUAL_UINT64(100U + 80U * 20000U, stamp_at(1000U + 80U * 20000U + 3U));
-    TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, stamp_at(1000U)); // Longer ago than any command lives.
+    TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, stamp_at(1000U)); // Longer ago than the life of any command.
 }
 
-TEST(test_link_stamps_that_come_close_together_reach_back_all_the_same) {
+TEST(test_link_stamps_at_short_intervals_cover_the_same_time) {
     (void)hear_link(BOOT, 100, 1000);
     for (unsigned i = 1; i <= 1000U; i++) {
         (void)hear(1, 100U + i * 200U, "{}", 1000U + i * 200U);
@@ -92,7 +93,7 @@ TEST(test_link_stamps_that_come_close_together_reach_back_all_the_same) {
     TEST_ASSERT_TRUE(stamp_at(then_us) + 2U * SERIAL_STAMP_US >= 100U + 400U * 200U);
 }
 
-TEST(test_link_falls_silent_once) {
+TEST(test_link_goes_offline_once) {
     (void)hear_link(BOOT, 5, 1000);
     TEST_ASSERT_FALSE(serial_link_fell_silent(&state, 1000U + SERIAL_SILENT_US - 1U));
     TEST_ASSERT_TRUE(serial_link_fell_silent(&state, 1000U + SERIAL_SILENT_US));
@@ -110,7 +111,7 @@ TEST(test_link_bad_lines_are_counted_and_change_nothing) {
     TEST_ASSERT_EQUAL_UINT64(3, state.complaints);
 }
 
-TEST(test_link_noise_is_counted_until_it_is_forgotten) {
+TEST(test_link_noise_is_counted_until_it_is_cleared) {
     (void)hear_raw("boot: ok\n\xff", 1000);
     TEST_ASSERT_EQUAL_UINT64(10, state.noise.bytes);
     TEST_ASSERT_EQUAL_UINT64(1, state.noise.odd);

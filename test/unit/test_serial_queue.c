@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What waits between a client and a board: in order, bounded, replaced by what is newer, never sent late.
+// Requests that wait between a client and a board: in order, bounded, replaced by newer ones, never sent late.
 #include "serial_queue.h"
 
 #include "unit.h"
@@ -24,7 +24,7 @@ static serial_request_t *put(serial_kind_t kind, uint64_t came_us) {
     return place;
 }
 
-/// What goes to the wire now; NULL: nothing.
+/// Returns the request that is sent now; NULL: none.
 static serial_request_t *send_next(uint64_t now_us) {
     serial_request_t *next = serial_queue_next(&queue, false, now_us);
     if (next != NULL) {
@@ -37,7 +37,7 @@ static bool answered(uint64_t which) {
     return serial_queue_take(&queue, which, true, "}", 1);
 }
 
-TEST(test_kind_of_each_command_is_what_it_can_do) {
+TEST(test_queue_kind_of_each_command_is_that_of_its_effect) {
     TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_DRIVE));
     TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_TWIST));
     TEST_ASSERT_EQUAL_INT(SERIAL_STOPS, serial_kind_of(IWN_CMD_STOP));
@@ -48,7 +48,7 @@ TEST(test_kind_of_each_command_is_what_it_can_do) {
     TEST_ASSERT_EQUAL_INT(SERIAL_ASKS, serial_kind_of(IWN_CMD_STATUS));
 }
 
-TEST(test_queue_sends_one_and_the_next_when_it_is_answered) {
+TEST(test_queue_sends_the_next_request_after_the_reply) {
     serial_request_t *first = put(SERIAL_ASKS, NOW);
     serial_request_t *second = put(SERIAL_ASKS, NOW);
     TEST_ASSERT_EQUAL_PTR(first, send_next(NOW));
@@ -58,7 +58,7 @@ TEST(test_queue_sends_one_and_the_next_when_it_is_answered) {
     TEST_ASSERT_EQUAL_PTR(second, send_next(NOW));
 }
 
-TEST(test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent) {
+TEST(test_queue_newer_command_replaces_the_waiting_one_only) {
     const serial_request_t *sent = put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     const serial_request_t *waits = put(SERIAL_MOVES, NOW + 1U);
@@ -71,7 +71,7 @@ TEST(test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent) 
     TEST_ASSERT_NULL(send_next(NOW + 3U));
 }
 
-TEST(test_queue_answers_leave_in_the_order_of_the_requests) {
+TEST(test_queue_replies_are_in_the_order_of_the_requests) {
     (void)put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     (void)put(SERIAL_MOVES, NOW);
@@ -85,7 +85,7 @@ TEST(test_queue_answers_leave_in_the_order_of_the_requests) {
     TEST_ASSERT_EQUAL_UINT(3, send_next(NOW)->number);
 }
 
-TEST(test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not) {
+TEST(test_queue_stop_is_next_and_earlier_motion_is_refused) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     const serial_request_t *arm = put(SERIAL_GRANTS, NOW);
@@ -96,7 +96,7 @@ TEST(test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not) {
     TEST_ASSERT_EQUAL_PTR(stop, serial_queue_next(&queue, true, NOW));
 }
 
-TEST(test_queue_stop_takes_questions_before_it_along) {
+TEST(test_queue_stop_is_sent_after_earlier_queries) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     serial_request_t *question = put(SERIAL_ASKS, NOW);
@@ -105,7 +105,7 @@ TEST(test_queue_stop_takes_questions_before_it_along) {
     TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
 }
 
-TEST(test_queue_early_answer_is_held_until_its_turn) {
+TEST(test_queue_early_reply_waits_for_its_turn) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     serial_request_t *stop = put(SERIAL_STOPS, NOW);
@@ -119,7 +119,7 @@ TEST(test_queue_early_answer_is_held_until_its_turn) {
     TEST_ASSERT_EQUAL_STRING_LEN(",\"state\":\"stopping\"}", stop->json, stop->length);
 }
 
-TEST(test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is) {
+TEST(test_queue_only_a_stop_without_a_reply_is_sent_again) {
     serial_request_t *drive = put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     serial_request_t *stop = put(SERIAL_STOPS, NOW);
@@ -131,7 +131,7 @@ TEST(test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is) {
     TEST_ASSERT_EQUAL_INT(SERIAL_SENT, drive->state);
 }
 
-TEST(test_queue_command_that_waited_too_long_is_refused_and_not_sent) {
+TEST(test_queue_command_that_waited_too_long_is_refused) {
     (void)put(SERIAL_ASKS, NOW);
     (void)send_next(NOW);
     const serial_request_t *drive = put(SERIAL_MOVES, NOW);
@@ -145,7 +145,7 @@ TEST(test_queue_command_that_waited_too_long_is_refused_and_not_sent) {
     TEST_ASSERT_NULL(send_next(NOW + SERIAL_FRESH_US));
 }
 
-TEST(test_queue_lost_answer_holds_the_next_command_no_longer_than_told) {
+TEST(test_queue_lost_reply_delays_the_next_command_by_hold_time) {
     (void)put(SERIAL_MOVES, NOW);
     (void)send_next(NOW);
     (void)put(SERIAL_MOVES, NOW + 10000U);
@@ -157,7 +157,7 @@ TEST(test_queue_lost_answer_holds_the_next_command_no_longer_than_told) {
     TEST_ASSERT_EQUAL_UINT(1, queue.unanswered);
 }
 
-TEST(test_queue_answer_that_nobody_waits_for_is_known) {
+TEST(test_queue_reply_without_a_request_is_rejected) {
     (void)put(SERIAL_ASKS, NOW);
     TEST_ASSERT_FALSE(answered(1));
     (void)send_next(NOW);
@@ -167,7 +167,7 @@ TEST(test_queue_answer_that_nobody_waits_for_is_known) {
     TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, serial_queue_answered(&queue)->error);
 }
 
-TEST(test_queue_is_full_and_empty_again) {
+TEST(test_queue_full_refuses_until_it_is_drained) {
     for (unsigned round = 0; round < 3U; round++) {
         for (unsigned i = 0; i < SERIAL_QUEUE_SIZE; i++) {
             TEST_ASSERT_FALSE(serial_queue_is_full(&queue));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The relay's whole loop with a simulated board: this file replaces time, waits and the port; the sockets are real.
+// The complete loop of the relay with a simulated board: this file replaces time, waits and the port. The sockets are
+// real.
 #include "relay.h"
 
 #include "iwheel_linux/clock.h"
@@ -27,9 +28,9 @@ static relay_t relay;
 static serial_settings_t settings;
 static uint64_t now_us;
 static char folder[] = "/tmp/serial_relay_XXXXXX";
-static char to_relay[8192]; // What the board has written and the relay has not read yet.
+static char to_relay[8192]; // Bytes that the board has written and the relay has not read yet.
 static size_t to_relay_length;
-static char to_board[65536]; // Everything that the relay has written.
+static char to_board[65536]; // All bytes that the relay has written.
 static size_t to_board_length;
 static bool port_is_full;
 static bool port_is_missing;
@@ -37,7 +38,7 @@ static int client_fd;
 static unsigned step;
 static bool (*script)(void); // Called before each wait; true: the relay ends.
 
-// ---- instead of the port, the clock and the wait ------------------------------------------------------------------
+// ---- replacements of the port, the clock and the wait -------------------------------------------------------------
 
 iw_time_us_t iwl_clock_now_us(void) {
     return now_us;
@@ -199,7 +200,7 @@ void tearDown(void) {
 
 // ---- tests --------------------------------------------------------------------------------------------------------
 
-/// The client goes while the line is full, before its `open` could be written.
+/// The client disconnects while the line is full, before its `open` could be written.
 static bool client_goes_before_open(void) {
     switch (step) {
     case 2:
@@ -222,16 +223,16 @@ static bool client_goes_before_open(void) {
     return step == 500U;
 }
 
-static void test_relay_client_gone_before_open_opens_nothing(void) {
+static void test_relay_client_disconnected_before_open_leaves_none_open(void) {
     run(client_goes_before_open);
-    // A line that the port had half taken may still leave; a channel that stays open may not.
+    // A line that the port has partly accepted may still be sent. No channel may stay open.
     TEST_ASSERT_LESS_OR_EQUAL_UINT(1, written("\"cmd\":\"open\""));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(1, written("\"cmd\":\"close\",\"channel\":1"));
     const char *last_open = strstr(to_board, "\"cmd\":\"open\"");
     TEST_ASSERT_TRUE(last_open == NULL || strstr(last_open, "\"cmd\":\"close\"") != NULL);
 }
 
-/// A client goes, and the next one comes before the line takes a byte.
+/// A client disconnects, and the next one connects before the line accepts a byte.
 static bool client_follows_another(void) {
     switch (step) {
     case 2:
@@ -267,7 +268,7 @@ static void test_relay_closes_a_channel_before_it_opens_the_next(void) {
     TEST_ASSERT_NOT_NULL(strstr(close_at, "\"cmd\":\"open\""));
 }
 
-/// In one wake-up the board's newer stamp and a command that was sent before it.
+/// One wake-up brings a newer stamp of the board and a command that was sent before it.
 static bool stamp_and_command_together(void) {
     switch (step) {
     case 2:
@@ -295,7 +296,7 @@ static bool stamp_and_command_together(void) {
     return step == 150U;
 }
 
-static void test_relay_stamp_of_the_same_wake_up_is_not_quoted(void) {
+static void test_relay_command_quotes_the_stamp_before_its_wake_up(void) {
     char early[32];
     char late[32];
     run(stamp_and_command_together);
@@ -306,7 +307,7 @@ static void test_relay_stamp_of_the_same_wake_up_is_not_quoted(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written(early), to_board);
 }
 
-/// The relay stands still for 0.3 s while its client asks for the lease.
+/// The relay stalls for 0.3 s while its client requests the lease.
 static bool relay_stands_still(void) {
     if (step < 30U) {
         return stamp_and_command_together();
@@ -318,7 +319,7 @@ static bool relay_stands_still(void) {
     return step == 150U;
 }
 
-static void test_relay_arm_from_a_gap_is_not_sent(void) {
+static void test_relay_arm_during_a_stall_is_not_sent(void) {
     run(relay_stands_still);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"arm\""), to_board);
 }
@@ -388,7 +389,7 @@ static void test_relay_event_before_hello_is_dropped(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"alive\""), to_board);
 }
 
-/// The board's clock falls back: it has restarted, whatever it says.
+/// The clock of the board decreases: the board has restarted, whatever it sends.
 static bool board_restarts(void) {
     if (step == 40U) {
         board_writes(1, 5, "{\"event\":\"state\"}");
@@ -402,7 +403,7 @@ static bool board_restarts(void) {
     return (step < 40U) ? event_before_hello() : step == 50U;
 }
 
-static void test_relay_client_ends_with_its_start_of_the_board(void) {
+static void test_relay_client_is_closed_by_a_restart_of_the_board(void) {
     run(board_restarts);
 }
 
@@ -413,7 +414,7 @@ static bool board_comes(void) {
     return step == 20U;
 }
 
-static void test_relay_log_without_a_reader_ends_nothing(void) {
+static void test_relay_log_without_a_reader_does_not_end_the_relay(void) {
     const int kept = dup(STDERR_FILENO);
     int ends[2];
     TEST_ASSERT_EQUAL_INT(0, pipe(ends));
@@ -428,7 +429,7 @@ static void test_relay_log_without_a_reader_ends_nothing(void) {
     TEST_ASSERT_EQUAL_INT(0, code);
 }
 
-static int guest_fd = -1; ///< Comes when every place is taken.
+static int guest_fd = -1; ///< Connects when every place is in use.
 static char guest_got[512];
 
 static void guest_says(const char *line) {
@@ -445,7 +446,7 @@ static void guest_reads(void) {
     (void)close(guest_fd);
 }
 
-/// The only place is taken, and a stop comes with another connection.
+/// The only place is in use, and a stop arrives on another connection.
 static bool stop_beyond_the_places(void) {
     switch (step) {
     case 2:
@@ -488,12 +489,12 @@ static void test_stop_never_refused_by_a_relay_without_a_place(void) {
     char text[512];
     const ssize_t length = recv(client_fd, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(length > 0) ? length : 0] = '\0';
-    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // It has asked nothing.
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // The guest has requested nothing.
 }
 
-static char complaints[4096]; // The log.
+static char complaints[4096]; // Captured log.
 
-/// Runs it and keeps what it logs.
+/// Runs the relay and captures its log.
 static void run_logged(bool (*play)(void)) {
     char path[64];
     (void)snprintf(path, sizeof path, "%s/log", folder);
@@ -515,7 +516,7 @@ static unsigned logged(const char *words) {
     return count_in(complaints, words);
 }
 
-/// A client that comes at this step is told this.
+/// A client that connects at this step receives this text.
 static void assert_told_at(unsigned at, const char *words) {
     if (step == at) {
         client_connects();
@@ -533,7 +534,7 @@ static void device_sends(const char *bytes) {
     to_relay_length += (size_t)snprintf(&to_relay[to_relay_length], sizeof to_relay - to_relay_length, "%s", bytes);
 }
 
-/// Nothing comes for 3 s; then a device of another rate talks, then one of another protocol, which says less.
+/// Nothing arrives for 3 s. Then a device with another rate sends, then one with another protocol and fewer bytes.
 static bool noise_after_nothing(void) {
     if (step >= 3000U && step < 4900U && step % 10U == 0U) {
         device_sends("\xf8\x80\xff\x81");
@@ -547,27 +548,27 @@ static bool noise_after_nothing(void) {
     return step == 9000U;
 }
 
-static void test_relay_reason_changes_with_what_comes(void) {
+static void test_relay_reason_follows_the_received_bytes(void) {
     run_logged(noise_after_nothing);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: 760 bytes came"), complaints);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: another protocol"), complaints);
 }
 
-/// The port is not there.
+/// The port does not exist.
 static bool port_stays_away(void) {
     assert_told_at(4000, "plug the board in");
     return step == 4100U;
 }
 
-static void test_relay_missing_port_is_no_silent_board(void) {
+static void test_relay_missing_port_is_not_reported_as_no_bytes(void) {
     port_is_missing = true;
     run_logged(port_stays_away);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: port: plug the board in"), complaints);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, logged("warning: nothing comes"), complaints);
 }
 
-/// Long after the port was opened the board's clock falls back, and it says nothing more.
+/// Long after the port was opened the clock of the board decreases, and the board sends nothing more.
 static bool board_restarts_late(void) {
     if (step % 1000U == 2U && step < 5000U) {
         board_links(EARLY + step);
@@ -579,7 +580,7 @@ static bool board_restarts_late(void) {
     return step == 7600U;
 }
 
-static void test_relay_board_that_restarts_is_silent_only_later(void) {
+static void test_relay_board_restarted_late_is_reported_as_no_bytes(void) {
     run_logged(board_restarts_late);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, logged("warning: nothing comes"), complaints);
 }
@@ -591,7 +592,7 @@ static bool board_goes(void) {
     return step == 7000U;
 }
 
-static void test_relay_board_that_goes_is_logged_each_time(void) {
+static void test_relay_board_offline_is_logged_each_time(void) {
     run_logged(board_goes);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(2, logged("warning: nothing comes"), complaints);
 }
@@ -599,19 +600,19 @@ static void test_relay_board_that_goes_is_logged_each_time(void) {
 int main(void) {
     UNITY_BEGIN();
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
-    RUN_TEST(test_relay_client_gone_before_open_opens_nothing);
+    RUN_TEST(test_relay_client_disconnected_before_open_leaves_none_open);
     RUN_TEST(test_relay_closes_a_channel_before_it_opens_the_next);
-    RUN_TEST(test_relay_stamp_of_the_same_wake_up_is_not_quoted);
-    RUN_TEST(test_relay_arm_from_a_gap_is_not_sent);
+    RUN_TEST(test_relay_command_quotes_the_stamp_before_its_wake_up);
+    RUN_TEST(test_relay_arm_during_a_stall_is_not_sent);
     RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
     RUN_TEST(test_relay_event_before_hello_is_dropped);
-    RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
-    RUN_TEST(test_relay_log_without_a_reader_ends_nothing);
+    RUN_TEST(test_relay_client_is_closed_by_a_restart_of_the_board);
+    RUN_TEST(test_relay_log_without_a_reader_does_not_end_the_relay);
     RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
-    RUN_TEST(test_relay_reason_changes_with_what_comes);
-    RUN_TEST(test_relay_missing_port_is_no_silent_board);
-    RUN_TEST(test_relay_board_that_restarts_is_silent_only_later);
-    RUN_TEST(test_relay_board_that_goes_is_logged_each_time);
+    RUN_TEST(test_relay_reason_follows_the_received_bytes);
+    RUN_TEST(test_relay_missing_port_is_not_reported_as_no_bytes);
+    RUN_TEST(test_relay_board_restarted_late_is_reported_as_no_bytes);
+    RUN_TEST(test_relay_board_offline_is_logged_each_time);
     (void)rmdir(folder);
     return UNITY_END();
 }

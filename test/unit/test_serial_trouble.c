@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The reason why no board answers: which one, how soon it follows a change, and how often the log gets it.
+// The reason why no board answers: which reason, how soon it follows a change, and how often it is logged.
 #include "serial_trouble.h"
 
 #include "unit.h"
@@ -23,7 +23,7 @@ void setUp(void) {
     serial_trouble_begin(&trouble, now_us);
 }
 
-/// A window with this noise.
+/// Ends a window with this noise.
 static serial_report_t window(const serial_noise_t *noise) {
     TEST_ASSERT_EQUAL_UINT64(now_us + WINDOW, trouble.judge_us);
     now_us = trouble.judge_us;
@@ -57,7 +57,7 @@ TEST(test_trouble_of_another_kind_is_logged_after_its_window) {
     TEST_ASSERT_EQUAL_INT(SERIAL_TROUBLE_BAUD, trouble.kind);
 }
 
-TEST(test_trouble_of_the_same_kind_is_logged_seldom) {
+TEST(test_trouble_of_the_same_kind_is_logged_once_per_interval) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     for (unsigned i = 1; i < SERIAL_TROUBLE_AGAIN_US / WINDOW; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_CLIENTS, window(&text));
@@ -72,7 +72,7 @@ TEST(test_trouble_without_bytes_is_logged_once) {
     }
 }
 
-TEST(test_trouble_of_a_device_that_pauses_is_kept) {
+TEST(test_trouble_of_a_pausing_device_is_retained) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     for (unsigned i = 1; i < SERIAL_TROUBLE_PAUSE_US / WINDOW; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_KEEP, window(&nothing));
@@ -82,8 +82,8 @@ TEST(test_trouble_of_a_device_that_pauses_is_kept) {
     TEST_ASSERT_EQUAL_INT(SERIAL_TROUBLE_NO_BYTES, trouble.kind);
 }
 
-/// Clients get each change; the log a burst of them, and then one for each refill.
-TEST(test_trouble_that_changes_all_the_time_does_not_flood_the_log) {
+/// Clients get each change. The log gets a burst of changes, and then one for each refill.
+TEST(test_trouble_that_alternates_is_logged_at_a_limited_rate) {
     unsigned logged = 0;
     for (unsigned i = 0; i < HOUR / WINDOW; i++) {
         const serial_report_t report = window((i % 2U == 0U) ? &text : &binary);
@@ -101,8 +101,8 @@ TEST(test_trouble_that_changes_all_the_time_does_not_flood_the_log) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_CLIENTS, window(&text));
 }
 
-/// A change that found the burst used up is logged later, if it still holds.
-TEST(test_trouble_that_was_held_back_is_logged_later) {
+/// A change that was not logged because the burst was used up is logged later, if it still holds.
+TEST(test_trouble_beyond_the_burst_is_logged_later) {
     for (unsigned i = 0; i < SERIAL_TROUBLE_BURST; i++) {
         TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window((i % 2U == 0U) ? &text : &binary));
     }
@@ -113,10 +113,10 @@ TEST(test_trouble_that_was_held_back_is_logged_later) {
     TEST_ASSERT_TRUE(now_us > begin_us + WINDOW);
 }
 
-TEST(test_trouble_begins_anew_with_each_opening) {
+TEST(test_trouble_restarts_with_each_opening_of_the_port) {
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&text));
     serial_trouble_begin(&trouble, now_us);
-    TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing)); // No pause: it is another opening.
+    TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing)); // No pause is needed: the port was opened again.
     serial_trouble_begin(&trouble, now_us);
     TEST_ASSERT_EQUAL_INT(SERIAL_REPORT_LOG, window(&nothing));
 }

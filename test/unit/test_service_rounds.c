@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
+// Many clients at the same time: each gets its turn, the holder of the lease is first, and no client uses all the time.
 #include "daemon.h"
 #include "sockets/sock_clients.h"
 
@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 #define CROWD 60U
-/// Lines of each; a turn takes four.
+/// Lines of each client; a turn reads four.
 #define LINES 4U
 
 static gw_daemon_t *daemon_;
@@ -92,14 +92,14 @@ static unsigned served(void) {
     return count;
 }
 
-TEST(test_round_serves_no_crowd_at_once_and_says_that_somebody_waits) {
+TEST(test_round_serves_a_part_of_the_clients_and_is_busy) {
     sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_GREATER_THAN_UINT(0, served());
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
     TEST_ASSERT_TRUE(sock_service_is_busy(&daemon_->clients));
 }
 
-TEST(test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn) {
+TEST(test_round_continues_after_the_last_served_client) {
     unsigned before = 0;
     for (unsigned rounds = 0; served() < CROWD; rounds++) {
         sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
@@ -120,7 +120,7 @@ TEST(test_round_begins_with_the_holder_of_the_lease) {
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
 }
 
-TEST(test_round_a_client_that_was_not_reached_is_not_caught_up) {
+TEST(test_round_client_not_served_is_not_caught_up) {
     daemon_->clients.now_us = iwl_clock_now_us();
     sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_FALSE(is_served(CROWD - 1U));
@@ -128,7 +128,7 @@ TEST(test_round_a_client_that_was_not_reached_is_not_caught_up) {
     TEST_ASSERT_EQUAL_UINT64(daemon_->clients.now_us, daemon_->clients.client[0].caught_up_us);
 }
 
-TEST(test_round_of_sending_reaches_everybody_in_turn) {
+TEST(test_round_of_sending_reaches_every_client) {
     while (served() < CROWD) {
         sock_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     }
@@ -141,8 +141,8 @@ TEST(test_round_of_sending_reaches_everybody_in_turn) {
     }
 }
 
-/// What waits is moved to the front again and again.
-TEST(test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time) {
+/// Waiting bytes are moved to the front many times.
+TEST(test_lines_are_complete_and_in_order_for_a_slow_reader) {
     sock_client_t *client = &daemon_->clients.client[0];
     char line[64];
     char expected[sizeof line];

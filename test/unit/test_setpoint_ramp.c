@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What do setpoint pairs say? Ramps, curves, sign changes, the bound of the stopping time.
+// Values of the setpoint pairs: ramps, curves, sign changes, the bound of the stopping time.
 #include "setpoint_rig.h"
 #include "unit.h"
 #include <stdlib.h>
@@ -54,7 +54,7 @@ TEST(test_setpoint_braking_follows_time_at_every_period) {
     }
 }
 
-/// 35 minutes: in 32 bits slope and time would make a step of nothing.
+/// In 32 bits the product of slope and time would wrap to a step of zero after 35 minutes.
 TEST(test_setpoint_braking_has_ended_after_any_pause) {
     rig.config.decel_mm_s2 = 2048;
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);
@@ -80,7 +80,7 @@ TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond) {
         uint16_t after_us;
         int16_t target_mm_s;
         int16_t expected_mm_s;
-    } cases[] = {{20500, 410, 410}, {20999, 420, 419}, {21000, 420, 420}}; // 20 mm/s per ms.
+    } cases[] = {{20500, 410, 410}, {20999, 420, 419}, {21000, 420, 420}}; // Slope of 20 mm/s per ms.
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         setUp();
         rig.config.accel_mm_s2 = 20000;
@@ -91,12 +91,12 @@ TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond) {
     }
 }
 
-TEST(test_setpoint_ramp_that_has_hardly_begun_goes_on) {
+TEST(test_setpoint_ramp_after_1_us_is_not_zero_and_continues) {
     rig.config.accel_mm_s2 = 2000;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 1, 1, 2000);
     (void)iw_setpoint_take(&rig.setpoint, rig.now_us + 1U);
-    TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig)); // A thousandth of a mm/s.
+    TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig)); // The speed is a thousandth of a mm/s.
     const iw_pair_t pair = setpoint_rig_take_next(&rig);
     TEST_ASSERT_EQUAL_INT16(1, pair.wheel[IW_LEFT].speed_mm_s);
 }
@@ -110,7 +110,7 @@ TEST(test_setpoint_slower_command_uses_the_slope_towards_zero) {
     TEST_ASSERT_INT_WITHIN(1, 700, pair.wheel[IW_LEFT].speed_mm_s);
 }
 
-TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods) {
+TEST(test_setpoint_late_call_accelerates_for_two_periods_at_most) {
     static const uint32_t late_ms[] = {41, 60, 500, 3600000};
     for (size_t i = 0; i < 4; i++) {
         setUp();
@@ -122,7 +122,7 @@ TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods) {
     }
 }
 
-TEST(test_setpoint_late_call_is_granted_not_a_microsecond_more) {
+TEST(test_setpoint_late_call_limit_is_exact_to_the_microsecond) {
     rig.config.period_ms = 50;
     rig.config.accel_mm_s2 = 20000;
     rig.config.max_speed_mm_s = 5000;
@@ -169,7 +169,7 @@ TEST(test_setpoint_small_slopes_accumulate) {
     TEST_ASSERT_INT_WITHIN(1, 50, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
 }
 
-/// The curve is kept: left : right stays as 1000 : part.
+/// The curve is retained: left : right stays as 1000 : part.
 static void assert_curve_kept(int16_t part) {
     uint32_t moving = 0;
     for (uint32_t n = 0; n < 200; n++) {
@@ -209,7 +209,7 @@ TEST(test_setpoint_sign_change_passes_through_zero) {
     TEST_ASSERT_EQUAL_INT(300, before.wheel[IW_RIGHT].speed_mm_s);
 }
 
-TEST(test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero) {
+TEST(test_setpoint_sign_change_in_a_late_call_ends_near_zero) {
     setpoint_rig_cruise(&rig, 100, 100, 2000);
     setpoint_rig_command(&rig, -1000, -1000, 2000);
     const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(5000));
@@ -235,7 +235,7 @@ TEST(test_setpoint_command_counts_under_follow_only) {
     }
 }
 
-TEST(test_setpoint_command_is_forgotten_when_follow_ends) {
+TEST(test_setpoint_command_is_cleared_when_follow_ends) {
     static const iw_demand_t ends[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE};
     for (size_t i = 0; i < 2; i++) {
         setUp();
@@ -253,7 +253,7 @@ TEST(test_setpoint_command_is_forgotten_when_follow_ends) {
     }
 }
 
-TEST(test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes) {
+TEST(test_setpoint_stays_within_its_target_and_slopes) {
     fixture_random_t random;
     fixture_random_init(&random, 3);
     setpoint_rig_follow(&rig);
@@ -334,7 +334,7 @@ TEST(test_setpoint_stop_takes_no_longer_than_the_fastest_ramp) {
     }
 }
 
-TEST(test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one) {
+TEST(test_setpoint_accelerating_wheel_does_not_delay_the_other) {
     setpoint_rig_cruise(&rig, 1000, 0, 2000);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, 100, 1000, 2000);

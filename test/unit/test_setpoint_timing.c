@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// When do setpoint pairs leave? Grid, spacing, silence, lateness.
+// Times of the setpoint pairs: grid, spacing, silence, lateness.
 #include "fixture.h"
 #include "iwheel/private/setpoint.h"
 #include "unit.h"
@@ -29,7 +29,7 @@ static void command_at(iw_time_us_t now_us, int16_t left_mm_s, int16_t right_mm_
     iw_setpoint_command(&setpoint, now_us, &target);
 }
 
-/// Takes every pair when it is due, until `until_us`, and returns when the last one was taken.
+/// Takes every pair when it is due, until `until_us`, and returns the time of the last one.
 static iw_time_us_t run_until(iw_time_us_t until_us) {
     iw_time_us_t last_us = 0;
     while (iw_setpoint_next_us(&setpoint) <= until_us) {
@@ -39,7 +39,7 @@ static iw_time_us_t run_until(iw_time_us_t until_us) {
     return last_us;
 }
 
-/// FOLLOW, first pair taken at `start_us`, and `left`/`right` reached for good.
+/// FOLLOW with the first pair at `start_us`, until `left` and `right` are reached.
 static iw_time_us_t cruise(iw_time_us_t start_us, int16_t left_mm_s, int16_t right_mm_s) {
     iw_setpoint_demand(&setpoint, start_us, IW_DEMAND_FOLLOW);
     take_at(start_us);
@@ -59,7 +59,7 @@ static void assert_silent(iw_time_us_t now_us) {
     TEST_ASSERT_TRUE(iw_setpoint_next_us(&setpoint) == IW_NEVER);
 }
 
-TEST(test_setpoint_after_init_is_silent) {
+TEST(test_setpoint_after_init_is_never_due) {
     assert_silent(0);
     assert_silent(FIXTURE_START_US);
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
@@ -69,12 +69,12 @@ TEST(test_setpoint_after_init_is_silent) {
     assert_silent(FIXTURE_START_US);
 }
 
-TEST(test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun) {
+TEST(test_setpoint_first_pair_at_clock_start_is_due_immediately) {
     iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
     assert_only_due_from(1000);
 }
 
-TEST(test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing) {
+TEST(test_setpoint_hasten_moves_the_pair_forward_with_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_BRAKE);
     take_at(FIXTURE_START_US);
     iw_setpoint_hasten(&setpoint, FIXTURE_START_US + MS(2));
@@ -83,7 +83,7 @@ TEST(test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing) {
     assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
 }
 
-TEST(test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows) {
+TEST(test_setpoint_late_pair_returns_to_the_grid_with_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_ZERO);
     take_at(FIXTURE_START_US);
     take_at(FIXTURE_START_US + MS(35));
@@ -92,7 +92,7 @@ TEST(test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows) {
     assert_only_due_from(FIXTURE_START_US + MS(75) + 1U);
 }
 
-TEST(test_setpoint_any_demand_from_silence_is_due_at_once_with_zero) {
+TEST(test_setpoint_demand_from_silence_is_due_with_zero) {
     static const iw_demand_t demands[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE, IW_DEMAND_FOLLOW};
     for (size_t i = 0; i < sizeof demands / sizeof demands[0]; i++) {
         setUp();
@@ -106,14 +106,14 @@ TEST(test_setpoint_any_demand_from_silence_is_due_at_once_with_zero) {
     }
 }
 
-TEST(test_setpoint_first_pair_taken_late_is_still_zero) {
+TEST(test_setpoint_first_pair_sent_late_is_zero) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     command_at(FIXTURE_START_US, 1000, 1000);
     take_at(FIXTURE_START_US + MS(700));
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
 }
 
-TEST(test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs) {
+TEST(test_setpoint_grid_does_not_drift_over_10000_late_pairs) {
     fixture_random_t random;
     fixture_random_init(&random, 1);
     static const uint16_t periods_ms[] = {5, 20, 33, 50};
@@ -130,7 +130,7 @@ TEST(test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs) {
     }
 }
 
-TEST(test_setpoint_late_call_takes_one_pair_and_no_burst) {
+TEST(test_setpoint_late_call_sends_one_pair_and_no_burst) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     static const uint32_t late_ms[] = {21, 39, 41, 110, 990, 3599990};
@@ -147,7 +147,7 @@ TEST(test_setpoint_late_call_takes_one_pair_and_no_burst) {
     }
 }
 
-TEST(test_setpoint_pair_taken_late_still_keeps_spacing) {
+TEST(test_setpoint_late_pair_retains_the_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     take_at(FIXTURE_START_US + MS(39));
@@ -157,14 +157,14 @@ TEST(test_setpoint_pair_taken_late_still_keeps_spacing) {
     TEST_ASSERT_TRUE(next_us <= FIXTURE_START_US + MS(44));
 }
 
-TEST(test_setpoint_changed_command_leaves_five_ms_after_the_last_pair) {
+TEST(test_setpoint_changed_command_is_due_after_the_spacing) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     command_at(FIXTURE_START_US + MS(1), 500, 500);
     assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
 }
 
-TEST(test_setpoint_changed_command_later_than_spacing_leaves_at_once) {
+TEST(test_setpoint_changed_command_past_the_spacing_is_due_now) {
     static const uint32_t after_us[] = {5000, 5001, 12345, 19999};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
         setUp();
@@ -180,7 +180,7 @@ TEST(test_setpoint_changed_command_later_than_spacing_leaves_at_once) {
     }
 }
 
-TEST(test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change) {
+TEST(test_setpoint_change_of_one_wheel_or_current_is_due) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 300, 300);
     const iw_pair_t changes[] = {{{{301, 2000}, {300, 2000}}},
                                  {{{301, 2000}, {301, 2000}}},
@@ -194,13 +194,13 @@ TEST(test_setpoint_change_of_one_wheel_or_of_a_current_is_a_change) {
     }
 }
 
-TEST(test_setpoint_same_command_again_moves_nothing) {
+TEST(test_setpoint_same_command_again_does_not_move_the_pair) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 300, -300);
     command_at(last_us + MS(7), 300, -300);
     assert_only_due_from(last_us + MS(20));
 }
 
-TEST(test_setpoint_command_storm_is_spaced_and_never_starves) {
+TEST(test_setpoint_command_burst_is_spaced_without_a_missing_pair) {
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
     take_at(FIXTURE_START_US);
     iw_time_us_t last_us = FIXTURE_START_US;
@@ -217,7 +217,7 @@ TEST(test_setpoint_command_storm_is_spaced_and_never_starves) {
     TEST_ASSERT_UINT_WITHIN(2, 200, pairs);
 }
 
-TEST(test_setpoint_gap_stays_within_a_period_whatever_is_commanded) {
+TEST(test_setpoint_gap_stays_within_a_period_at_any_command) {
     fixture_random_t random;
     fixture_random_init(&random, 2);
     iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_FOLLOW);
@@ -250,7 +250,7 @@ TEST(test_setpoint_changed_demand_moves_the_pair_forward) {
     assert_only_due_from(last_us + MS(17));
 }
 
-TEST(test_setpoint_same_demand_again_moves_nothing) {
+TEST(test_setpoint_same_demand_again_does_not_move_the_pair) {
     static const iw_demand_t demands[] = {IW_DEMAND_ZERO, IW_DEMAND_BRAKE, IW_DEMAND_FOLLOW};
     for (size_t i = 0; i < sizeof demands / sizeof demands[0]; i++) {
         setUp();
@@ -264,7 +264,7 @@ TEST(test_setpoint_same_demand_again_moves_nothing) {
     }
 }
 
-TEST(test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair) {
+TEST(test_setpoint_demand_zero_after_a_pair_is_due_immediately) {
     static const uint32_t after_us[] = {0, 1, 4999, 5000, 19999};
     for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
         setUp();
@@ -276,7 +276,7 @@ TEST(test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair) {
     }
 }
 
-TEST(test_setpoint_demand_silence_ends_everything_at_once) {
+TEST(test_setpoint_demand_silence_clears_all_immediately) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 1000, 1000);
     iw_setpoint_demand(&setpoint, last_us + MS(1), IW_DEMAND_SILENCE);
     assert_silent(last_us + MS(1));
@@ -288,7 +288,7 @@ TEST(test_setpoint_demand_silence_ends_everything_at_once) {
     assert_silent(last_us + MS(3));
 }
 
-TEST(test_setpoint_after_silence_starts_from_zero_without_the_old_command) {
+TEST(test_setpoint_after_silence_has_no_old_command) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 1000, 1000);
     iw_setpoint_demand(&setpoint, last_us + MS(1), IW_DEMAND_SILENCE);
     iw_setpoint_demand(&setpoint, last_us + MS(300), IW_DEMAND_FOLLOW);
@@ -298,7 +298,7 @@ TEST(test_setpoint_after_silence_starts_from_zero_without_the_old_command) {
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
 }
 
-TEST(test_setpoint_first_pair_after_a_short_silence_is_due_at_once) {
+TEST(test_setpoint_first_pair_after_a_short_silence_is_due) {
     iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
     take_at(1000);
     iw_setpoint_demand(&setpoint, 2000, IW_DEMAND_SILENCE);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What zero is under either role of the current, how currents ramp, and what a collapse leaves.
+// The pair of zero under either role of the current, the ramps of currents, and the state after a collapse.
 #include "setpoint_rig.h"
 #include "unit.h"
 #include <stdlib.h>
@@ -10,12 +10,12 @@ void setUp(void) {
     setpoint_rig_init(&rig);
 }
 
-TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command) {
+TEST(test_setpoint_collapse_is_zero_and_clears_the_command) {
     setpoint_rig_cruise(&rig, 1000, 500, 2000);
     rig.now_us += 1;
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
     TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
-    // Spaced from the last pair, which left 1 us ago.
+    // Spacing from the last pair, which was sent 1 us ago.
     TEST_ASSERT_FALSE(iw_setpoint_due(&rig.setpoint, rig.now_us + IW_SETPOINT_SPACING_US - 2U));
     (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US - 1U);
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
@@ -30,7 +30,7 @@ TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command) {
     TEST_ASSERT_TRUE(pair.wheel[IW_LEFT].speed_mm_s > 0);
 }
 
-TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero) {
+TEST(test_setpoint_command_after_a_collapse_follows_its_zero) {
     setpoint_rig_cruise(&rig, 1000, 500, 2000);
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
     setpoint_rig_command(&rig, -700, 1000, 2000);
@@ -68,7 +68,7 @@ TEST(test_setpoint_zero_with_a_limit_carries_the_maximum_current) {
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-/// A wheel that loses its torque at once is a wheel that lets go.
+/// A wheel that loses its torque suddenly rolls freely.
 TEST(test_setpoint_limit_falls_by_80_mA_in_20_ms) {
     setpoint_rig_follow(&rig);
     const iw_pair_t target = {{{1000, 700}, {1000, 300}}};
@@ -101,7 +101,7 @@ TEST(test_setpoint_limit_of_a_long_gap_falls_to_its_target) {
     TEST_ASSERT_EQUAL_INT(300, setpoint_rig_take_after(&rig, MS(1000000)).wheel[IW_LEFT].current_mA);
 }
 
-/// A command that comes before the zero of a collapse does not take its torque.
+/// A command before the zero of a collapse does not remove its torque.
 TEST(test_setpoint_zero_of_a_collapse_carries_the_maximum_current) {
     setpoint_rig_cruise(&rig, 1000, 1000, 300);
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
@@ -112,7 +112,7 @@ TEST(test_setpoint_zero_of_a_collapse_carries_the_maximum_current) {
     TEST_ASSERT_EQUAL_INT(2000, pair.wheel[IW_RIGHT].current_mA);
 }
 
-TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current) {
+TEST(test_setpoint_zero_with_current_as_setpoint_has_no_current) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_cruise(&rig, 500, -500, 1200);
     TEST_ASSERT_EQUAL_INT(1200, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].current_mA);
@@ -139,7 +139,7 @@ TEST(test_setpoint_current_setpoint_scales_with_the_speed) {
     }
 }
 
-TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current) {
+TEST(test_setpoint_current_does_not_overflow_at_extreme_slopes) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     rig.config.max_speed_mm_s = 10;
     rig.config.decel_mm_s2 = 20000;
@@ -149,7 +149,7 @@ TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_curren
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
 }
 
-TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time) {
+TEST(test_setpoint_current_without_speed_is_not_zero) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 0, 0, 2000);
@@ -168,7 +168,7 @@ TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time) {
     TEST_ASSERT_EQUAL_INT(0, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
 }
 
-TEST(test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain) {
+TEST(test_setpoint_next_is_zero_without_ramp_and_command) {
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
     for (size_t i = 0; i < 2; i++) {
         setUp();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The simulated bus: time on the wire, arbitration, acknowledgement, adapters' queues.
+// The simulated bus: time on the wire, arbitration, acknowledgement, queues of the adapters.
 #include "iwheel_sim/sim_bus.h"
 
 #include "unit.h"
@@ -38,7 +38,7 @@ static void submit(iw_time_us_t now_us, uint8_t port, uint32_t id) {
     TEST_ASSERT_TRUE(sim_bus_submit(&bus, now_us, port, &frame));
 }
 
-TEST(test_bus_frame_takes_its_bits) {
+TEST(test_bus_frame_bits_match_format_and_length) {
     iw_can_frame_t frame = frame_of(256U, 8U);
     TEST_ASSERT_EQUAL_UINT32(120U, sim_bus_frame_bits(&frame));
     frame.dlc = 0U;
@@ -79,7 +79,7 @@ TEST(test_bus_lowest_id_wins_when_several_wait) {
     expect_none(START_US + SECOND);
 }
 
-TEST(test_bus_frame_that_has_begun_is_not_displaced) {
+TEST(test_bus_frame_under_way_is_not_replaced_by_a_lower_id) {
     sim_bus_open(&bus, 0U, 4U, false);
     sim_bus_open(&bus, 1U, 4U, false);
     submit(START_US, 0U, 545U);
@@ -88,7 +88,7 @@ TEST(test_bus_frame_that_has_begun_is_not_displaced) {
     expect_next(START_US + SECOND, 256U, 1U);
 }
 
-TEST(test_bus_one_ports_frames_keep_their_order_whatever_their_ids) {
+TEST(test_bus_frames_of_one_port_stay_in_order) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 700U);
     submit(START_US, 0U, 1U);
@@ -96,7 +96,7 @@ TEST(test_bus_one_ports_frames_keep_their_order_whatever_their_ids) {
     expect_next(START_US + SECOND, 1U, 0U);
 }
 
-TEST(test_bus_full_queue_loses_the_newest_and_counts_it) {
+TEST(test_bus_full_queue_drops_and_counts_the_newest) {
     iw_can_frame_t const frame = frame_of(5U, 4U);
     sim_bus_open(&bus, 0U, 2U, true);
     submit(START_US, 0U, 1U);
@@ -109,7 +109,7 @@ TEST(test_bus_full_queue_loses_the_newest_and_counts_it) {
     expect_none(START_US + 2U * SECOND);
 }
 
-TEST(test_bus_queue_survives_going_round_many_times) {
+TEST(test_bus_queue_wraps_around_many_times) {
     sim_bus_open(&bus, 0U, 3U, false);
     for (uint32_t i = 0U; i < 500U; i++) {
         submit(START_US + i * MS, 0U, i);
@@ -120,7 +120,7 @@ TEST(test_bus_queue_survives_going_round_many_times) {
     TEST_ASSERT_EQUAL_UINT32(1000U, bus.port[0].sent);
 }
 
-TEST(test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebody_comes) {
+TEST(test_bus_unacknowledged_frame_waits_for_an_acknowledger) {
     sim_delivery_t delivery;
     sim_bus_open(&bus, 0U, 4U, true);
     submit(START_US, 0U, 266U);
@@ -131,7 +131,7 @@ TEST(test_bus_unacknowledged_frame_waits_for_ever_and_leaves_when_somebody_comes
     TEST_ASSERT_EQUAL_UINT64(START_US + 3600U * SECOND + 85U, delivery.end_us);
 }
 
-TEST(test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_later) {
+TEST(test_bus_frame_with_a_lost_acknowledgement_is_sent_again) {
     sim_bus_open(&bus, 0U, 4U, true);
     sim_bus_acknowledge(&bus, START_US, true);
     submit(START_US, 0U, 266U);
@@ -143,7 +143,7 @@ TEST(test_bus_acknowledgement_lost_in_mid_frame_brings_the_frame_back_later) {
     expect_next(START_US + 2U * SECOND, 266U, 0U);
 }
 
-TEST(test_bus_stalled_takes_nothing_from_anybody_then_everything) {
+TEST(test_bus_stalled_delivers_all_frames_after_the_stall) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 256U);
     expect_none(START_US + 50U);
@@ -155,7 +155,7 @@ TEST(test_bus_stalled_takes_nothing_from_anybody_then_everything) {
     expect_next(START_US + 2U * SECOND, 257U, 0U);
 }
 
-TEST(test_bus_clear_forgets_queue_and_frame_being_sent) {
+TEST(test_bus_clear_drops_the_queue_and_the_frame_being_sent) {
     sim_bus_open(&bus, 0U, 4U, false);
     submit(START_US, 0U, 256U);
     submit(START_US, 0U, 257U);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The running simulator, a child process, through its sockets: local bus, e-stop button, control. Takes a second.
+// The running simulator as a child process, through its sockets: local bus, e-stop button, control. The test needs a
+// second.
 #include "simulator.h"
 
 #include "unit.h"
@@ -107,7 +108,7 @@ static const char *tell(const char *command) {
     return answer;
 }
 
-/// Waits for a frame with this id word. Its echo mark, or -1 if the connection closed.
+/// Waits for a frame with this id word. Returns its echo mark, or -1 if the connection is closed.
 static int wait_for_frame(int fd, canid_t id, struct can_frame *out_frame) {
     for (unsigned i = 0U; i < 10000U; i++) {
         size_t const length = receive(fd, out_frame, sizeof *out_frame);
@@ -128,7 +129,7 @@ static void send_setpoint(int fd) {
     TEST_ASSERT_EQUAL_INT(sizeof frame, send(fd, &frame, sizeof frame, MSG_NOSIGNAL));
 }
 
-TEST(test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo) {
+TEST(test_hub_frame_reaches_all_and_is_an_echo_for_the_sender) {
     struct can_frame frame;
     start();
     int const sender = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -142,7 +143,7 @@ TEST(test_hub_everybody_hears_a_frame_and_only_the_sender_gets_it_as_echo) {
     (void)close(other);
 }
 
-TEST(test_hub_reader_that_stalls_loses_frames_and_the_others_none) {
+TEST(test_hub_stalled_reader_loses_frames_and_others_none) {
     struct can_frame frame;
     start();
     int const stalled = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -157,7 +158,7 @@ TEST(test_hub_reader_that_stalls_loses_frames_and_the_others_none) {
     (void)close(reader);
 }
 
-TEST(test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody) {
+TEST(test_hub_malformed_messages_are_counted_only) {
     struct can_frame frame;
     unsigned char junk[72] = {0x0AU, 0x01U};
     start();
@@ -172,7 +173,7 @@ TEST(test_hub_messages_that_are_no_frame_are_counted_and_harm_nobody) {
     (void)close(fd);
 }
 
-TEST(test_hub_tells_bus_off_and_restart_and_is_silent_between) {
+TEST(test_hub_sends_bus_off_and_restart_and_nothing_between) {
     struct can_frame frame;
     start();
     int const fd = open_socket(options.can_path, SOCK_SEQPACKET);
@@ -186,7 +187,7 @@ TEST(test_hub_tells_bus_off_and_restart_and_is_silent_between) {
     (void)close(fd);
 }
 
-TEST(test_hub_late_client_is_told_that_it_is_bus_off) {
+TEST(test_hub_late_client_receives_bus_off) {
     struct can_frame frame;
     start();
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("busoff on"));
@@ -204,7 +205,7 @@ TEST(test_hub_error_frame_of_a_client_reaches_the_others_only) {
     int const other = open_socket(options.can_path, SOCK_SEQPACKET);
     (void)wait_for_frame(other, 256U, &frame);
     (void)send(liar, &forged, sizeof forged, MSG_NOSIGNAL);
-    TEST_ASSERT_EQUAL_INT(2, wait_for_frame(other, forged.can_id, &frame)); // Marked as a client's.
+    TEST_ASSERT_EQUAL_INT(2, wait_for_frame(other, forged.can_id, &frame)); // The frame has the mark of a client.
     send_setpoint(liar);
     for (unsigned i = 0U; i < 100U; i++) {
         (void)receive(liar, &frame, sizeof frame);
@@ -230,7 +231,7 @@ TEST(test_hub_bus_down_closes_connections_until_it_is_up) {
     (void)close(fd);
 }
 
-TEST(test_button_tells_its_state_on_connect_and_at_every_change) {
+TEST(test_button_sends_its_state_on_connect_and_at_every_change) {
     char state = '?';
     start();
     int const fd = open_socket(options.estop_path, SOCK_STREAM);
@@ -255,7 +256,7 @@ TEST(test_button_tells_its_state_on_connect_and_at_every_change) {
     (void)close(late);
 }
 
-TEST(test_control_takes_bytes_one_by_one_and_several_lines_at_once) {
+TEST(test_control_reads_single_bytes_and_several_lines) {
     char answer[64];
     start();
     int const fd = open_socket(options.control_path, SOCK_STREAM);
@@ -294,7 +295,7 @@ TEST(test_control_nul_in_a_line_is_refused) {
     (void)close(fd);
 }
 
-TEST(test_simulator_ends_cleanly_and_takes_its_sockets_away) {
+TEST(test_simulator_ends_cleanly_and_removes_its_sockets) {
     static const int signals[] = {SIGTERM, SIGINT};
     for (size_t i = 0U; i < 2U; i++) {
         start();
@@ -305,7 +306,7 @@ TEST(test_simulator_ends_cleanly_and_takes_its_sockets_away) {
     }
 }
 
-TEST(test_simulator_replaces_sockets_that_a_killed_one_left) {
+TEST(test_simulator_replaces_sockets_of_a_killed_one) {
     start();
     TEST_ASSERT_EQUAL_INT(-SIGKILL, end(SIGKILL));
     TEST_ASSERT_EQUAL_INT(0, access(options.can_path, F_OK));
@@ -313,7 +314,7 @@ TEST(test_simulator_replaces_sockets_that_a_killed_one_left) {
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("power on"));
 }
 
-TEST(test_simulator_second_on_the_same_bus_refuses_and_leaves_the_first_alone) {
+TEST(test_simulator_second_on_the_same_bus_exits_with_an_error) {
     start();
     (void)freopen("/dev/null", "w", stderr);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, run_simulator());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The pair as a machine: droop, slope, kerb, free wheel, late wheel, yaw inertia, cut rpm; the ranges of what is ordinary.
+// The pair as a machine: droop, slope, kerb, free wheel, late wheel, yaw inertia, truncated rpm, and the ranges of
+// ordinary machines.
 #include "sim_ranges.h"
 #include "test_sim_rig.h"
 
@@ -16,7 +17,7 @@ static sim_motion_t *motion(iw_side_t side) {
     return &pair.wheel[side].motion;
 }
 
-/// Drives both wheels from BOOTED on for so many ms; the time reached.
+/// Drives both wheels from BOOTED on for `ms`; returns the end time.
 static iw_time_us_t drive_for(int16_t left_mm_s, int16_t right_mm_s, uint32_t ms) {
     rig_drive(left_mm_s, right_mm_s);
     rig_run(BOOTED, BOOTED + ms * MS);
@@ -30,7 +31,7 @@ TEST(test_machine_wheel_with_droop_settles_below_its_setpoint) {
     TEST_ASSERT_INT32_WITHIN(1, 960, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-TEST(test_machine_free_wheel_coasts_whatever_it_is_commanded) {
+TEST(test_machine_free_wheel_coasts_despite_commands) {
     iw_time_us_t const now_us = drive_for(1000, 1000, 2000U);
     motion(IW_RIGHT)->freewheels = true;
     rig_run(now_us, now_us + 500U * MS);
@@ -38,7 +39,7 @@ TEST(test_machine_free_wheel_coasts_whatever_it_is_commanded) {
     TEST_ASSERT_INT32_WITHIN(5, 650, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-TEST(test_machine_kerb_takes_its_share_and_ends_at_once) {
+TEST(test_machine_kerb_reduces_the_speed_and_ends_immediately) {
     iw_time_us_t const now_us = drive_for(1000, 1000, 2000U);
     int64_t const before_mm = sim_motion_true_mm(motion(IW_LEFT));
     motion(IW_LEFT)->kerb_permille = 500U;
@@ -50,7 +51,7 @@ TEST(test_machine_kerb_takes_its_share_and_ends_at_once) {
     TEST_ASSERT_INT32_WITHIN(1, 1000, sim_motion_true_mm_s(motion(IW_LEFT)));
 }
 
-TEST(test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel) {
+TEST(test_machine_slope_is_held_by_the_motor_only) {
     motion(IW_LEFT)->slope_mm_s2 = 1500;
     motion(IW_RIGHT)->slope_mm_s2 = 1500;
     motion(IW_RIGHT)->freewheels = true;
@@ -59,19 +60,19 @@ TEST(test_machine_slope_is_held_by_the_motor_and_rolls_a_free_wheel) {
     TEST_ASSERT_INT32_WITHIN(10, 800, sim_motion_true_mm_s(motion(IW_RIGHT)));
 }
 
-TEST(test_machine_slope_within_friction_rolls_nothing) {
+TEST(test_machine_slope_within_friction_moves_no_wheel) {
     motion(IW_LEFT)->slope_mm_s2 = 690;
     rig_run(BOOTED, BOOTED + SECOND);
     TEST_ASSERT_EQUAL_INT32(0, motion(IW_LEFT)->speed_um_s);
 }
 
-TEST(test_machine_slope_steeper_than_the_torque_wins) {
+TEST(test_machine_slope_steeper_than_the_torque_moves_the_wheel) {
     motion(IW_LEFT)->slope_mm_s2 = -4500;
     (void)drive_for(500, 500, 500U);
     TEST_ASSERT_LESS_OR_EQUAL_INT32(0, motion(IW_LEFT)->speed_um_s);
 }
 
-TEST(test_machine_late_wheel_obeys_each_setpoint_later) {
+TEST(test_machine_late_wheel_follows_each_setpoint_later) {
     pair.wheel[IW_RIGHT].late_us = 400U * MS;
     iw_time_us_t const now_us = drive_for(300, 300, 390U);
     TEST_ASSERT_GREATER_THAN_INT32(250, sim_motion_true_mm_s(motion(IW_LEFT)));
@@ -87,7 +88,7 @@ TEST(test_machine_late_wheel_obeys_each_setpoint_later) {
     TEST_ASSERT_EQUAL_INT32(0, motion(IW_RIGHT)->speed_um_s);
 }
 
-TEST(test_machine_late_wheel_that_reboots_forgets_what_it_had_received) {
+TEST(test_machine_late_wheel_drops_its_setpoints_at_a_reboot) {
     pair.wheel[IW_RIGHT].late_us = 400U * MS;
     iw_time_us_t const now_us = drive_for(300, 300, 300U);
     rig_let_go();
@@ -96,7 +97,7 @@ TEST(test_machine_late_wheel_that_reboots_forgets_what_it_had_received) {
     TEST_ASSERT_EQUAL_UINT32(0U, motion(IW_RIGHT)->setpoints);
 }
 
-TEST(test_machine_late_wheel_holds_no_more_than_it_can) {
+TEST(test_machine_late_wheel_stores_a_limited_number) {
     iw_codec_setpoint_t const setpoint = {100, 2000, 1U};
     pair.wheel[IW_LEFT].late_us = 400U * MS;
     for (uint32_t i = 0U; i < SIM_WHEEL_LATE_MAX + 10U; i++) {
@@ -105,7 +106,7 @@ TEST(test_machine_late_wheel_holds_no_more_than_it_can) {
     TEST_ASSERT_EQUAL_UINT32(SIM_WHEEL_LATE_MAX, pair.wheel[IW_LEFT].late_count);
 }
 
-/// Speed of both wheels 60 ms after a command, with that share of yaw inertia.
+/// Returns the speed of both wheels 60 ms after a command, with this share of yaw inertia.
 static void speeds_after_60_ms(int16_t yaw_permille, int16_t left_mm_s, int16_t right_mm_s,
                                int32_t out_mm_s[IW_SIDES]) {
     rig_init();
@@ -117,7 +118,7 @@ static void speeds_after_60_ms(int16_t yaw_permille, int16_t left_mm_s, int16_t 
     out_mm_s[IW_RIGHT] = sim_motion_true_mm_s(motion(IW_RIGHT));
 }
 
-TEST(test_machine_yaw_inertia_slows_turning_and_not_going_straight) {
+TEST(test_machine_yaw_inertia_slows_turning_only) {
     int32_t without[IW_SIDES];
     int32_t with[IW_SIDES];
     speeds_after_60_ms(0, 100, 100, without);
@@ -130,16 +131,16 @@ TEST(test_machine_yaw_inertia_slows_turning_and_not_going_straight) {
     TEST_ASSERT_GREATER_THAN_INT32(without[IW_LEFT] + 10, with[IW_LEFT]);
 }
 
-TEST(test_machine_yaw_inertia_moves_the_other_wheel_along) {
+TEST(test_machine_yaw_inertia_moves_the_other_wheel) {
     int32_t with[IW_SIDES];
     speeds_after_60_ms(300, 0, 500, with);
     TEST_ASSERT_GREATER_THAN_INT32(5, with[IW_LEFT]);
 }
 
-TEST(test_machine_cut_rpm_are_never_above_the_true_speed) {
+TEST(test_machine_truncated_rpm_never_exceed_the_true_speed) {
     pair.wheel[IW_LEFT].truncates = true;
     pair.wheel[IW_RIGHT].truncates = true;
-    iw_time_us_t now_us = drive_for(993, -993, 2000U); // 49.4 rpm.
+    iw_time_us_t now_us = drive_for(993, -993, 2000U); // The speed is 49.4 rpm.
     for (unsigned i = 0U; i < 200U; i++) {
         rig_run(now_us, now_us + 4U * MS);
         now_us += 4U * MS;
@@ -148,12 +149,12 @@ TEST(test_machine_cut_rpm_are_never_above_the_true_speed) {
     }
 }
 
-/// True if it lies within, both ends included.
+/// Returns true if the value is between the limits, both included.
 static bool within(int64_t value, int64_t low, int64_t high) {
     return value >= low && value <= high;
 }
 
-TEST(test_ranges_machine_lies_within_and_reaches_both_ends) {
+TEST(test_ranges_machine_is_within_and_reaches_both_ends) {
     sim_random_t random;
     uint32_t shortest_us = UINT32_MAX;
     uint32_t longest_us = 0U;
@@ -176,7 +177,7 @@ TEST(test_ranges_machine_lies_within_and_reaches_both_ends) {
     TEST_ASSERT_EQUAL_UINT32(SIM_RANGE_LAG_MAX_US, longest_us);
 }
 
-TEST(test_ranges_road_lies_within_and_slopes_both_wheels_alike) {
+TEST(test_ranges_road_is_within_and_slopes_both_wheels_equally) {
     sim_random_t random;
     sim_random_init(&random, 2U);
     pair.pose.mirrored[IW_RIGHT] = true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The simulated wheel's motion and the pieces it stands on: chance, sine, watchdog, torque, ticks.
+// The motion of the simulated wheel and its parts: random numbers, sine, watchdog, torque, ticks.
 #include "iwheel_sim/motion.h"
 #include "iwheel_sim/trig.h"
 
@@ -28,7 +28,7 @@ static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
     return sim_motion_receive(&motion, now_us, &setpoint);
 }
 
-/// Tells the same every 20 ms for `ms`; the time reached.
+/// Sends the same setpoint every 20 ms for `ms`; returns the end time.
 static iw_time_us_t drive(iw_time_us_t from_us, uint32_t ms, int16_t speed_mm_s, int16_t current_mA) {
     iw_time_us_t now_us = from_us;
     for (; now_us < from_us + (iw_time_us_t)ms * MS; now_us += 20U * MS) {
@@ -38,7 +38,7 @@ static iw_time_us_t drive(iw_time_us_t from_us, uint32_t ms, int16_t speed_mm_s,
     return now_us;
 }
 
-TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others) {
+TEST(test_random_numbers_depend_on_the_seed_only) {
     sim_random_t one;
     sim_random_t same;
     sim_random_t other;
@@ -54,7 +54,7 @@ TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others) {
     TEST_ASSERT_GREATER_THAN_UINT32(990U, differ);
 }
 
-TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero) {
+TEST(test_random_noise_reaches_its_amplitude_around_zero) {
     sim_random_t random;
     int64_t sum = 0;
     int32_t low = 0;
@@ -73,7 +73,7 @@ TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero) {
     TEST_ASSERT_EQUAL_UINT32(0U, sim_random_below(&random, 0U));
 }
 
-TEST(test_trig_known_angles_give_known_values) {
+TEST(test_trig_tabulated_angles_have_tabulated_values) {
     static const struct {
         int64_t angle_nrad;
         int64_t sine_ppm;
@@ -97,14 +97,14 @@ TEST(test_trig_known_angles_give_known_values) {
     }
 }
 
-TEST(test_motion_told_nothing_stays_at_rest) {
+TEST(test_motion_without_a_setpoint_stays_at_standstill) {
     sim_motion_advance(&motion, START_US + 3600U * 1000000ULL);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
     TEST_ASSERT_EQUAL_INT64(0, motion.position_nm);
     TEST_ASSERT_FALSE(motion.driven);
 }
 
-TEST(test_motion_reaches_the_speed_it_is_told_without_overshoot) {
+TEST(test_motion_reaches_the_commanded_speed_without_overshoot) {
     iw_time_us_t now_us = START_US;
     for (; now_us < START_US + 1500U * MS; now_us += 20U * MS) {
         (void)tell(now_us, 500, 2000);
@@ -124,18 +124,18 @@ TEST(test_motion_acceleration_is_bound_by_the_current) {
     }
 }
 
-TEST(test_motion_current_beyond_the_range_gives_no_more_than_its_limit) {
+TEST(test_motion_current_beyond_the_range_is_limited) {
     (void)drive(START_US, 100U, 5000, 32767);
     TEST_ASSERT_INT32_WITHIN(2000, 400000, motion.speed_um_s);
 }
 
-TEST(test_motion_limit_of_zero_current_lets_it_coast) {
+TEST(test_motion_with_a_current_limit_of_zero_coasts) {
     iw_time_us_t const now_us = drive(START_US, 1500U, 1000, 2000);
     (void)drive(now_us, 200U, 1000, 0);
     TEST_ASSERT_INT32_WITHIN(2000, 1000000 - 140000, motion.speed_um_s);
 }
 
-TEST(test_motion_setpoint_holds_until_one_second_and_not_longer) {
+TEST(test_motion_setpoint_is_valid_for_one_second) {
     iw_time_us_t const last_us = drive(START_US, 1500U, 1000, 2000);
     TEST_ASSERT_TRUE(tell(last_us, 1000, 2000));
     sim_motion_advance(&motion, last_us + 999999U);
@@ -146,7 +146,7 @@ TEST(test_motion_setpoint_holds_until_one_second_and_not_longer) {
     TEST_ASSERT_INT32_WITHIN(500, 1000000, motion.speed_um_s);
 }
 
-TEST(test_motion_after_the_watchdog_coasts_to_rest) {
+TEST(test_motion_after_the_watchdog_coasts_to_standstill) {
     iw_time_us_t const last_us = drive(START_US, 1500U, 700, 2000);
     sim_motion_advance(&motion, last_us + 980U * MS + 500U * MS);
     TEST_ASSERT_INT32_WITHIN(2000, 350000, motion.speed_um_s);
@@ -160,7 +160,7 @@ TEST(test_motion_fresh_setpoint_after_the_watchdog_drives_again) {
     TEST_ASSERT_INT32_WITHIN(1000, -300000, motion.speed_um_s);
 }
 
-TEST(test_motion_coasts_the_same_in_one_step_or_many) {
+TEST(test_motion_coasting_does_not_depend_on_the_steps) {
     sim_motion_t many;
     iw_time_us_t const last_us = drive(START_US, 500U, 800, 2000);
     many = motion;
@@ -205,7 +205,7 @@ TEST(test_motion_current_as_limit_speed_zero_holds_still) {
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
 }
 
-TEST(test_motion_current_as_setpoint_zero_pair_comes_to_rest) {
+TEST(test_motion_current_as_setpoint_zero_pair_stops_the_wheel) {
     config.current_is_setpoint = true;
     restart();
     iw_time_us_t const now_us = drive(START_US, 1000U, 300, 1000);
@@ -221,7 +221,7 @@ TEST(test_motion_zero_setpoint_brakes_to_an_exact_stop) {
     TEST_ASSERT_EQUAL_INT64(0, sim_motion_milli_rpm(&motion));
 }
 
-TEST(test_motion_blocked_stands_still_and_draws_current_until_unblocked) {
+TEST(test_motion_blocked_draws_current_without_moving) {
     motion.blocked = true;
     iw_time_us_t const now_us = drive(START_US, 500U, 500, 1500);
     TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
@@ -232,7 +232,7 @@ TEST(test_motion_blocked_stands_still_and_draws_current_until_unblocked) {
     TEST_ASSERT_INT32_WITHIN(1000, 500000, motion.speed_um_s);
 }
 
-TEST(test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven) {
+TEST(test_motion_runaway_adds_speed_while_driven) {
     motion.runaway_mm_s = 1000;
     iw_time_us_t now_us = drive(START_US, 1500U, -300, 2000);
     TEST_ASSERT_INT32_WITHIN(2000, -1300000, motion.speed_um_s);
@@ -248,7 +248,7 @@ TEST(test_motion_one_metre_per_second_is_49_74_rpm) {
     TEST_ASSERT_INT32_WITHIN(50, 1000000, sim_motion_um_s_of_milli_rpm(&motion.config, 49736));
 }
 
-TEST(test_motion_rpm_of_the_rotor_has_the_gear_in_it) {
+TEST(test_motion_rpm_of_the_rotor_includes_the_gear) {
     config.gear_turns = 15U;
     config.gear_per = 2U;
     config.rpm_of_rotor = true;
@@ -258,7 +258,7 @@ TEST(test_motion_rpm_of_the_rotor_has_the_gear_in_it) {
     TEST_ASSERT_INT32_WITHIN(100, -1000000, sim_motion_um_s_of_milli_rpm(&motion.config, -373020));
 }
 
-TEST(test_motion_sixty_ticks_per_turn_both_ways) {
+TEST(test_motion_has_60_ticks_per_turn_in_both_directions) {
     iw_time_us_t now_us = drive(START_US, 4000U, 1000, 2000);
     int64_t const expected = motion.position_nm * 60 / 1206371579;
     TEST_ASSERT_GREATER_THAN_INT64(150, expected);
@@ -275,7 +275,7 @@ TEST(test_motion_ticks_count_rotor_turns) {
     TEST_ASSERT_EQUAL_INT64(motion.position_nm * 1200 / 1206371579, (int32_t)motion.ticks);
 }
 
-TEST(test_motion_swapped_sign_reports_the_opposite_of_what_it_does) {
+TEST(test_motion_swapped_sign_reports_the_opposite_direction) {
     motion.swapped = true;
     (void)drive(START_US, 2000U, 500, 2000);
     TEST_ASSERT_GREATER_THAN_INT64(0, motion.position_nm);
@@ -283,7 +283,7 @@ TEST(test_motion_swapped_sign_reports_the_opposite_of_what_it_does) {
     TEST_ASSERT_LESS_THAN_INT32(-30, (int32_t)motion.ticks);
 }
 
-TEST(test_motion_larger_wheel_really_goes_faster) {
+TEST(test_motion_larger_wheel_has_a_higher_true_speed) {
     config.radius_mm = 384U;
     restart();
     (void)drive(START_US, 2000U, 500, 2000);
@@ -291,7 +291,7 @@ TEST(test_motion_larger_wheel_really_goes_faster) {
     TEST_ASSERT_INT64_WITHIN(1, motion.position_nm / 500000, sim_motion_true_mm(&motion));
 }
 
-TEST(test_motion_release_forgets_the_setpoint) {
+TEST(test_motion_release_clears_the_setpoint) {
     iw_time_us_t const now_us = drive(START_US, 1000U, 500, 2000);
     sim_motion_release(&motion, now_us);
     TEST_ASSERT_FALSE(motion.driven);
@@ -307,7 +307,7 @@ TEST(test_motion_draws_more_while_it_accelerates) {
     TEST_ASSERT_EQUAL_UINT32(150U, sim_motion_draw_mA(&motion));
 }
 
-TEST(test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius) {
+TEST(test_motion_push_moves_the_wheel_by_the_exact_distance) {
     config.radius_mm = 160U;
     restart();
     sim_motion_push(&motion, START_US, 3000);
@@ -322,7 +322,7 @@ TEST(test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius) 
     TEST_ASSERT_EQUAL_INT64(0, sim_motion_true_mm(&motion));
 }
 
-TEST(test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest) {
+TEST(test_motion_push_overrides_the_motor_and_ends) {
     TEST_ASSERT_TRUE(tell(START_US, 500, 2000));
     sim_motion_push(&motion, START_US, -100);
     sim_motion_advance(&motion, START_US + 40U * MS);
@@ -332,7 +332,7 @@ TEST(test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest) {
 }
 
 /// 2^31 nm are 2.1 m.
-TEST(test_motion_way_of_many_metres_does_not_wrap) {
+TEST(test_motion_distance_of_many_metres_does_not_wrap) {
     (void)drive(START_US, 20000U, 1000, 4000);
     TEST_ASSERT_GREATER_THAN_INT64(17000, sim_motion_true_mm(&motion));
     sim_motion_push(&motion, START_US + 30000U * MS, 5000);

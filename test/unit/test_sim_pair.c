@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pair of simulated wheels: when which frame leaves; its life from power to reboot; determinism.
+// The pair of simulated wheels: the time of each frame, power, boot and reboot, determinism.
 #include "test_sim_rig.h"
 
 #include "unit.h"
@@ -10,7 +10,7 @@ void setUp(void) {
     rig_init();
 }
 
-TEST(test_pair_every_id_keeps_its_period_exactly_for_ten_seconds) {
+TEST(test_sim_pair_every_id_has_its_exact_period_for_10_s) {
     static const struct {
         uint32_t id;
         uint32_t period_us;
@@ -27,7 +27,7 @@ TEST(test_pair_every_id_keeps_its_period_exactly_for_ten_seconds) {
     }
 }
 
-TEST(test_pair_sends_its_nine_ids_and_nothing_else) {
+TEST(test_sim_pair_sends_its_nine_ids_only) {
     uint32_t total = 0U;
     uint32_t known = 0U;
     rig_run(START_US, START_US + 10U * SECOND);
@@ -42,7 +42,7 @@ TEST(test_pair_sends_its_nine_ids_and_nothing_else) {
     TEST_ASSERT_EQUAL_UINT32(known, total);
 }
 
-TEST(test_pair_is_silent_and_deaf_while_it_boots) {
+TEST(test_sim_pair_neither_sends_nor_receives_while_it_boots) {
     TEST_ASSERT_FALSE(sim_pair_acknowledges(&pair));
     rig_drive(500, 500);
     rig_run(START_US, START_US + 399U * MS);
@@ -54,7 +54,7 @@ TEST(test_pair_is_silent_and_deaf_while_it_boots) {
     TEST_ASSERT_TRUE(sim_pair_acknowledges(&pair));
 }
 
-TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start) {
+TEST(test_sim_pair_offset_frames_end_60_s_after_the_start) {
     rig_run(START_US, START_US + 100U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[513].count);
     TEST_ASSERT_EQUAL_UINT32(58U, seen[545].count);
@@ -63,7 +63,7 @@ TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(START_US + 400U * MS + 2U * SECOND, seen[513].first_us);
 }
 
-TEST(test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back) {
+TEST(test_sim_pair_reboot_of_one_wheel_resets_ticks_and_offsets) {
     rig_drive(500, 500);
     rig_run(START_US, START_US + 70U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT32(1000, rig_last(257U).as.status.odometry_ticks);
@@ -80,7 +80,7 @@ TEST(test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_bac
     TEST_ASSERT_EQUAL_UINT32(2U, pair.wheel[IW_LEFT].boots);
 }
 
-TEST(test_pair_without_power_is_silent_coasts_and_starts_anew) {
+TEST(test_sim_pair_without_power_sends_nothing_and_coasts) {
     rig_drive(700, 700);
     rig_run(START_US, START_US + 3U * SECOND);
     sim_pair_power(&pair, START_US + 3U * SECOND, false);
@@ -97,7 +97,7 @@ TEST(test_pair_without_power_is_silent_coasts_and_starts_anew) {
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.speed_rpm);
 }
 
-TEST(test_pair_power_told_twice_changes_nothing) {
+TEST(test_sim_pair_power_set_twice_changes_nothing) {
     rig_run(START_US, BOOTED);
     sim_pair_t const before = pair;
     sim_pair_power(&pair, BOOTED, true);
@@ -107,7 +107,7 @@ TEST(test_pair_power_told_twice_changes_nothing) {
     TEST_ASSERT_EQUAL_INT(SIM_WHEEL_OFF, pair.wheel[IW_LEFT].state);
 }
 
-TEST(test_pair_muted_wheel_is_silent_but_follows_and_acknowledges) {
+TEST(test_sim_pair_muted_wheel_follows_and_acknowledges) {
     pair.wheel[IW_LEFT].muted = true;
     rig_drive(500, 500);
     rig_run(START_US, START_US + 3U * SECOND);
@@ -119,23 +119,23 @@ TEST(test_pair_muted_wheel_is_silent_but_follows_and_acknowledges) {
     TEST_ASSERT_EQUAL_UINT32(250U, seen[256].count);
 }
 
-TEST(test_pair_that_is_old_already_sends_no_offset_but_knows_it) {
+TEST(test_sim_pair_older_than_60_s_sends_no_offset) {
     config.age_us = 61U * SECOND;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, START_US + 5U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(1251U, seen[256].count);
     TEST_ASSERT_EQUAL_UINT32(0U, seen[513].count + seen[545].count);
-    TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learnt_dN);
+    TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learned_dN);
 }
 
-TEST(test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only) {
+TEST(test_sim_pair_aged_30_s_sends_offsets_for_30_s) {
     config.age_us = 30U * SECOND;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, START_US + 100U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(30U, seen[513].count);
 }
 
-TEST(test_pair_loss_swallows_its_share_of_telemetry_and_setpoints) {
+TEST(test_sim_pair_loss_drops_its_share_of_frames) {
     rig_run(START_US, BOOTED);
     rig_forget();
     pair.wheel[IW_LEFT].loss_permille = 250U;
@@ -150,7 +150,7 @@ TEST(test_pair_loss_swallows_its_share_of_telemetry_and_setpoints) {
     TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count);
 }
 
-TEST(test_pair_slow_stretches_every_period_and_back) {
+TEST(test_sim_pair_slow_stretches_every_period) {
     sim_wheel_slow(&pair.wheel[IW_LEFT], 2500U);
     rig_run(START_US, START_US + 3U * SECOND);
     rig_forget();
@@ -165,7 +165,7 @@ TEST(test_pair_slow_stretches_every_period_and_back) {
     TEST_ASSERT_UINT32_WITHIN(260U, 2500U, seen[256].count);
 }
 
-TEST(test_pair_ignores_frames_that_are_no_setpoint_of_the_table) {
+TEST(test_sim_pair_ignores_frames_that_are_no_setpoint) {
     rig_run(START_US, BOOTED);
     sim_pair_t const before = pair;
     static const iw_can_frame_t strange[] = {
@@ -191,7 +191,7 @@ static void expect_same(const sim_sent_t *one, const sim_sent_t *other) {
     TEST_ASSERT_EQUAL_MEMORY(one->frame.data, other->frame.data, sizeof one->frame.data);
 }
 
-TEST(test_pair_same_seed_same_bytes_however_often_it_is_stepped) {
+TEST(test_sim_pair_bytes_do_not_depend_on_the_steps) {
     static sim_pair_t fine;
     iw_time_us_t fine_us = START_US;
     sim_sent_t one;
@@ -208,7 +208,7 @@ TEST(test_pair_same_seed_same_bytes_however_often_it_is_stepped) {
     TEST_ASSERT_GREATER_THAN_UINT32(12000U, frames);
 }
 
-TEST(test_pair_another_seed_gives_other_noise) {
+TEST(test_sim_pair_another_seed_gives_other_noise) {
     static sim_pair_t other;
     sim_sent_t sent;
     uint32_t differ = 0U;
@@ -221,7 +221,7 @@ TEST(test_pair_another_seed_gives_other_noise) {
     TEST_ASSERT_GREATER_THAN_UINT32(50U, differ);
 }
 
-TEST(test_pair_null_configuration_is_the_default) {
+TEST(test_sim_pair_null_configuration_is_the_default) {
     static sim_pair_t standard;
     sim_sent_t one;
     sim_sent_t other;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The simulator's commands: what is understood, what is refused, and that a refusal changes nothing.
+// Commands of the simulator: which are accepted, which are refused, and that a refused command changes nothing.
 #include "panel.h"
 #include "sim_command.h"
 
@@ -63,7 +63,7 @@ static sim_wheel_t *wheel(iw_side_t side) {
     return &world.pair.wheel[side];
 }
 
-TEST(test_panel_every_command_with_right_arguments_is_done) {
+TEST(test_panel_every_command_with_valid_arguments_is_executed) {
     static const char *const right[] = {
         "power off",
         "power on",
@@ -308,7 +308,7 @@ static int32_t pushed_mm(iw_side_t side) {
     return (int32_t)(wheel(side)->motion.push_nm / 1000000);
 }
 
-TEST(test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense) {
+TEST(test_panel_turn_rolls_each_wheel_along_its_circle) {
     expect_done("track 600");
     expect_done("turn 2");
     TEST_ASSERT_INT32_WITHIN(1, -3770, pushed_mm(IW_LEFT)); // 2 x pi x 600 mm
@@ -330,14 +330,14 @@ TEST(test_panel_line_too_long_is_refused) {
     expect_refused(line);
 }
 
-TEST(test_panel_refusal_tells_the_usage) {
+TEST(test_panel_refusal_has_the_usage) {
     expect_refused("load left");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "usage: load left|right|both NEWTON"));
     expect_refused("lod left 5");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "help"));
 }
 
-TEST(test_panel_reboot_without_power_is_refused_with_the_cure) {
+TEST(test_panel_reboot_without_power_is_refused_with_the_fix) {
     expect_done("power off");
     expect_refused("reboot left");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "power on"));
@@ -352,7 +352,7 @@ TEST(test_panel_help_lists_commands_and_ends_in_a_dot) {
     TEST_ASSERT_EQUAL_STRING("\n.\n", &panel.answer[strlen(panel.answer) - 3U]);
 }
 
-/// So many lines of the list begin with the name.
+/// Returns how many lines of the list begin with the name.
 static unsigned lines_of(const char *list, const char *name) {
     unsigned lines = 0;
     for (const char *line = list; *line != '\0'; line += strcspn(line, "\n") + 1U) {
@@ -377,20 +377,20 @@ static unsigned all_lines(const char *list) {
     return lines;
 }
 
-/// The help of each is there once, and there is none of a command that is not.
-TEST(test_panel_lists_are_those_of_the_tables) {
+/// The list contains the help of each command once, and no other help.
+TEST(test_panel_help_lists_exactly_the_commands) {
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_wheel), expect_listed(sim_wheel_commands, sim_commands_wheel));
     TEST_ASSERT_EQUAL_UINT(all_lines(sim_commands_bus), expect_listed(sim_bus_commands, sim_commands_bus) + 1U);
     TEST_ASSERT_EQUAL_UINT(1U, lines_of(sim_commands_bus, "help"));
 }
 
-TEST(test_panel_usage_longer_than_its_column_is_told_whole) {
+TEST(test_panel_usage_longer_than_its_column_is_not_cut) {
     expect_refused("contact 1");
     TEST_ASSERT_EQUAL_STRING("error that is not right; usage: contact 1|2 press|release|pulse MS|unplug|plug\n",
                              panel.answer);
 }
 
-TEST(test_panel_status_is_one_line_that_tells_the_truth) {
+TEST(test_panel_status_is_one_line_with_the_present_values) {
     expect_done("load left 50");
     expect_done("power off");
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "status"));
@@ -401,7 +401,7 @@ TEST(test_panel_status_is_one_line_that_tells_the_truth) {
     TEST_ASSERT_EQUAL_PTR(&panel.answer[strlen(panel.answer) - 1U], strchr(panel.answer, '\n'));
 }
 
-TEST(test_panel_status_tells_the_last_setpoint_and_its_age) {
+TEST(test_panel_status_has_the_last_setpoint_and_its_age) {
     expect_done("frame 10A#0101F407D0");
     run_until(NOW_US + 500000U);
     (void)sim_panel_execute(&panel, NOW_US + 500000U, "status");
@@ -409,7 +409,7 @@ TEST(test_panel_status_tells_the_last_setpoint_and_its_age) {
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint_age_ms\":499,\"driven\":true"));
 }
 
-TEST(test_panel_status_that_does_not_fit_is_cut_and_ended) {
+TEST(test_panel_status_that_does_not_fit_is_cut_and_terminated) {
     char small[40];
     memset(small, 0x5A, sizeof small);
     TEST_ASSERT_EQUAL_size_t(sizeof small - 1U, sim_panel_status(&panel, NOW_US, small, sizeof small));
@@ -430,14 +430,14 @@ TEST(test_panel_commands_reach_the_side_they_name) {
     TEST_ASSERT_EQUAL_INT32(12500, wheel(IW_RIGHT)->force.load_mN);
 }
 
-TEST(test_panel_mark_and_quit_reach_the_hooks) {
+TEST(test_panel_mark_and_quit_call_their_hooks) {
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge looks here"));
     TEST_ASSERT_EQUAL_STRING("the judge looks here", marked);
     expect_done("quit");
     TEST_ASSERT_EQUAL_UINT(1U, quits);
 }
 
-TEST(test_words_frame_reads_what_candump_writes) {
+TEST(test_panel_frame_is_parsed_in_the_format_of_candump) {
     iw_can_frame_t frame;
     TEST_ASSERT_TRUE(sim_words_frame("10a#DEADbeef", &frame));
     TEST_ASSERT_EQUAL_HEX32(0x10AU, frame.id);
@@ -450,7 +450,7 @@ TEST(test_words_frame_reads_what_candump_writes) {
     TEST_ASSERT_EQUAL_HEX32(0x7FFU | IW_CAN_REMOTE, frame.id);
 }
 
-TEST(test_each_contact_moves_alone_and_the_button_moves_both) {
+TEST(test_panel_each_contact_moves_alone_the_button_moves_both) {
     static sim_button_t first;
     static sim_button_t second;
     first = (sim_button_t){.release_us = IW_NEVER};
@@ -459,7 +459,7 @@ TEST(test_each_contact_moves_alone_and_the_button_moves_both) {
         first.client[i].fd = second.client[i].fd = -1;
     }
     panel.hooks.button = &first;
-    expect_refused("contact 1 press"); // It has one only.
+    expect_refused("contact 1 press"); // The button has only one contact.
     expect_refused("contact 2 press");
     TEST_ASSERT_FALSE(first.pressed);
     panel.hooks.second = &second;
@@ -469,7 +469,7 @@ TEST(test_each_contact_moves_alone_and_the_button_moves_both) {
     TEST_ASSERT_TRUE(first.unplugged && !second.unplugged);
     (void)sim_panel_execute(&panel, NOW_US, "status");
     TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"estop\":\"unplugged\",\"estop2\":\"pressed\"}"));
-    expect_refused("contact 2 pulse 20"); // Pressed already.
+    expect_refused("contact 2 pulse 20"); // The contact is already pressed.
     expect_done("normal");
     TEST_ASSERT_FALSE(first.pressed || second.pressed || first.unplugged || second.unplugged);
     expect_done("estop press");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The simulator's scripts: which command when, and how a faulty script is refused.
+// Scripts of the simulator: the time of each command, and the refusal of a faulty script.
 #include "panel.h"
 #include "script.h"
 
@@ -44,7 +44,7 @@ static void expect_step(iw_time_us_t at_us, const char *command) {
     TEST_ASSERT_EQUAL_STRING(command, sim_script_take(&script, at_us));
 }
 
-TEST(test_script_gives_each_command_at_its_time) {
+TEST(test_script_returns_each_command_at_its_time) {
     sim_script_fault_t fault;
     TEST_ASSERT_TRUE(load("# story\npower off\n\n  at 2.5 power on\nwait 1.0\nestop press\nwait 0.25 estop release\r\n"
                           "wait 5\n",
@@ -57,7 +57,7 @@ TEST(test_script_gives_each_command_at_its_time) {
     TEST_ASSERT_NULL(sim_script_take(&script, IW_NEVER - 1U));
 }
 
-TEST(test_script_faults_are_told_with_their_line) {
+TEST(test_script_faults_are_reported_with_their_line) {
     static const struct {
         const char *text;
         unsigned line;
@@ -97,7 +97,7 @@ TEST(test_script_line_too_long_and_too_many_commands_are_refused) {
     TEST_ASSERT_EQUAL_UINT(SIM_SCRIPT_STEPS + 1U, fault.line);
 }
 
-TEST(test_script_missing_file_is_told) {
+TEST(test_script_missing_file_is_reported) {
     sim_script_fault_t fault;
     TEST_ASSERT_FALSE(sim_script_load(&script, "/nonexistent/script", check, &panel, &fault));
     TEST_ASSERT_EQUAL_UINT(0U, fault.line);

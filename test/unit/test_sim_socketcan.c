@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Which commands the simulator refuses when it is a node on a CAN interface.
+// Commands that the simulator refuses when it is a node on a CAN interface.
 #include "sim_socketcan.h"
 
 #include "unit.h"
 
 #include <string.h>
 
-TEST(test_commands_that_need_the_hub_are_refused_with_any_arguments) {
+TEST(test_sim_socketcan_commands_of_the_hub_are_refused) {
     static const char *const refused[] = {"ack off", "stall on", "busoff", "passive\ton", "bus down", "queue 4"};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         TEST_ASSERT_TRUE_MESSAGE(sim_socketcan_refuses(refused[i]), refused[i]);
     }
 }
 
-TEST(test_commands_of_the_wheels_and_other_nodes_are_not) {
+TEST(test_sim_socketcan_commands_of_wheels_and_nodes_are_accepted) {
     static const char *const allowed[] = {"power off",   "mute left", "foreign once", "frame 100#", "babble 1 100 on",
                                           "estop press", "status",    "normal",       "busy",       "",
                                           "acknowledge", "b"};
@@ -22,7 +22,7 @@ TEST(test_commands_of_the_wheels_and_other_nodes_are_not) {
     }
 }
 
-TEST(test_open_of_a_name_that_no_interface_can_have_tells_why) {
+TEST(test_sim_socketcan_open_of_an_invalid_name_reports_the_fix) {
     static sim_socketcan_t can;
     static sim_world_t world;
     static sim_loop_t loop;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pair of simulated wheels: what its frames say.
+// Contents of the frames of the simulated pair.
 #include "test_sim_rig.h"
 
 #include "unit.h"
@@ -10,7 +10,7 @@ void setUp(void) {
     rig_init();
 }
 
-TEST(test_pair_learns_its_sensor_zero_when_nobody_presses) {
+TEST(test_sim_pair_learns_its_sensor_zero_without_load) {
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
     TEST_ASSERT_INT_WITHIN(1, 98, rig_last(545U).as.offset.offset_dN);
@@ -18,7 +18,7 @@ TEST(test_pair_learns_its_sensor_zero_when_nobody_presses) {
     TEST_ASSERT_INT_WITHIN(3, 98, rig_last(544U).as.force.force_raw);
 }
 
-TEST(test_pair_load_at_the_start_contaminates_the_offset) {
+TEST(test_sim_pair_load_at_the_start_changes_the_offset) {
     pair.wheel[IW_RIGHT].force.load_mN = 200000;
     rig_run(START_US, START_US + 4U * SECOND);
     pair.wheel[IW_RIGHT].force.load_mN = 0;
@@ -28,7 +28,7 @@ TEST(test_pair_load_at_the_start_contaminates_the_offset) {
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
 }
 
-TEST(test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset) {
+TEST(test_sim_pair_load_after_2_s_does_not_change_the_offset) {
     rig_run(START_US, START_US + 3U * SECOND);
     pair.wheel[IW_LEFT].force.load_mN = 100000;
     rig_run(START_US + 3U * SECOND, START_US + 8U * SECOND);
@@ -36,7 +36,7 @@ TEST(test_pair_load_after_the_first_two_seconds_does_not_touch_the_offset) {
     TEST_ASSERT_INT_WITHIN(600, 1230 + 10000, rig_last(512U).as.force.force_raw);
 }
 
-TEST(test_pair_load_sways_by_five_percent_at_0_7_hertz) {
+TEST(test_sim_pair_load_varies_by_5_percent_at_0_7_hertz) {
     int32_t low = INT32_MAX;
     int32_t high = INT32_MIN;
     unsigned rising = 0U;
@@ -57,7 +57,7 @@ TEST(test_pair_load_sways_by_five_percent_at_0_7_hertz) {
     TEST_ASSERT_UINT32_WITHIN(1U, 7U, rising);
 }
 
-TEST(test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN) {
+TEST(test_sim_pair_force_unit_is_per_wheel_and_offset_is_in_dN) {
     pair.wheel[IW_LEFT].force.unit = IW_FORCE_DN;
     pair.wheel[IW_RIGHT].force.unit = IW_FORCE_CN;
     rig_run(START_US, START_US + 4U * SECOND);
@@ -67,14 +67,14 @@ TEST(test_pair_units_are_selectable_per_wheel_and_the_offset_stays_in_dN) {
     TEST_ASSERT_INT_WITHIN(1, 98, rig_last(545U).as.offset.offset_dN);
 }
 
-TEST(test_pair_zero_removed_shows_nothing_at_rest_but_still_tells_its_offset) {
+TEST(test_sim_pair_with_zero_removed_sends_its_offset) {
     pair.wheel[IW_LEFT].force.zero_removed = true;
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_INT_WITHIN(30, 0, rig_last(512U).as.force.force_raw);
     TEST_ASSERT_INT_WITHIN(1, 123, rig_last(513U).as.offset.offset_dN);
 }
 
-TEST(test_pair_force_saturates_and_can_be_forced_to_any_raw_value) {
+TEST(test_sim_pair_force_saturates_or_has_a_set_raw_value) {
     pair.wheel[IW_LEFT].force.load_mN = 4000000;
     pair.wheel[IW_RIGHT].force.load_mN = -4000000;
     rig_run(START_US, START_US + 1U * SECOND);
@@ -85,7 +85,7 @@ TEST(test_pair_force_saturates_and_can_be_forced_to_any_raw_value) {
     TEST_ASSERT_EQUAL_INT(-32768, rig_last(512U).as.force.force_raw);
 }
 
-TEST(test_pair_speed_frames_tell_the_speed_without_bias) {
+TEST(test_sim_pair_speed_frames_have_no_bias) {
     int64_t sum = 0;
     rig_drive(500, -300);
     rig_run(START_US, START_US + 3U * SECOND);
@@ -98,7 +98,7 @@ TEST(test_pair_speed_frames_tell_the_speed_without_bias) {
     TEST_ASSERT_INT64_WITHIN(100, 24868, sum);
 }
 
-TEST(test_pair_at_rest_tells_exactly_zero_rpm) {
+TEST(test_sim_pair_at_standstill_sends_exactly_zero_rpm) {
     rig_drive(0, 0);
     rig_run(START_US, START_US + 3U * SECOND);
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.speed_rpm);
@@ -106,7 +106,7 @@ TEST(test_pair_at_rest_tells_exactly_zero_rpm) {
     TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.acceleration_raw);
 }
 
-TEST(test_pair_swapped_sign_turns_rpm_and_ticks_around) {
+TEST(test_sim_pair_swapped_sign_negates_rpm_and_ticks) {
     pair.wheel[IW_RIGHT].motion.swapped = true;
     rig_drive(500, 500);
     rig_run(START_US, START_US + 4U * SECOND);
@@ -116,7 +116,7 @@ TEST(test_pair_swapped_sign_turns_rpm_and_ticks_around) {
     TEST_ASSERT_LESS_THAN_INT32(-60, rig_last(289U).as.status.odometry_ticks);
 }
 
-TEST(test_pair_ticks_wrap_at_the_end_of_int32) {
+TEST(test_sim_pair_ticks_wrap_at_the_end_of_int32) {
     rig_run(START_US, BOOTED);
     pair.wheel[IW_LEFT].motion.ticks = INT32_MAX;
     rig_drive(500, 500);
@@ -125,7 +125,7 @@ TEST(test_pair_ticks_wrap_at_the_end_of_int32) {
     TEST_ASSERT_GREATER_THAN_INT32(INT32_MIN + 20, rig_last(257U).as.status.odometry_ticks);
 }
 
-TEST(test_pair_straight_drive_ends_straight_ahead) {
+TEST(test_sim_pair_straight_drive_has_a_straight_pose) {
     rig_run(START_US, BOOTED);
     rig_drive(500, 500);
     rig_run(BOOTED, START_US + 10U * SECOND);
@@ -137,7 +137,7 @@ TEST(test_pair_straight_drive_ends_straight_ahead) {
     TEST_ASSERT_EQUAL_INT(0, pose.z_mm);
 }
 
-TEST(test_pair_turn_on_the_spot_turns_by_way_over_track) {
+TEST(test_sim_pair_turn_on_the_spot_turns_by_distance_over_track) {
     rig_run(START_US, BOOTED);
     rig_drive(-200, 200);
     rig_run(BOOTED, START_US + 6U * SECOND);
@@ -148,21 +148,21 @@ TEST(test_pair_turn_on_the_spot_turns_by_way_over_track) {
     TEST_ASSERT_INT_WITHIN(15, 0, pose.y_mm);
 }
 
-TEST(test_pair_curve_to_the_left_has_positive_y_and_psi) {
+TEST(test_sim_pair_curve_to_the_left_has_positive_y_and_psi) {
     rig_drive(250, 350);
     rig_run(START_US, START_US + 5U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT16(500, rig_last(290U).as.pose.y_mm);
     TEST_ASSERT_GREATER_THAN_INT16(600, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_pose_needs_the_left_wheel_on_the_bus) {
+TEST(test_sim_pair_pose_needs_the_left_wheel_on_the_bus) {
     pair.wheel[IW_LEFT].muted = true;
     rig_drive(300, 300);
     rig_run(START_US, START_US + 4U * SECOND);
     TEST_ASSERT_GREATER_THAN_INT16(1500, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_mirrored_wheel_counts_the_other_way_in_the_pose) {
+TEST(test_sim_pair_mirrored_wheel_is_negated_in_the_pose) {
     config.mirrored[IW_RIGHT] = true;
     sim_pair_init(&pair, &config, START_US, 1U);
     rig_run(START_US, BOOTED);
@@ -172,7 +172,7 @@ TEST(test_pair_mirrored_wheel_counts_the_other_way_in_the_pose) {
     TEST_ASSERT_INT_WITHIN(15, 0, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi) {
+TEST(test_sim_pair_pose_saturates_in_x_and_wraps_in_psi) {
     rig_run(START_US, BOOTED);
     pair.pose.x_nm = INT64_C(40000000000);
     pair.pose.y_nm = INT64_C(-40000000000);
@@ -183,7 +183,7 @@ TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi) {
     TEST_ASSERT_EQUAL_INT(33000 - 65536, rig_last(290U).as.pose.psi_mrad);
 }
 
-TEST(test_pair_battery_sags_under_load_and_temperature_rises) {
+TEST(test_sim_pair_battery_drops_and_temperature_rises_under_load) {
     rig_run(START_US, START_US + 2U * SECOND);
     TEST_ASSERT_EQUAL_UINT8(248U, rig_last(257U).as.status.battery_dV);
     TEST_ASSERT_EQUAL_UINT8(28U, rig_last(257U).as.status.temperature_degC);
@@ -196,7 +196,7 @@ TEST(test_pair_battery_sags_under_load_and_temperature_rises) {
     TEST_ASSERT_UINT8_WITHIN(8U, 60U, rig_last(257U).as.status.temperature_degC);
 }
 
-TEST(test_pair_reboot_learns_the_offset_anew) {
+TEST(test_sim_pair_reboot_learns_the_offset_again) {
     rig_run(START_US, START_US + 4U * SECOND);
     pair.wheel[IW_LEFT].force.sensor_zero_mN = -50000;
     sim_pair_reboot(&pair, START_US + 4U * SECOND, IW_LEFT);
@@ -204,7 +204,7 @@ TEST(test_pair_reboot_learns_the_offset_anew) {
     TEST_ASSERT_INT_WITHIN(1, -500, rig_last(513U).as.offset.offset_dN);
 }
 
-TEST(test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample) {
+TEST(test_sim_pair_offset_is_the_mean_of_two_seconds) {
     pair.wheel[IW_LEFT].force.noise_mN = 0;
     rig_run(START_US, BOOTED + 900U * MS);
     pair.wheel[IW_LEFT].force.sensor_zero_mN = 52300;
@@ -212,7 +212,7 @@ TEST(test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample) {
     TEST_ASSERT_INT_WITHIN(12, 323, rig_last(513U).as.offset.offset_dN);
 }
 
-TEST(test_pair_left_wheel_that_falls_silent_counts_as_standing_still) {
+TEST(test_sim_pair_muted_left_wheel_counts_as_standstill_in_pose) {
     rig_run(START_US, BOOTED);
     rig_drive(300, 300);
     rig_run(BOOTED, BOOTED + 2U * SECOND);

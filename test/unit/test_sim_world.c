@@ -48,7 +48,7 @@ static void run_until(iw_time_us_t until_us) {
     }
 }
 
-/// A client that tells both wheels the same every 20 ms.
+/// A client that sends both wheels the same setpoint every 20 ms.
 static iw_time_us_t drive(uint8_t port, iw_time_us_t from_us, iw_time_us_t until_us, int16_t speed_mm_s) {
     iw_time_us_t now_us = from_us;
     for (; now_us < until_us; now_us += 20U * MS) {
@@ -74,7 +74,7 @@ TEST(test_world_load_of_telemetry_alone_is_five_to_six_percent) {
     TEST_ASSERT_UINT64_WITHIN(50000U, 560000U, world.bus.busy_us - before_us);
 }
 
-/// Sleeps and steps like a program would; how often it woke up. Keeps every delivery in `history`.
+/// Sleeps and steps as a program would, and stores every delivery in `history`. Returns the number of wake-ups.
 static uint32_t sleep_until(iw_time_us_t until_us, iw_time_us_t (*wake_us)(const sim_world_t *)) {
     uint32_t wakes = 0U;
     for (iw_time_us_t now_us = wake_us(&world); now_us <= until_us; now_us = wake_us(&world)) {
@@ -89,7 +89,7 @@ static uint32_t sleep_until(iw_time_us_t until_us, iw_time_us_t (*wake_us)(const
     return wakes;
 }
 
-TEST(test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes) {
+TEST(test_world_woken_at_frame_ends_delivers_the_same_frames) {
     static sim_delivery_t every_step[HISTORY];
     uint32_t const wakes = sleep_until(START_US + 3U * SECOND, sim_world_next_us);
     uint32_t const told = count;
@@ -106,7 +106,7 @@ TEST(test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes) {
     TEST_ASSERT_LESS_THAN_UINT32(wakes * 6U / 10U, fewer);
 }
 
-TEST(test_world_client_gets_its_frames_back_within_a_millisecond) {
+TEST(test_world_client_receives_its_echoes_within_1_ms) {
     uint8_t const port = sim_world_connect(&world);
     (void)drive(port, START_US + SECOND, START_US + 2U * SECOND, 300);
     run_until(START_US + 2U * SECOND);
@@ -119,7 +119,7 @@ TEST(test_world_client_gets_its_frames_back_within_a_millisecond) {
     }
 }
 
-TEST(test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns) {
+TEST(test_world_power_cut_retains_queued_setpoints_until_power_on) {
     uint8_t const port = sim_world_connect(&world);
     iw_time_us_t now_us = drive(port, START_US + SECOND, START_US + 3U * SECOND, 1000);
     run_until(now_us);
@@ -142,7 +142,7 @@ TEST(test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns) {
     TEST_ASSERT_GREATER_THAN_UINT32(900U, world.dropped);
 }
 
-TEST(test_world_queue_of_one_keeps_only_the_controllers_frame) {
+TEST(test_world_queue_of_one_retains_one_frame) {
     uint8_t const port = sim_world_connect(&world);
     sim_world_queue(&world, 1U);
     run_until(START_US + SECOND);
@@ -154,7 +154,7 @@ TEST(test_world_queue_of_one_keeps_only_the_controllers_frame) {
     TEST_ASSERT_EQUAL_HEX32(266U, history[0].frame.id);
 }
 
-TEST(test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge) {
+TEST(test_world_rebooting_wheel_leaves_one_that_acknowledges) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_reboot(&world, START_US + SECOND, IW_LEFT);
@@ -165,7 +165,7 @@ TEST(test_world_one_wheel_rebooting_leaves_the_other_to_acknowledge) {
     TEST_ASSERT_EQUAL_UINT32(5U, world.pair.wheel[IW_RIGHT].motion.setpoints);
 }
 
-TEST(test_world_ack_off_holds_clients_frames_while_telemetry_goes_on) {
+TEST(test_world_ack_off_delays_frames_of_clients_only) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_ack(&world, START_US + SECOND, false);
@@ -179,7 +179,7 @@ TEST(test_world_ack_off_holds_clients_frames_while_telemetry_goes_on) {
     TEST_ASSERT_EQUAL_UINT32(SIM_QUEUE_DEFAULT, count);
 }
 
-TEST(test_world_disconnected_client_takes_its_queue_along) {
+TEST(test_world_queue_of_a_disconnected_client_is_dropped) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_power(&world, START_US + SECOND, false);
@@ -190,7 +190,7 @@ TEST(test_world_disconnected_client_takes_its_queue_along) {
     TEST_ASSERT_EQUAL_UINT32(0U, count);
 }
 
-TEST(test_world_has_room_for_so_many_clients_and_no_more) {
+TEST(test_world_accepts_its_maximum_of_clients_only) {
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         TEST_ASSERT_EQUAL_UINT8(SIM_PORT_CLIENT + i, sim_world_connect(&world));
     }
@@ -199,7 +199,7 @@ TEST(test_world_has_room_for_so_many_clients_and_no_more) {
     TEST_ASSERT_EQUAL_UINT8(SIM_PORT_CLIENT + 3U, sim_world_connect(&world));
 }
 
-TEST(test_world_bus_off_loses_what_clients_had_and_what_they_send) {
+TEST(test_world_bus_off_drops_frames_of_clients) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     sim_world_ack(&world, START_US + SECOND, false);
@@ -215,7 +215,7 @@ TEST(test_world_bus_off_loses_what_clients_had_and_what_they_send) {
     TEST_ASSERT_EQUAL_UINT32(2U, count);
 }
 
-TEST(test_world_foreign_master_sends_pairs_every_20_ms_and_the_wheels_obey) {
+TEST(test_world_foreign_master_sends_pairs_every_20_ms) {
     run_until(START_US + SECOND);
     world.foreign.due_us = START_US + SECOND;
     world.foreign.setpoint.speed_mm_s = 400;
@@ -237,7 +237,7 @@ TEST(test_world_foreign_once_is_one_pair) {
     TEST_ASSERT_EQUAL_UINT32(2U, count);
 }
 
-TEST(test_world_injected_frame_is_heard_as_it_is) {
+TEST(test_world_injected_frame_is_delivered_unchanged) {
     iw_can_frame_t frame = frame_of(0x12345U | IW_CAN_EXTENDED, 3U);
     frame.data[2] = 0x5AU;
     run_until(START_US + SECOND);
@@ -250,7 +250,7 @@ TEST(test_world_injected_frame_is_heard_as_it_is) {
     TEST_ASSERT_EQUAL_UINT8(SIM_PORT_INJECT, history[0].port);
 }
 
-TEST(test_world_babbling_low_id_fills_the_bus_and_starves_the_others) {
+TEST(test_world_babbling_low_id_fills_the_bus) {
     run_until(START_US + SECOND);
     world.babble = (sim_babble_t){START_US + SECOND, 100U, frame_of(1U, 8U)};
     telemetry = 0U;
@@ -262,7 +262,7 @@ TEST(test_world_babbling_low_id_fills_the_bus_and_starves_the_others) {
     TEST_ASSERT_GREATER_THAN_UINT32(8U, telemetry);
 }
 
-TEST(test_world_babbling_high_id_delays_the_others_by_one_frame_only) {
+TEST(test_world_babbling_high_id_delays_others_by_one_frame) {
     uint8_t const port = sim_world_connect(&world);
     run_until(START_US + SECOND);
     world.babble = (sim_babble_t){START_US + SECOND, 100U, frame_of(0x7FFU, 8U)};

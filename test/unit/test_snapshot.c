@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The one door for reading: what a snapshot shows is what the gateway's parts have, in every state, and nothing is left out.
+// A snapshot, the only interface for reading: it equals the state of the parts of the gateway in every state, and no
+// field is missing.
 #include "gateway_rig.h"
 #include "message.h"
 #include "unit.h"
@@ -107,7 +108,8 @@ static void assert_rest(const iw_snapshot_t *seen) {
     TEST_ASSERT_EQUAL_INT(gateway->left_behind, seen->left_behind);
 }
 
-/// Looks twice, into structs that were not alike before: every field must be alike now, and what the parts have.
+/// Takes two snapshots into structs with different contents: every field must be equal, and equal to the state of the
+/// parts.
 static iw_snapshot_t look_at(iw_time_us_t now_us) {
     iw_snapshot_t seen;
     iw_snapshot_t again;
@@ -150,7 +152,7 @@ TEST(test_snapshot_no_field_is_missing_in_this_test) {
     TEST_ASSERT_TRUE(sizeof(iw_snapshot_t) - end < sizeof(iw_time_us_t));
 }
 
-TEST(test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus) {
+TEST(test_snapshot_before_the_first_frame_has_no_telemetry) {
     const iw_snapshot_t seen = look();
     for (size_t side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].speed_us);
@@ -175,12 +177,12 @@ TEST(test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus) {
     }
 }
 
-TEST(test_snapshot_listening_shows_what_each_wheel_told_and_when) {
+TEST(test_snapshot_listening_has_telemetry_and_its_time) {
     const iw_codec_wheel_t force = {.force = {0, 200}};
     const iw_codec_wheel_t pose = {.pose = {1, 2, 3, 4}};
     rig.config.invert[IW_RIGHT] = true;
     gateway_rig_begin(&rig, false);
-    gateway_rig_run(&rig, MS(5)); // Each has told its ticks once: counting begins there.
+    gateway_rig_run(&rig, MS(5)); // Each wheel has sent its ticks once: counting starts there.
     rig.wheel[IW_LEFT] = (rig_wheel_t){false, true, 1, 7, rig.wheel[IW_LEFT].speed_us, rig.wheel[IW_LEFT].status_us};
     rig.wheel[IW_RIGHT] =
         (rig_wheel_t){false, true, 9, 11, rig.wheel[IW_RIGHT].speed_us, rig.wheel[IW_RIGHT].status_us};
@@ -205,7 +207,7 @@ TEST(test_snapshot_listening_shows_what_each_wheel_told_and_when) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, seen.bus);
 }
 
-TEST(test_snapshot_heard_and_at_rest_are_those_of_the_look) {
+TEST(test_snapshot_heard_and_at_rest_are_judged_at_its_time) {
     gateway_rig_run(&rig, MS(199));
     const iw_time_us_t rest_us = rig.gateway.wheel[IW_LEFT].rest_since_us + MS(rig.config.rest_ms);
     TEST_ASSERT_FALSE(look_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
@@ -215,7 +217,7 @@ TEST(test_snapshot_heard_and_at_rest_are_those_of_the_look) {
     TEST_ASSERT_FALSE(look_at(lost_us).wheel[IW_LEFT].heard);
 }
 
-TEST(test_snapshot_arming_shows_who_waits_and_since_when) {
+TEST(test_snapshot_arming_has_its_client_and_start_time) {
     gateway_rig_run(&rig, MS(1100));
     rig.bus.echo_delay_us = MS(20);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
@@ -236,7 +238,7 @@ TEST(test_snapshot_confirmed_is_the_older_of_both_wheels) {
     rig.bus.echo_delay_us = MS(2);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
     const iw_time_us_t first_us = rig.now_us;
-    gateway_rig_run(&rig, MS(2)); // The left one's echo is there, the right one's not yet.
+    gateway_rig_run(&rig, MS(2)); // The echo of the left wheel has arrived, that of the right wheel has not.
     TEST_ASSERT_EQUAL_UINT64(0, look().confirmed_us);
     gateway_rig_run(&rig, FAKE_BUS_FRAME_US);
     TEST_ASSERT_EQUAL_UINT64(first_us, look().confirmed_us);
@@ -265,7 +267,7 @@ TEST(test_snapshot_armed_shows_command_ramp_and_lease) {
     TEST_ASSERT_UINT32_WITHIN(1, seen.sent->pairs, seen.counters->echoes / 2U);
 }
 
-TEST(test_snapshot_braking_tells_the_stop_and_what_was_applied) {
+TEST(test_snapshot_braking_has_the_stop_and_the_applied_pair) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(400));
     gateway_rig_stop(&rig);
@@ -281,7 +283,7 @@ TEST(test_snapshot_braking_tells_the_stop_and_what_was_applied) {
     TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, seen.holder);
 }
 
-TEST(test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset) {
+TEST(test_snapshot_latched_has_a_cause_while_it_prevents_reset) {
     const uint32_t bit = 1U << IW_CAUSE_ESTOP_SOFTWARE;
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(400));
@@ -302,7 +304,7 @@ TEST(test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset) {
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
 }
 
-TEST(test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew) {
+TEST(test_snapshot_after_a_reboot_has_no_status_until_a_new_one) {
     rig.wheel[IW_RIGHT].ticks = 500;
     gateway_rig_run(&rig, MS(100));
     rig.wheel[IW_RIGHT].mute = true;
@@ -321,7 +323,7 @@ TEST(test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew) {
     TEST_ASSERT_TRUE(look().at_us - look().wheel[IW_RIGHT].status_us <= MS(1));
 }
 
-TEST(test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still) {
+TEST(test_snapshot_doubt_is_the_first_blocking_contradiction) {
     const iw_assumption_entry_t wrong = {IW_CONTRADICTED, IW_SOURCE_OPERATOR, 0};
     const uint32_t changes = look().assumed_changes;
     iw_gateway_set_assumption(&rig.gateway, IW_ASSUMPTION_GEAR_RATIO, &wrong);
@@ -334,7 +336,7 @@ TEST(test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still)
     TEST_ASSERT_EQUAL_INT(IW_CONTRADICTED, look().assumed[IW_ASSUMPTION_GEAR_RATIO].state);
 }
 
-TEST(test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind) {
+TEST(test_snapshot_failed_arming_has_refusal_and_left_behind) {
     const iw_bus_facts_t facts = {false, true};
     iw_gateway_bus_facts(&rig.gateway, &facts);
     gateway_rig_run(&rig, MS(1100));
@@ -349,8 +351,8 @@ TEST(test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind) {
     TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
 }
 
-/// Counters that nothing ordinary moves, each with a value of its own.
-TEST(test_snapshot_every_count_of_sending_is_its_own) {
+/// Counters that ordinary runs do not change, each with a separate value.
+TEST(test_snapshot_counters_of_sending_are_not_exchanged) {
     gateway_rig_arm(&rig);
     rig.gateway.sender.sent.later = 101;
     rig.gateway.sender.sent.clamped = 102;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What readers of the web bridge's stream get; its metrics, settings and token.
+// The stream of the web bridge to its readers; metrics, settings and token.
 #include "feed.h"
 #include "metrics.h"
 #include "token.h"
@@ -48,7 +48,7 @@ TEST(test_reader_gets_events_in_order_and_then_the_state) {
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
 }
 
-TEST(test_slow_reader_gets_the_newest_state_only) {
+TEST(test_reader_slow_gets_the_newest_state_only) {
     for (char i = '0'; i <= '9'; i++) {
         const char json[] = {'{', '"', i, '"', ':', i, '}', '\0'};
         add("state", json);
@@ -57,7 +57,7 @@ TEST(test_slow_reader_gets_the_newest_state_only) {
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest) {
+TEST(test_reader_within_a_state_gets_its_end_then_the_newest) {
     add("state", "{\"a\":1}");
     TEST_ASSERT_EQUAL_STRING("event", take(5));
     add("state", "{\"a\":2}");
@@ -66,18 +66,18 @@ TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest) {
     TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", take(1000));
 }
 
-TEST(test_reader_that_falls_behind_is_told_how_many_it_missed) {
-    for (unsigned i = 0; i < WEB_FEED_KEPT + 7U; i++) {
+TEST(test_reader_too_slow_gets_the_count_of_lost_events) {
+    for (unsigned i = 0; i < WEB_FEED_STORED + 7U; i++) {
         add("bus", "{}");
     }
     TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", take(1000));
-    for (unsigned i = 0; i < WEB_FEED_KEPT; i++) {
+    for (unsigned i = 0; i < WEB_FEED_STORED; i++) {
         TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", take(1000));
     }
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event) {
+TEST(test_reader_new_gets_the_newest_state_and_no_old_event) {
     add("stop", "{}");
     add("state", "{\"a\":1}");
     web_reader_begin(&reader, &feed);
@@ -85,7 +85,7 @@ TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event) {
     TEST_ASSERT_EQUAL_STRING("", take(1000));
 }
 
-TEST(test_state_that_is_forgotten_is_told_to_nobody) {
+TEST(test_reader_gets_no_state_that_was_cleared) {
     add("state", "{\"a\":1}");
     web_feed_forget(&feed);
     TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
@@ -107,7 +107,7 @@ static char *metrics_of(const char *json) {
     return text;
 }
 
-TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown) {
+TEST(test_metrics_have_base_units_and_no_unknown_values) {
     char *text = metrics_of("{\"state\":\"armed\",\"left\":{\"heard\":true,\"speed_mm_s\":-1234,\"battery_dV\":251,"
                             "\"temperature_degC\":null},"
                             "\"right\":{\"heard\":false,\"speed_mm_s\":null},\"counters\":{\"pairs\":7},"
@@ -135,7 +135,7 @@ TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown) {
     free(text);
 }
 
-TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels) {
+TEST(test_metrics_without_a_gateway_have_no_values_of_wheels) {
     char *text = metrics_of(NULL);
     TEST_ASSERT_NOT_NULL(strstr(text, "\niwheel_up 0\n"));
     TEST_ASSERT_NULL(strstr(text, "iwheel_wheel"));
@@ -153,28 +153,28 @@ static void expect_line(const char *line) {
     free(text);
 }
 
-TEST(test_metrics_count_stops_by_cause_once_and_from_the_connection) {
+TEST(test_metrics_count_each_stop_since_the_connection_once) {
     memset(&tally, 0, sizeof tally);
     expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 0\n");
     stopped("{\"number\":4,\"cause\":\"overspeed\",\"at_us\":9,\"wall_us\":1760000000000007}", false);
-    expect_line("\niwheel_stops_total{cause=\"overspeed\"} 0\n"); // Before our time.
+    expect_line("\niwheel_stops_total{cause=\"overspeed\"} 0\n"); // The stop was before the connection.
     expect_line("\niwheel_last_stop_number 4\n");
     expect_line("\niwheel_last_stop_timestamp_seconds 1760000000.000007\n");
     stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", true);
-    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", false); // The same, from `why`.
+    stopped("{\"number\":5,\"cause\":\"lease_lost\",\"at_us\":20}", false); // The same stop, from the reply to `why`.
     expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 1\n");
     expect_line("\niwheel_stops_total{cause=\"unknown\"} 0\n");
-    stopped("{\"number\":8,\"cause\":\"lease_lost\",\"at_us\":30}", false); // Two were missed.
+    stopped("{\"number\":8,\"cause\":\"lease_lost\",\"at_us\":30}", false); // Two stops were missed.
     expect_line("\niwheel_stops_total{cause=\"lease_lost\"} 2\n");
     expect_line("\niwheel_stops_total{cause=\"unknown\"} 2\n");
 }
 
-TEST(test_metrics_count_on_when_the_gateway_begins_anew) {
+TEST(test_metrics_counts_continue_after_a_gateway_restart) {
     memset(&tally, 0, sizeof tally);
     stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
     expect_line("\niwheel_last_stop_number 0\n");
     stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":5}", true);
-    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":7}", true); // Of its next run.
+    stopped("{\"number\":1,\"cause\":\"client_stop\",\"at_us\":7}", true); // A stop of the next run of the gateway.
     stopped("{\"number\":0,\"cause\":null,\"at_us\":null}", false);
     stopped("{\"number\":2,\"cause\":\"of the future\",\"at_us\":8}", true);
     expect_line("\niwheel_stops_total{cause=\"client_stop\"} 2\n");
@@ -182,7 +182,7 @@ TEST(test_metrics_count_on_when_the_gateway_begins_anew) {
     expect_line("\niwheel_last_stop_number 2\n");
 }
 
-TEST(test_metrics_name_the_version) {
+TEST(test_metrics_have_the_version) {
     expect_line("\niwheel_build_info{version=\"" IWHEEL_VERSION "\"} 1\n");
 }
 
@@ -200,7 +200,7 @@ static int read_settings(const char *text, web_settings_t *settings) {
     return result;
 }
 
-TEST(test_settings_that_are_wrong_are_told_with_line_and_cure) {
+TEST(test_settings_errors_have_line_and_fix) {
     static const char *const cases[][2] = {
         {"[web]\nport = 0", "f:2: "},
         {"[web]\nlisten = walker\n", "f:2: listen = walker is no address"},
@@ -219,7 +219,7 @@ TEST(test_settings_that_are_wrong_are_told_with_line_and_cure) {
     }
 }
 
-TEST(test_settings_that_leave_the_machine_are_taken_with_tls) {
+TEST(test_settings_for_other_machines_are_accepted_with_tls) {
     web_settings_t settings;
     TEST_ASSERT_EQUAL_INT(
         0, read_settings("[web]\nlisten = 0.0.0.0\ncertificate = /a\nkey = /b\nhosts = a b\n", &settings));
@@ -232,7 +232,7 @@ TEST(test_settings_that_leave_the_machine_are_taken_with_tls) {
     TEST_ASSERT_FALSE(settings.drive.enabled);
 }
 
-// ---- the token ------------------------------------------------------------------------------------------------------
+// ---- token ----------------------------------------------------------------------------------------------------------
 
 static char folder[] = "/tmp/iwheel-token-XXXXXX";
 static char path[64];
@@ -252,7 +252,7 @@ static void end_token(void) {
     (void)fclose(silent);
 }
 
-TEST(test_token_is_made_for_the_bridge_alone_and_stays) {
+TEST(test_token_is_created_for_the_bridge_alone_and_stays) {
     web_token_t token;
     web_token_t other;
     struct stat status;
@@ -271,7 +271,7 @@ TEST(test_token_is_made_for_the_bridge_alone_and_stays) {
     end_token();
 }
 
-TEST(test_token_that_is_deleted_or_over_is_replaced) {
+TEST(test_token_that_is_deleted_or_expired_is_replaced) {
     web_token_t token;
     char before[WEB_TOKEN_SIZE];
     bool changed = false;
@@ -299,7 +299,7 @@ TEST(test_token_that_others_can_read_is_refused) {
     end_token();
 }
 
-TEST(test_token_that_is_only_read_is_never_made) {
+TEST(test_token_that_is_only_read_is_never_created) {
     web_token_t token;
     bool changed = false;
     begin_token(&token, 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the web bridge lets in, and what it reads of a request.
+// Which requests the web bridge accepts, and which values it reads from them.
 #include "driver.h"
 #include "web_judge.h"
 
@@ -22,7 +22,7 @@ static unsigned status(void) {
     return verdict.status;
 }
 
-TEST(test_request_with_token_to_an_address_is_taken) {
+TEST(test_request_with_token_to_an_address_is_accepted) {
     TEST_ASSERT_EQUAL_UINT(200, status());
     TEST_ASSERT_EQUAL(WEB_STATUS, web_judge(&rules, &asked).route->verb);
 }
@@ -69,7 +69,7 @@ TEST(test_origin_of_another_site_is_refused) {
     }
 }
 
-TEST(test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not) {
+TEST(test_request_cross_site_is_refused_except_the_page_itself) {
     asked.site = "cross-site";
     TEST_ASSERT_EQUAL_UINT(403, status());
     asked.site = "same-site";
@@ -104,7 +104,7 @@ TEST(test_request_without_proof_is_refused) {
     }
 }
 
-TEST(test_secret_for_reading_only_reads) {
+TEST(test_secret_for_reading_grants_only_reading) {
     static const char *const commands[] = {"/api/estop", "/api/arm", "/api/drive", "/api/reset"};
     rules.may_drive = true;
     rules.may_reset = true;
@@ -131,14 +131,14 @@ TEST(test_stop_never_needs_a_proof) {
     TEST_ASSERT_EQUAL_UINT(421, status());
 }
 
-TEST(test_header_that_is_there_twice_is_refused) {
+TEST(test_header_given_twice_is_refused) {
     asked.is_doubled = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
     asked.has_body = true;
     TEST_ASSERT_EQUAL_UINT(400, status());
 }
 
-TEST(test_unknown_path_and_other_method_are_refused) {
+TEST(test_request_to_unknown_path_or_method_is_refused) {
     static const char *const nowhere[] = {"/api", "/api/status/", "/../etc/passwd",   "/%2e%2e/token", "//",
                                           "",     "/index.html",  "/uPlot.LICENSE/.."};
     for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++) {
@@ -167,7 +167,7 @@ TEST(test_driving_and_reset_are_refused_unless_configured) {
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
-TEST(test_stop_and_estop_are_always_taken) {
+TEST(test_stop_and_estop_are_always_accepted) {
     asked.method = "POST";
     asked.path = "/api/stop";
     TEST_ASSERT_EQUAL_UINT(200, status());
@@ -175,7 +175,7 @@ TEST(test_stop_and_estop_are_always_taken) {
     TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
-TEST(test_number_with_anything_beside_its_digits_is_refused) {
+TEST(test_number_with_other_characters_or_out_of_range_is_refused) {
     static const char *const wrong[] = {NULL,   "",   "-", "+1", " 1", "1 ", "1.0", "0x1", "1e2", "9223372036854775808",
                                         "-101", "101"};
     int64_t value = 7;
@@ -187,7 +187,7 @@ TEST(test_number_with_anything_beside_its_digits_is_refused) {
     TEST_ASSERT_EQUAL_INT64(-100, value);
 }
 
-TEST(test_name_of_a_recording_with_a_path_in_it_is_refused) {
+TEST(test_recording_name_with_a_path_is_refused) {
     static const char *const wrong[] = {
         NULL,      "",
         ".log",    "a",
@@ -225,24 +225,25 @@ static void begin(void) {
     web_driver_begin(&driver, NOW);
 }
 
-TEST(test_drive_command_of_the_page_that_armed_is_taken_once) {
+TEST(test_drive_command_of_the_armed_page_is_accepted_once) {
     begin();
     TEST_ASSERT_NULL(take(NOW));
-    TEST_ASSERT_NOT_NULL(take(NOW)); // The same again.
+    TEST_ASSERT_NOT_NULL(take(NOW)); // The same command again.
     command.sequence = "3";
     TEST_ASSERT_NULL(take(NOW));
-    command.sequence = "2"; // Overtaken.
+    command.sequence = "2"; // Overtaken by sequence 3.
     TEST_ASSERT_NOT_NULL(take(NOW));
     TEST_ASSERT_EQUAL_UINT64(2, driver.dropped);
 }
 
-TEST(test_drive_command_that_is_late_or_from_the_future_is_dropped) {
+TEST(test_drive_command_late_or_from_the_future_is_dropped) {
     begin();
     TEST_ASSERT_NOT_NULL(strstr(take(4900000U + 300001U), "too old"));
     TEST_ASSERT_NOT_NULL(strstr(take(4900000U - WEB_AHEAD_US - 1U), "future"));
     TEST_ASSERT_EQUAL_INT64(0, driver.sequence);
     TEST_ASSERT_NULL(take(4900000U + 300000U));
-    command.sequence = "2"; // Its clock was read after the bridge's, which then found it waiting.
+    // The clock of this command was read after that of the bridge, which found the command waiting.
+    command.sequence = "2";
     TEST_ASSERT_NULL(take(4900000U - WEB_AHEAD_US));
 }
 
@@ -255,7 +256,7 @@ TEST(test_drive_command_of_another_page_is_dropped) {
     TEST_ASSERT_NOT_NULL(take(NOW));
 }
 
-TEST(test_command_that_turns_a_wheel_is_noticed_beyond_limits_too) {
+TEST(test_drive_command_beyond_limits_counts_as_motion) {
     begin();
     command.is_holders = false;
     TEST_ASSERT_TRUE(web_command_moves(&command));
@@ -271,7 +272,7 @@ TEST(test_command_that_turns_a_wheel_is_noticed_beyond_limits_too) {
     TEST_ASSERT_FALSE(web_command_moves(&command));
 }
 
-TEST(test_age_of_arm_and_reset_has_two_ends) {
+TEST(test_arm_and_reset_outside_their_age_limits_are_refused) {
     static const char *const wrong[] = {NULL, "", "x", "-1", "3999999", "5100001", "0", "9223372036854775807"};
     static const char *const good[] = {"4000000", "5000000", "5100000"};
     int64_t t_us = 7;
@@ -296,7 +297,7 @@ TEST(test_drive_command_beyond_the_configured_speed_is_dropped) {
     TEST_ASSERT_NOT_NULL(take(NOW));
 }
 
-TEST(test_driver_that_says_nothing_is_silent_and_nobody_is_not) {
+TEST(test_driver_without_commands_is_silent_until_it_ends) {
     begin();
     TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_FIRST_US - 1U));
     TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_FIRST_US));

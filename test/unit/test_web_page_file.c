@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file of the page: compressed for who accepts that, and not sent again to who has it.
+// A file of the page: compressed for clients that accept it, and not sent again to clients that have it.
 #include "page_file.h"
 
 #include "unity.h"
@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 static const char hello[] = "hello\n";
-/// `printf 'hello\n' | gzip -9n`
+/// Output of `printf 'hello\n' | gzip -9n`.
 static const unsigned char packed[] = {0x1f, 0x8b, 0x08, 0x00, 0x00, 0x00, 0x00, 0x00, 0x02, 0x03, 0xcb, 0x48, 0xcd,
                                        0xc9, 0xc9, 0xe7, 0x02, 0x00, 0x20, 0x30, 0x3a, 0x36, 0x06, 0x00, 0x00, 0x00};
 static char folder[] = "/tmp/iwheel-page-XXXXXX";
@@ -37,7 +37,7 @@ void tearDown(void) {
     (void)unlink(beside);
 }
 
-static void test_file_is_read_with_its_packed_form_and_two_tags(void) {
+static void test_page_file_is_read_with_its_packed_form_and_two_tags(void) {
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     TEST_ASSERT_EQUAL_STRING(hello, file.plain.text);
     TEST_ASSERT_EQUAL_size_t(sizeof packed, file.packed.length);
@@ -46,12 +46,12 @@ static void test_file_is_read_with_its_packed_form_and_two_tags(void) {
     TEST_ASSERT_TRUE(strcmp(file.plain.tag, file.packed.tag) != 0);
 }
 
-static void test_file_that_is_not_there_is_refused(void) {
+static void test_page_file_missing_is_refused(void) {
     (void)unlink(path);
     TEST_ASSERT_FALSE(page_file_read(&file, path));
 }
 
-static void test_packed_form_of_other_bytes_is_left_out(void) {
+static void test_page_file_packed_form_of_other_bytes_is_ignored(void) {
     unsigned char other[sizeof packed];
     for (size_t i = 0; i < 10U; i++) {
         static const size_t at[] = {0, 1, 18, 19, 20, 21, 22, 23, 24, 25};
@@ -71,7 +71,7 @@ static void test_packed_form_of_other_bytes_is_left_out(void) {
     TEST_ASSERT_EQUAL_PTR(&file.plain, page_file_choose(&file, "gzip"));
 }
 
-static void test_packed_form_is_chosen_by_who_accepts_it(void) {
+static void test_page_file_packed_form_is_chosen_by_accepted_encodings(void) {
     static const char *const yes[] = {"gzip",    "GZIP",       "deflate, gzip;q=0.5, br",
                                       "br,gzip", "gzip;q=1.0", " gzip ; q=0.001"};
     static const char *const no[] = {"",        "identity",        "gzip;q=0", "gzip;q=0.000, deflate;q=1",
@@ -87,7 +87,7 @@ static void test_packed_form_is_chosen_by_who_accepts_it(void) {
     TEST_ASSERT_EQUAL_PTR(&file.plain, page_file_choose(&file, NULL));
 }
 
-static void test_copy_is_known_by_its_tag_only(void) {
+static void test_page_file_copy_is_recognized_by_its_tag_only(void) {
     char list[128];
     TEST_ASSERT_TRUE(page_file_read(&file, path));
     (void)snprintf(list, sizeof list, "\"other\", W/%s", file.plain.tag);
@@ -104,11 +104,11 @@ int main(void) {
     (void)snprintf(path, sizeof path, "%s/page.js", folder);
     (void)snprintf(beside, sizeof beside, "%s/page.js.gz", folder);
     UNITY_BEGIN();
-    RUN_TEST(test_file_is_read_with_its_packed_form_and_two_tags);
-    RUN_TEST(test_file_that_is_not_there_is_refused);
-    RUN_TEST(test_packed_form_of_other_bytes_is_left_out);
-    RUN_TEST(test_packed_form_is_chosen_by_who_accepts_it);
-    RUN_TEST(test_copy_is_known_by_its_tag_only);
+    RUN_TEST(test_page_file_is_read_with_its_packed_form_and_two_tags);
+    RUN_TEST(test_page_file_missing_is_refused);
+    RUN_TEST(test_page_file_packed_form_of_other_bytes_is_ignored);
+    RUN_TEST(test_page_file_packed_form_is_chosen_by_accepted_encodings);
+    RUN_TEST(test_page_file_copy_is_recognized_by_its_tag_only);
     const int failures = UNITY_END();
     (void)rmdir(folder);
     return failures;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who has the token, without the token on the line. The MACs were made by Python's hmac.
+// Proof that a client has the token, without the token on the connection. The hmac module of Python computed the MACs.
 #include "proof.h"
 
 #include "unit.h"
@@ -49,13 +49,13 @@ TEST(test_proof_with_the_token_is_full_and_counts_once) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(1));
     TEST_ASSERT_EQUAL_UINT64(0, session);
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(4));
-    TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(2)); // Overtaken.
+    TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(2)); // Overtaken by sequence 4.
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(2));
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(4));
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(3));
 }
 
-TEST(test_proof_behind_the_window_is_wrong) {
+TEST(test_proof_older_than_the_window_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     proofs.sessions[0].newest = 65;
     proofs.sessions[0].seen = 1;
@@ -74,7 +74,7 @@ TEST(test_proof_of_another_request_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, judge("POST", "/api/arm?t_us=1", text));
 }
 
-TEST(test_proof_in_another_form_is_wrong) {
+TEST(test_proof_in_another_spelling_is_wrong) {
     static const char *const forms[] = {"IWheel %s %s %u %s x",  "IWheel %s %s %u %s ", "IWheel %.31s %s %u %s",
                                         "IWheel %s %.31s %u %s", "IWheel %s %s -%u %s", "IWheel %s %s %u %.63s",
                                         "iwheel %s %s %u %s",    "Bearer %s %s %u %s"};
@@ -88,8 +88,8 @@ TEST(test_proof_in_another_form_is_wrong) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("POST", "/api/arm?t_us=1", "IWheel "));
 }
 
-TEST(test_session_begins_only_with_a_nonce_in_force) {
-    now_us = proofs.renew_us + WEB_NONCE_US - 1U; // The one before.
+TEST(test_session_begins_only_with_a_valid_nonce) {
+    now_us = proofs.renew_us + WEB_NONCE_US - 1U; // The previous nonce.
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     setUp();
     now_us = proofs.renew_us + WEB_NONCE_US;
@@ -104,7 +104,7 @@ TEST(test_session_lasts_longer_than_its_nonce) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, arm(1));
 }
 
-TEST(test_full_table_forgets_no_session_that_could_come_again) {
+TEST(test_full_table_replaces_only_sessions_that_have_expired) {
     TEST_ASSERT_EQUAL(WEB_PROOF_FULL, arm(1));
     for (unsigned i = 1; i < WEB_SESSIONS; i++) {
         (void)snprintf(proofs.sessions[i].id, sizeof proofs.sessions[i].id, "%032x", i);
@@ -117,7 +117,7 @@ TEST(test_full_table_forgets_no_session_that_could_come_again) {
     TEST_ASSERT_EQUAL_UINT64(proofs.begun, proofs.sessions[7].number);
 }
 
-TEST(test_nonce_is_renewed_and_the_one_before_counts_once_more) {
+TEST(test_nonce_is_renewed_and_the_previous_one_is_retained) {
     char first[BRIDGE_SECRET_SIZE];
     memset(&proofs, 0, sizeof proofs);
     (void)snprintf(first, sizeof first, "%s", web_proofs_nonce(&proofs, now_us));
@@ -128,7 +128,7 @@ TEST(test_nonce_is_renewed_and_the_one_before_counts_once_more) {
     TEST_ASSERT_EQUAL_STRING("", proofs.nonce[1]);
 }
 
-TEST(test_secret_for_reading_is_made_from_the_token) {
+TEST(test_secret_for_reading_is_derived_from_the_token) {
     char text[64];
     char secret[BRIDGE_SECRET_SIZE];
     web_read_secret(token, secret);
@@ -141,7 +141,7 @@ TEST(test_secret_for_reading_is_made_from_the_token) {
     TEST_ASSERT_EQUAL(WEB_PROOF_WRONG, judge("GET", "/metrics", text));
 }
 
-TEST(test_empty_token_lets_nobody_in) {
+TEST(test_empty_token_grants_no_access) {
     char text[64];
     char secret[BRIDGE_SECRET_SIZE];
     token = "";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How far and how fast? Unwrapping, jumps, geometry, mirrored wheels.
+// Distance and speed of a wheel: unwrapping, jumps, geometry, mirrored wheels.
 #include "fixture.h"
 #include "iwheel/private/wheel.h"
 #include "message.h"
@@ -32,7 +32,7 @@ static void hear_speed(int16_t rpm) {
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
-/// From one reading to another, so long after it.
+/// The ticks change from one reading to another after `after_us`.
 static iw_reboot_t jump_from(int32_t from, int32_t to, iw_time_us_t after_us) {
     begin_side(IW_LEFT);
     hear_ticks(from);
@@ -46,7 +46,7 @@ static iw_reboot_t jump_from(int32_t from, int32_t to, iw_time_us_t after_us) {
     return iw_wheel_take_reboot(&wheel);
 }
 
-/// A jump of that many ticks, so long after the status frame before it.
+/// The ticks jump by `ticks`, `after_us` after the previous status frame.
 static iw_reboot_t jump(int32_t ticks, iw_time_us_t after_us) {
     return jump_from(5000, 5000 + ticks, after_us);
 }
@@ -81,7 +81,7 @@ TEST(test_wheel_ticks_unwrap_in_both_directions) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-TEST(test_wheel_ticks_go_on_beyond_32_bits) {
+TEST(test_wheel_ticks_continue_beyond_32_bits) {
     config.radius_mm = 20;
     config.gear_turns = 100;
     begin_side(IW_LEFT);
@@ -107,7 +107,7 @@ TEST(test_wheel_ticks_end_at_their_limit_in_both_directions) {
     TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
 }
 
-TEST(test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel) {
+TEST(test_wheel_distance_at_the_limit_of_ticks_does_not_overflow) {
     config.radius_mm = 500;
     begin_side(IW_LEFT);
     wheel.ticks = IW_WHEEL_TICKS_MAX;
@@ -126,7 +126,7 @@ TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance) {
     TEST_ASSERT_TRUE(wheel.ticks <= 1);
 }
 
-/// 10 m/s are 0.4973 ticks in a millisecond.
+/// 10 m/s are 0.4973 ticks per millisecond.
 TEST(test_wheel_jump_is_judged_by_the_time_it_took) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(30, MS(40)));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(-30, MS(40)));
@@ -140,7 +140,7 @@ TEST(test_wheel_jump_is_judged_by_the_time_it_took) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-5050, MS(10000)));
 }
 
-TEST(test_wheel_small_jump_is_believed_whatever_the_time) {
+TEST(test_wheel_small_jump_is_accepted_at_any_interval) {
     const message_t first = {IW_CODEC_STATUS, IW_LEFT, {.status = {0, 0, 0, 0}}};
     const message_t second = {IW_CODEC_STATUS, IW_LEFT, {.status = {30, 0, 0, 0}}};
     const message_t third = {IW_CODEC_STATUS, IW_LEFT, {.status = {61, 0, 0, 0}}};
@@ -164,9 +164,9 @@ TEST(test_wheel_jump_is_judged_to_the_microsecond) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(40, 52359));
 }
 
-TEST(test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick) {
+TEST(test_wheel_jump_of_2_31_ticks_is_judged_to_the_tick) {
     config.radius_mm = 20;
-    config.gear_turns = 100; // 2 us per tick at 10 m/s: in 71 minutes as far as the counter reaches.
+    config.gear_turns = 100; // 2 us per tick at 10 m/s: the counter reaches its end in 71 minutes.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump_from(0, INT32_MAX, 4294967233U));
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump_from(0, INT32_MAX, 4294967234U));
     TEST_ASSERT_EQUAL_INT64(INT32_MAX, wheel.ticks);
@@ -174,7 +174,7 @@ TEST(test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick) {
     TEST_ASSERT_EQUAL_INT64(INT32_MIN, wheel.ticks);
 }
 
-TEST(test_wheel_distance_and_speed_of_the_documented_wheel) {
+TEST(test_wheel_distance_and_speed_match_the_documented_wheel) {
     hear_ticks(0);
     hear_ticks(10);
     TEST_ASSERT_INT64_WITHIN(1000, 201061930, distance_nm());
@@ -205,12 +205,12 @@ TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only) {
     TEST_ASSERT_INT_WITHIN(1, 1608, wheel.speed_mm_s);
 }
 
-/// 2 pi r / 60 in whole nanometres, by the rational 355/113 (wrong by 1e-7).
+/// 2 pi r / 60 in whole nanometres, by the rational 355/113 (relative error 1e-7).
 static int64_t nm_per_turn_60th(uint32_t radius_mm) {
     return (int64_t)radius_mm * 1000000 * 355 / (113 * 30);
 }
 
-TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere) {
+TEST(test_wheel_geometry_is_exact_to_10_ppm_for_all_radii) {
     static const uint16_t radii_mm[] = {20, 33, 192, 499, 500};
     static const uint16_t gears[][2] = {{1, 1}, {3, 2}, {7, 3}, {100, 1}, {1000, 10}, {999, 998}};
     for (size_t r = 0; r < 5; r++) {
@@ -242,7 +242,7 @@ TEST(test_wheel_speed_extremes_do_not_overflow) {
     }
 }
 
-TEST(test_wheel_inverted_negates_what_the_machine_sees_only) {
+TEST(test_wheel_inverted_negates_distance_and_speed_but_not_ticks) {
     config.invert[IW_RIGHT] = true;
     begin_side(IW_RIGHT);
     hear_ticks(0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Is a wheel there, at rest, or back from a reboot?
+// Whether a wheel is online, at standstill, or back after a reboot.
 #include "fixture.h"
 #include "iwheel/private/wheel.h"
 #include "message.h"
@@ -44,7 +44,7 @@ static void hear_other(iw_codec_kind_t kind) {
     iw_wheel_receive(&wheel, now_us, message.kind, &message.as, true);
 }
 
-/// Speed frames every 4 ms for so long.
+/// Receives speed frames every 4 ms for `for_us`.
 static void hear_for(iw_time_us_t for_us, int16_t rpm) {
     const iw_time_us_t until_us = now_us + for_us;
     while (now_us + MS(4) <= until_us) {
@@ -58,7 +58,7 @@ static bool rests(iw_time_us_t at_us, uint32_t for_us) {
     return iw_wheel_rest_us(&wheel, at_us + 1U) > for_us;
 }
 
-TEST(test_wheel_never_heard_is_lost_and_not_at_rest) {
+TEST(test_wheel_never_received_is_lost_and_not_at_standstill) {
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_FALSE(rests(now_us, 0));
@@ -69,14 +69,14 @@ TEST(test_wheel_never_heard_is_lost_and_not_at_rest) {
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(100)));
 }
 
-TEST(test_wheel_never_heard_is_not_heard_when_time_has_just_begun) {
+TEST(test_wheel_never_received_is_not_online_at_clock_start) {
     iw_wheel_init(&wheel, &config, IW_LEFT, 0);
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 0));
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, 1000));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, 1000));
 }
 
-TEST(test_wheel_is_heard_for_exactly_its_silence_limit) {
+TEST(test_wheel_is_online_for_exactly_its_silence_limit) {
     static const uint16_t limits_ms[] = {20, 50, 200};
     for (size_t i = 0; i < 3; i++) {
         config.wheel_silent_ms = limits_ms[i];
@@ -91,7 +91,7 @@ TEST(test_wheel_is_heard_for_exactly_its_silence_limit) {
     }
 }
 
-TEST(test_wheel_is_kept_alive_by_speed_frames_only) {
+TEST(test_wheel_stays_online_by_speed_frames_only) {
     static const iw_codec_kind_t others[] = {IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_OFFSET, IW_CODEC_POSE};
     hear(0);
     for (uint32_t n = 0; n < 40; n++) {
@@ -102,7 +102,7 @@ TEST(test_wheel_is_kept_alive_by_speed_frames_only) {
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
 }
 
-TEST(test_wheel_is_not_found_by_frames_of_unknown_age) {
+TEST(test_wheel_is_not_online_by_frames_of_unknown_age) {
     hear_as(7, false);
     TEST_ASSERT_FALSE(iw_wheel_online(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
@@ -140,7 +140,7 @@ TEST(test_wheel_is_excused_again_after_a_fresh_frame) {
     TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
 }
 
-TEST(test_wheel_at_rest_counts_an_unbroken_run) {
+TEST(test_wheel_at_standstill_counts_an_unbroken_run) {
     hear(0);
     const iw_time_us_t start_us = now_us;
     hear_for(MS(200), 0);
@@ -157,7 +157,7 @@ TEST(test_wheel_at_rest_counts_an_unbroken_run) {
     TEST_ASSERT_TRUE(rests(now_us + 1U, 1));
 }
 
-TEST(test_wheel_at_rest_has_its_limit_in_both_directions) {
+TEST(test_wheel_at_standstill_has_its_limit_in_both_directions) {
     static const struct {
         int16_t rpm;
         bool rest;
@@ -174,7 +174,7 @@ TEST(test_wheel_at_rest_has_its_limit_in_both_directions) {
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
-TEST(test_wheel_rest_is_broken_by_a_gap) {
+TEST(test_wheel_standstill_is_broken_by_a_gap) {
     hear(0);
     hear_for(MS(400), 0);
     now_us += SILENT_US - 4000U;
@@ -187,7 +187,7 @@ TEST(test_wheel_rest_is_broken_by_a_gap) {
     TEST_ASSERT_FALSE(rests(now_us, 1));
 }
 
-TEST(test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age) {
+TEST(test_wheel_standstill_cannot_begin_at_a_frame_of_unknown_age) {
     hear_as(0, false);
     hear(5);
     hear_as(0, false);
@@ -198,7 +198,7 @@ TEST(test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age) {
     TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
-TEST(test_wheel_silent_for_a_second_has_rebooted) {
+TEST(test_wheel_offline_for_a_second_has_rebooted) {
     hear(0);
     now_us += MS(1000) - 1U;
     hear(0);
@@ -211,7 +211,7 @@ TEST(test_wheel_silent_for_a_second_has_rebooted) {
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
 
-TEST(test_wheel_that_sends_anything_is_not_silent) {
+TEST(test_wheel_that_sends_any_frame_has_not_rebooted) {
     hear(0);
     for (uint32_t n = 0; n < 30; n++) {
         now_us += MS(40);
@@ -231,7 +231,7 @@ TEST(test_wheel_silence_of_our_own_stall_is_no_reboot) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
 }
 
-TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen) {
+TEST(test_wheel_first_frame_is_no_reboot_but_may_set_boot_seen) {
     now_us += MS(1000) - 1U;
     hear(0);
     TEST_ASSERT_FALSE(wheel.boot_seen);
@@ -244,7 +244,7 @@ TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen) {
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-/// Offset frames every `period_us`, so many of them, with speed frames between; none may tell of a reboot.
+/// Receives offset frames every `period_us` with speed frames between them. None may report a reboot.
 static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
     for (uint32_t n = 0; n < number; n++) {
         hear_for(period_us, 0);
@@ -253,20 +253,20 @@ static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
     }
 }
 
-TEST(test_wheel_offset_frames_that_never_stop_tell_of_no_reboot) {
+TEST(test_wheel_endless_offset_frames_are_no_reboot) {
     hear(0);
     hear_for(IW_WHEEL_OFFSET_LEARN_US, 0);
     hear_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-TEST(test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot) {
+TEST(test_wheel_four_lost_offset_frames_are_no_reboot) {
     hear(0);
     hear_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-TEST(test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted) {
+TEST(test_wheel_found_during_its_offset_frames_has_not_rebooted) {
     static const uint32_t ages_s[] = {3, 30, 59};
     for (size_t i = 0; i < 3; i++) {
         begin();
@@ -278,9 +278,9 @@ TEST(test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted) {
     }
 }
 
-TEST(test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond) {
+TEST(test_wheel_offset_frames_that_return_are_a_reboot) {
     static const uint32_t heard_s[] = {1, 10, 58, 61,
-                                       300}; // Also long before a gateway that started late could know of 60 s.
+                                       300}; // Also long before a gateway that started late can know the limit of 60 s.
     for (size_t i = 0; i < 5; i++) {
         for (iw_time_us_t early_us = 0; early_us < 2; early_us++) {
             begin();
@@ -295,10 +295,10 @@ TEST(test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond
     }
 }
 
-TEST(test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames) {
+TEST(test_wheel_found_old_has_rebooted_at_an_offset_frame) {
     hear(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
-    hear_other(IW_CODEC_OFFSET); // So soon it may just have started.
+    hear_other(IW_CODEC_OFFSET); // At this time the wheel may just have started.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     begin();
     hear(0);
@@ -308,8 +308,8 @@ TEST(test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
 
-/// What the offset frames of a reboot within the wheel's first minute no longer tell, its silence or its odometry do.
-TEST(test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry) {
+/// Silence or odometry reveals a reboot within the first minute of the wheel, which its offset frames do not reveal.
+TEST(test_wheel_reboot_within_a_minute_shows_by_silence_or_ticks) {
     hear(0);
     hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_REBOOT_SILENCE_US;
@@ -326,8 +326,8 @@ TEST(test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry) {
     TEST_ASSERT_EQUAL_UINT32(2, wheel.reboots);
 }
 
-/// Nothing else may tell of what started anew while we did not run: silence then is excused.
-TEST(test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot) {
+/// Only the offset frames reveal a restart during a stall of the gateway: silence is excused then.
+TEST(test_wheel_offset_frames_after_our_own_stall_are_a_reboot) {
     hear(0);
     hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_OFFSET_BACK_US;
@@ -336,7 +336,7 @@ TEST(test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
 }
 
-TEST(test_wheel_other_frames_tell_of_no_reboot_however_late) {
+TEST(test_wheel_late_frames_of_other_kinds_are_no_reboot) {
     static const iw_codec_kind_t others[] = {IW_CODEC_SPEED, IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_POSE};
     hear_for(MS(70000), 0);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
@@ -345,7 +345,7 @@ TEST(test_wheel_other_frames_tell_of_no_reboot_however_late) {
     }
 }
 
-TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew) {
+TEST(test_wheel_power_cut_with_restarted_odometry_is_one_reboot) {
     hear(0);
     hear_status(1000000);
     now_us += MS(10000);
@@ -358,7 +358,7 @@ TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew) {
     TEST_ASSERT_TRUE(wheel.ticks == 1);
 }
 
-TEST(test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit) {
+TEST(test_wheel_standstill_time_saturates_at_its_limit) {
     const iw_time_us_t hours_us = (iw_time_us_t)UINT32_MAX + 5U;
     hear_for(MS(20), 0);
     wheel.rest_since_us = now_us - hours_us;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How fast the pair may turn the machine: what is commanded, how it grows in a ramp, and that it slows no stop.
+// How fast the pair may turn the machine: limits of commands, growth in a ramp, and no delay of a stop.
 #include "setpoint_rig.h"
 #include "unit.h"
 
@@ -17,7 +17,7 @@ static int32_t turn_of(const iw_pair_t *pair) {
     return pair->wheel[IW_RIGHT].speed_mm_s - pair->wheel[IW_LEFT].speed_mm_s;
 }
 
-TEST(test_yaw_bounds_are_those_of_the_real_machine) {
+TEST(test_yaw_bounds_match_the_real_machine) {
     static const struct {
         uint16_t max_mrad_s, accel_mrad_s2, track_mm, radius_mm;
         int32_t most_mm_s;
@@ -71,7 +71,7 @@ TEST(test_yaw_limit_scales_both_wheels_by_one_factor) {
     }
 }
 
-TEST(test_yaw_limit_never_is_faster_or_moves_another_way) {
+TEST(test_yaw_limit_never_increases_or_reverses_a_speed) {
     fixture_random_t random;
     fixture_random_init(&random, 21);
     for (uint32_t n = 0; n < 200000; n++) {
@@ -105,8 +105,8 @@ TEST(test_yaw_bound_is_the_growth_up_to_the_limit) {
     }
 }
 
-/// 2 um/s are left for the rounding of both wheels.
-TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change) {
+/// 2 um/s are reserved for the rounding of both wheels.
+TEST(test_yaw_room_is_the_margin_on_the_side_of_the_change) {
     static const struct {
         int32_t bound, from, change;
         uint32_t room;
@@ -119,7 +119,7 @@ TEST(test_yaw_room_is_up_to_the_bound_on_the_side_of_the_change) {
     }
 }
 
-TEST(test_yaw_grows_by_its_acceleration_and_to_its_end) {
+TEST(test_yaw_grows_by_its_acceleration_to_its_target) {
     setpoint_rig_follow(&rig);
     const iw_time_us_t start_us = rig.now_us;
     setpoint_rig_command(&rig, -270, 270, 2000);
@@ -132,14 +132,14 @@ TEST(test_yaw_grows_by_its_acceleration_and_to_its_end) {
     TEST_ASSERT_EQUAL_INT(-270, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
 }
 
-TEST(test_yaw_late_call_is_granted_two_periods_of_growth) {
+TEST(test_yaw_late_call_grows_for_two_periods_at_most) {
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, -270, 270, 2000);
     const iw_pair_t pair = setpoint_rig_take_after(&rig, 500000);
     TEST_ASSERT_INT_WITHIN(1, 42, turn_of(&pair));
 }
 
-TEST(test_yaw_of_a_faster_curve_keeps_the_curve) {
+TEST(test_yaw_of_a_faster_curve_retains_the_curve) {
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 300, 840, 2000);
     for (uint32_t n = 0; n < 100; n++) {
@@ -149,7 +149,7 @@ TEST(test_yaw_of_a_faster_curve_keeps_the_curve) {
     TEST_ASSERT_EQUAL_INT(840, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].speed_mm_s);
 }
 
-/// One wheel that alone slows down turns the machine: that is growth of yaw too.
+/// A single wheel that slows down turns the machine: this is growth of yaw, too.
 TEST(test_yaw_growth_by_one_braking_wheel_is_bounded) {
     setpoint_rig_cruise(&rig, 900, 900, 2000);
     const iw_time_us_t start_us = rig.setpoint.last_us;
@@ -163,9 +163,9 @@ TEST(test_yaw_growth_by_one_braking_wheel_is_bounded) {
     TEST_ASSERT_EQUAL_INT(400, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].speed_mm_s);
 }
 
-/// From 0/0 to 64 mm/s of the right wheel, which it could reach in one step: growth of 1000 mm/s2 gives it 20 mm/s, and as
-/// a current that is a setpoint it gets the same share of the way.
-TEST(test_yaw_that_holds_up_a_speed_holds_up_its_current) {
+/// From 0/0 to 64 mm/s of the right wheel, which it could reach in one step: growth of 1000 mm/s2 allows 20 mm/s. A
+/// current that is a setpoint changes by the same share.
+TEST(test_yaw_that_delays_a_speed_delays_its_current) {
     static const iw_pair_t target = {{{0, 0}, {64, 640}}};
     rig.config.track_mm = 500;
     rig.config.accel_mm_s2 = 20000;
@@ -180,8 +180,8 @@ TEST(test_yaw_that_holds_up_a_speed_holds_up_its_current) {
     TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_LEFT].current_mA);
 }
 
-/// The same where a wheel brakes: its current falls by the share that its speed falls by.
-TEST(test_yaw_that_holds_up_braking_holds_up_its_current) {
+/// The same for a wheel that brakes: its current decreases by the same share as its speed.
+TEST(test_yaw_that_delays_braking_delays_its_current) {
     static const iw_pair_t target = {{{400, 400}, {900, 900}}};
     rig.config.current_role = IW_ROLE_SETPOINT;
     rig.config.max_current_mA = 1000;
@@ -196,8 +196,8 @@ TEST(test_yaw_that_holds_up_braking_holds_up_its_current) {
     TEST_ASSERT_EQUAL_INT(400, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].current_mA);
 }
 
-/// Braking that alone leads exactly to the bound is not held up: only the wheel that would become faster waits.
-TEST(test_yaw_braking_up_to_its_bound_goes_all_the_way) {
+/// Braking that alone leads exactly to the bound is not delayed: only the wheel that would become faster waits.
+TEST(test_yaw_braking_up_to_its_bound_is_not_delayed) {
     rig.config.track_mm = 500;
     rig.config.max_yaw_mrad_s = 2000;
     rig.config.decel_mm_s2 = 1000;
@@ -209,8 +209,8 @@ TEST(test_yaw_braking_up_to_its_bound_goes_all_the_way) {
     TEST_ASSERT_EQUAL_INT32(900000, rig.setpoint.speed_um_s[IW_RIGHT]);
 }
 
-/// Nothing but the slope towards zero: in a stop, at a command of 0/0, and where yaw falls.
-TEST(test_yaw_slows_no_stop_and_no_fall) {
+/// Only the slope towards zero applies: in a stop, at a command of 0/0, and where yaw decreases.
+TEST(test_yaw_delays_no_stop_and_no_decrease) {
     static const struct {
         bool command;
         int16_t left_mm_s, right_mm_s;
@@ -236,8 +236,8 @@ TEST(test_yaw_slows_no_stop_and_no_fall) {
     }
 }
 
-/// Out of any curve 0/0 is reached as early as the slope of the faster wheel allows, however slowly yaw may grow.
-TEST(test_yaw_slows_no_stop_out_of_any_curve) {
+/// From any curve, 0/0 is reached as early as the slope of the faster wheel allows, however slowly yaw may grow.
+TEST(test_yaw_delays_no_stop_from_any_curve) {
     static const int16_t curves[][IW_SIDES] = {{300, 800},   {800, 300},   {-270, 270}, {0, 540},
                                                {-700, -701}, {1000, 1000}, {-100, 400}};
     static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
@@ -262,8 +262,9 @@ TEST(test_yaw_slows_no_stop_out_of_any_curve) {
     }
 }
 
-/// One wheel has a long way to brake through zero, the other would become faster at once: it waits, and both get there.
-TEST(test_yaw_at_its_limit_waits_and_gets_there) {
+/// One wheel brakes for a long time through zero. The other could become faster immediately: it waits, and both reach
+/// the target.
+TEST(test_yaw_at_its_limit_waits_and_reaches_the_target) {
     rig.config.max_yaw_mrad_s = 278; // 150 mm/s.
     rig.config.accel_mm_s2 = 20000;
     rig.config.decel_mm_s2 = 100;

@@ -789,7 +789,7 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
     assert rig.ask("POST", "/api/estop")[0] == 200
     time.sleep(1.2)
     number = newest()
-    for delay_s, burst in ((0.1, 1), (1.2, 1), (5, 20)) + (((60, 100),) if os.environ.get("IWHEEL_FULL") else ()):
+    for delay_s, burst in ((0.1, 1), (1.2, 1), (5, 20)) + (((60, 100),) if os.environ.get("IWHEEL_FULL") == "1" else ()):
         forwarder.delay_s = delay_s
         claims = [reset_of(person, number) for _ in range(burst)]
         with ThreadPoolExecutor(burst) as pool:
@@ -801,8 +801,8 @@ def test_reset_held_back_opens_no_latch_that_was_set_meanwhile(rig):
             until(lambda: newest() != number, what="another stop")
             number = newest()
         else:
-            assert all(body["error"] == "stale_command" for _, body in answers), answers[:3]
             assert gateway_state(rig)["state"] == "latched"
+            assert [answer for answer in answers if answer[1]["error"] != "stale_command"] == []
     # In time, but for the stop before: somebody reset at the machine and pressed once more.
     forwarder.delay_s = 0.6
     claim = reset_of(person, number)
@@ -999,7 +999,7 @@ def test_check_refuses_a_token_that_the_start_refuses(rig):
 def start_lan(rig):
     """The bridge by `--lan`, and the address that it prints."""
     rig.write_web()
-    rig.web = Process([rig.program("iwheel-web"), "-c", rig.path("web.conf"), "--lan"], rig.path("web.out"))
+    rig.web = Process([rig.program("iwheel-web"), "-c", rig.path("web.conf"), "--lan"], rig.path(f"web.{len(rig.processes)}.out"))
     rig.processes.append(rig.web)
     found = until(lambda: re.search(r"https://([\d.]+):(\d+)/#token=([0-9a-f]{32})", rig.web.text()), what="the address is printed")
     assert int(found[2]) == rig.port and found[3] == rig.token

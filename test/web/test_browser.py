@@ -607,6 +607,8 @@ def test_reset_button_clears_the_stop_that_is_shown(rig):
         time.sleep(1.2)
         page.click("#reset")
         rig.ask("POST", "/api/stop")
+        shown_us = page.evaluate("page.t_us")
+        seen(page, f"page.t_us > {shown_us + 200_000}")  # A reset by a state from before the stop is refused.
         page.click("#ask-yes")
         seen(page, "document.querySelector('#state').textContent === 'listening'")
 

@@ -18,18 +18,20 @@ from trials import Driver, braking_ms, until
 PHONES = {"portrait": (390, 844), "landscape": (844, 390), "small": (320, 568)}
 SIZES.update(PHONES)
 NO_FIGURE = "\N{EN DASH}"
-VIEWS = [*PHONES, "desk"]
+SIZES["wide"] = (1400, 900)
+VIEWS = [*PHONES, "wide"]
 FIGURES = ["big-left-speed", "big-right-speed", "big-left-force", "big-right-force", "big-left-battery", "big-right-battery", "big-estop"]
 
 # Of each element: whether its whole area is in the window, what lies on its middle, and whether its words are cut off.
 AREAS = """(ids) => ids.map((id) => { const e = document.getElementById(id), r = e.getBoundingClientRect();
   const top = document.elementFromPoint(r.left + r.width / 2, r.top + r.height / 2);
   return { id, text: e.textContent, inside: r.width > 0 && r.height > 0 && r.left >= 0 && r.top >= 0 && r.right <= innerWidth && r.bottom <= innerHeight,
-    free: top === e || e.contains(top), whole: e.scrollWidth <= e.clientWidth + 1 || getComputedStyle(e).display === 'inline', size: parseFloat(getComputedStyle(e).fontSize) }; })"""
+    card: !e.closest('.card') || r.right <= e.closest('.card').getBoundingClientRect().right, free: top === e || e.contains(top),
+    whole: e.scrollWidth <= e.clientWidth + 1 || getComputedStyle(e).display === 'inline', size: parseFloat(getComputedStyle(e).fontSize) }; })"""
 
 
 def touch(size):
-    return {} if size == "desk" else {"is_mobile": True, "has_touch": True}
+    return {} if size == "wide" else {"is_mobile": True, "has_touch": True}
 
 
 def shot(page, name):
@@ -39,7 +41,7 @@ def shot(page, name):
 
 def all_seen(page, ids, what):
     for area in page.evaluate(AREAS, ids):
-        assert area["inside"] and area["free"] and area["whole"] and area["text"].strip(), (what, area)
+        assert area["inside"] and area["card"] and area["free"] and area["whole"] and area["text"].strip(), (what, area)
 
 
 @pytest.mark.rig(driving=True)
@@ -437,3 +439,30 @@ def test_page_of_the_lan_is_live_and_an_app(rig):
         assert page.evaluate("fetch('/icon.svg').then((answer) => answer.headers.get('Content-Type'))") == "image/svg+xml"
         page.goto(page.url)  # Opened again without the token in its address, as the app is.
         live(page)
+
+
+def test_cause_that_prevents_driving_is_one_sentence(rig):
+    rig.start().connected()
+    with page_of(rig, "small", **touch("small")) as page:
+        live(page)
+        rig.sim.ask("power off")
+        seen(page, "document.querySelector('#word').textContent === 'Not ready'")
+        assert page.inner_text("#sentence") == "Wheel offline: switch the wheels on; check their cable and the termination."
+        assert {page.inner_text(f"#big-{side}-speed") for side in ("left", "right")} == {NO_FIGURE}
+        all_seen(page, ["word", "sentence", *FIGURES], "wheels without power")
+
+
+@pytest.mark.rig(driving=True)
+def test_pad_closes_when_the_bridge_forbids_driving(rig):
+    rig.start().connected()
+    with page_of(rig, "portrait", **touch("portrait")) as page:
+        live(page)
+        switch_on(page)
+        rig.web.signal(15)
+        rig.web.wait(5)
+        rig.web_settings["drive"] = {"enabled": "no"}
+        rig.start_web()
+        live(page)
+        seen(page, "!drive.on && document.querySelector('#drive').hidden")
+        all_seen(page, ["word", "sentence", *FIGURES, "stop"], "without the pad")
+        page.said.clear()  # The browser's own words about the lost connection.

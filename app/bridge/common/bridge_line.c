@@ -9,7 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/// The greeting is one write of the gateway: its rest is there, or comes now.
+/// Longest wait for the rest of a greeting in ms. The gateway writes the greeting in one call.
 #define REST_MS 20
 
 bool bridge_line_open(bridge_line_t *self, const char *socket, int epoll_fd) {
@@ -28,7 +28,7 @@ void bridge_line_close(bridge_line_t *self) {
 
 static void answer(bridge_sent_t *place, const iwc_message_t *reply) {
     const bridge_sent_t sent = *place;
-    place->id = 0; // First: the answer may send again.
+    place->id = 0; // Before the call, because the answer may send again.
     if (sent.answer != NULL) {
         sent.answer(sent.context, reply);
     }
@@ -39,7 +39,7 @@ void bridge_line_drop(bridge_line_t *self, iwc_result_t why) {
         (void)close(self->greeting_fd);
         self->greeting_fd = -1;
     }
-    iwc_close(self->gateway); // Takes the descriptor out of the epoll, too.
+    iwc_close(self->gateway); // This also removes the descriptor from the epoll set.
     self->state = BRIDGE_AWAY;
     self->result = why;
     for (size_t i = 0; i < BRIDGE_LINE_MAX; i++) {
@@ -93,7 +93,7 @@ bridge_line_state_t bridge_line_greet(bridge_line_t *self, uint64_t now_us) {
     }
     const int fd = self->greeting_fd;
     self->greeting_fd = -1;
-    const iwc_result_t result = iwc_adopt(self->gateway, fd, REST_MS); // Closes it if it fails.
+    const iwc_result_t result = iwc_adopt(self->gateway, fd, REST_MS); // On failure iwc_adopt closes the descriptor.
     if (result == IWC_OK || result == IWC_NEWER) {
         self->state = BRIDGE_HERE;
     } else {

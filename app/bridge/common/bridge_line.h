@@ -11,67 +11,68 @@
 
 #include "iwheel_client/client.h"
 
-/// Requests without reply on one line: the gateway reads as many from a watcher at once.
+/// Largest number of requests without a reply on one line: the gateway reads this number from a watcher at a time.
 #define BRIDGE_LINE_MAX 4U
-/// The gateway's greeting comes within this time, or the line is dropped.
+/// The line is dropped if the greeting of the gateway does not arrive within this time.
 #define BRIDGE_GREETING_US 500000U
-/// Longest request of a bridge with its terminator.
+/// Size of the longest request of a bridge with its terminator.
 #define BRIDGE_REQUEST_SIZE 1200U
 
-/// The gateway's reply; NULL: there was none in time. Valid during the call.
+/// Receives the reply of the gateway; NULL if there was none in time. The reply is valid during the call.
 typedef void (*bridge_answer_t)(void *context, const iwc_message_t *reply);
 
 typedef enum { BRIDGE_AWAY, BRIDGE_GREETING, BRIDGE_HERE } bridge_line_state_t;
 
-/// A request that is on its way.
+/// A sent request without a reply.
 typedef struct {
-    int64_t id; ///< 0: this place is free.
+    int64_t id; ///< Id of the request; 0: this place is free.
     uint64_t until_us;
     bridge_answer_t answer; ///< NULL: the reply is not needed.
     void *context;
 } bridge_sent_t;
 
 typedef struct {
-    const char *socket; ///< Outlives the line.
+    const char *socket; ///< Must outlive the line.
     int epoll_fd;       ///< Watches the descriptor; belongs to the owner.
     iwc_t *gateway;
     bridge_line_state_t state;
-    iwc_result_t result; ///< Why the line is AWAY.
-    int greeting_fd;     ///< GREETING: connected, not greeted yet.
+    iwc_result_t result; ///< Reason why the line is AWAY.
+    int greeting_fd;     ///< GREETING: the connected descriptor.
     uint64_t greeting_until_us;
     bridge_sent_t sent[BRIDGE_LINE_MAX];
 } bridge_line_t;
 
-/// Not connected yet. False: no memory.
+/// Initializes a line without a connection. Returns false if there is no memory.
 bool bridge_line_open(bridge_line_t *self, const char *socket, int epoll_fd);
 void bridge_line_close(bridge_line_t *self);
 
-/// Begins to connect an AWAY line. False, with `result`: the socket takes no connection now.
+/// Begins to connect an AWAY line. Returns false and sets `result` if the socket accepts no connection now.
 bool bridge_line_connect(bridge_line_t *self, uint64_t now_us);
 
-/// Drops the connection; each request without reply is answered with NULL.
+/// Drops the connection, and answers each request without a reply with NULL.
 void bridge_line_drop(bridge_line_t *self, iwc_result_t why);
 
 /// Reads the greeting, if the line is GREETING. Returns the state.
 bridge_line_state_t bridge_line_greet(bridge_line_t *self, uint64_t now_us);
 
-/// Sends one request of a HERE line. IWC_FULL: BRIDGE_LINE_MAX requests have no reply, or the gateway does not read; nothing is kept.
+/// Sends one request on a HERE line. Returns IWC_FULL and stores nothing if BRIDGE_LINE_MAX requests have no reply, or
+/// if the gateway does not read.
 iwc_result_t bridge_line_send(bridge_line_t *self, const char *request, const bridge_sent_t *sent);
 
-/// The next event of a HERE line in `*out_event`; replies on the way to it are passed to their `answer`. False: there is no event now; the
-/// line may be AWAY afterwards.
+/// Writes the next event of a HERE line to `*out_event`; replies before it are passed to their `answer`. Returns false
+/// if there is no event now; the line may then be AWAY.
 bool bridge_line_next(bridge_line_t *self, iwc_message_t *out_event);
 
-/// Answers with NULL what is due, and returns how many there were.
+/// Answers requests that are due with NULL. Returns their number.
 unsigned bridge_line_expire(bridge_line_t *self, uint64_t now_us);
 
-/// The replies for this context are not needed any more.
+/// Discards the answers for this context. Their requests still count as sent.
 void bridge_line_forget(bridge_line_t *self, const void *context);
 
-/// When `greet` or `expire` has something to do, if no byte comes.
+/// Returns the time of the next work of `greet` or `expire` without input.
 uint64_t bridge_line_next_us(const bridge_line_t *self, uint64_t now_us);
 
-/// Requests without reply.
+/// Returns the number of requests without a reply.
 unsigned bridge_line_in_flight(const bridge_line_t *self);
 
 #endif

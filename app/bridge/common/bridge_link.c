@@ -9,7 +9,7 @@
 
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
-/// The gateway changes the group of its socket after it made it: rights are missing only if that lasts.
+/// The gateway creates its socket and then changes the group. Missing rights are reported only after this time.
 #define DENIED_US 5000000U
 
 bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, const bridge_listener_t *listener) {
@@ -31,7 +31,7 @@ static bridge_question_t take_out(bridge_link_t *self, unsigned at) {
 }
 
 static void answer_none(bridge_link_t *self, unsigned at) {
-    const bridge_question_t question = take_out(self, at); // First: the answer may ask again.
+    const bridge_question_t question = take_out(self, at); // Before the call, because the answer may ask again.
     if (question.answer != NULL) {
         question.answer(question.context, NULL);
     }
@@ -46,7 +46,7 @@ void bridge_link_close(bridge_link_t *self) {
     (void)close(self->epoll_fd);
 }
 
-/// Becomes AWAY, or stays so: the line has ended, or was never there.
+/// Sets the state AWAY after the loss of the line or a failed try, and plans the next try.
 static void lose(bridge_link_t *self) {
     const bridge_link_state_t before = self->state;
     const char *socket = self->terms.socket;
@@ -66,14 +66,14 @@ static void lose(bridge_link_t *self) {
     self->try_us = bridge_backoff_us(&self->wait_us, LONGEST_US, &self->random, self->now_us);
 }
 
-/// Becomes HERE, if the gateway accepts the subscription.
+/// Sets the state HERE if the gateway accepts the subscription.
 static void take_subscribed(void *context, const iwc_message_t *reply) {
     bridge_link_t *self = context;
     if (reply == NULL || iwc_truth(reply, "ok").value != 1) {
         if (self->line.state == BRIDGE_HERE) {
             self->line.result = (reply == NULL) ? IWC_TIMEOUT : IWC_REFUSED;
         }
-        return; // `step` sees that it is not HERE, and that no question is on its way.
+        return; // `step` finds that the state is not HERE and that no request waits for a reply.
     }
     self->state = BRIDGE_LINK_HERE;
     self->connections++;
@@ -142,7 +142,7 @@ static int come_here(bridge_link_t *self) {
 static void listen_now(bridge_link_t *self) {
     iwc_message_t event;
     if (self->terms.latest && self->state == BRIDGE_LINK_HERE) {
-        (void)iwc_latest(self->line.gateway); // If it has ended, the next line finds that out.
+        (void)iwc_latest(self->line.gateway); // If the connection has ended, the next line detects it.
     }
     for (unsigned i = 0; i < 256U && bridge_line_next(&self->line, &event); i++) {
         if (self->state == BRIDGE_LINK_HERE) {
@@ -180,7 +180,7 @@ static void give_up(bridge_link_t *self) {
 
 int bridge_link_step(bridge_link_t *self, uint64_t now_us) {
     self->now_us = now_us;
-    bridge_stop_step(&self->stop, now_us); // First.
+    bridge_stop_step(&self->stop, now_us); // Stops precede everything else.
     if (self->line.state != BRIDGE_HERE) {
         const int code = come_here(self);
         if (code != 0) {

@@ -7,9 +7,9 @@
 
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
-/// Interval between two tries while a person waits for a stop.
+/// Interval of tries while a person waits for a stop.
 #define URGENT_US 20000U
-/// A line that held so long is followed by a new one soon.
+/// After the end of a line that lasted this time, a new one follows soon.
 #define LASTING_US 1000000U
 
 static bool is_request(const char *request, const char *cmd) {
@@ -32,7 +32,7 @@ uint64_t bridge_backoff_us(uint64_t *wait_us, uint64_t longest_us, uint64_t *ran
 bool bridge_stop_open(bridge_stop_t *self, const char *socket, int epoll_fd) {
     memset(self, 0, sizeof *self);
     self->wait_us = SHORTEST_US;
-    self->random = (uint64_t)getpid(); // Different on the many machines that one switch starts.
+    self->random = (uint64_t)getpid(); // Different on machines that one switch starts at the same time.
     for (int kind = 0; kind < BRIDGE_STOP_KINDS; kind++) {
         self->tag[kind] = (bridge_stop_tag_t){self, (bridge_stop_kind_t)kind};
     }
@@ -41,13 +41,13 @@ bool bridge_stop_open(bridge_stop_t *self, const char *socket, int epoll_fd) {
 
 static void settle(bridge_stop_asker_t *asker, const iwc_message_t *reply) {
     const bridge_stop_asker_t asked = *asker;
-    asker->state = BRIDGE_STOP_FREE; // First: the answer may ask again.
+    asker->state = BRIDGE_STOP_FREE; // Before the call, because the answer may ask again.
     if (asked.answer != NULL) {
         asked.answer(asked.context, reply);
     }
 }
 
-/// Answers all whom the request that was sent carries.
+/// Passes the reply to all askers of the request that was sent.
 static void take_reply(void *context, const iwc_message_t *reply) {
     const bridge_stop_tag_t *tag = context;
     bridge_stop_t *self = tag->stop;
@@ -79,7 +79,7 @@ static void send_wanted(bridge_stop_t *self, bridge_stop_kind_t kind, uint64_t n
     const bridge_sent_t sent = {0, now_us + BRIDGE_STOP_US, take_reply, &self->tag[kind]};
     if (bridge_line_send(&self->line, self->request[kind], &sent) != IWC_OK) {
         bridge_line_drop(&self->line,
-                         IWC_CLOSED); // A gateway that does not read, or is gone: a new connection may reach it.
+                         IWC_CLOSED); // The gateway does not read, or is gone; a new connection may reach it.
         self->try_us = now_us;
         return;
     }
@@ -100,7 +100,7 @@ static void give_up(bridge_stop_t *self, uint64_t now_us) {
     }
     for (int kind = 0; kind < BRIDGE_STOP_KINDS; kind++) {
         if (now_us >= self->wanted_until_us[kind]) {
-            self->wanted_until_us[kind] = 0; // Its people were answered that it was not delivered.
+            self->wanted_until_us[kind] = 0; // Its askers were answered that it was not delivered.
         }
     }
 }
@@ -113,13 +113,14 @@ static void plan_try(bridge_stop_t *self, uint64_t now_us) {
 static void listen_now(bridge_stop_t *self, uint64_t now_us) {
     iwc_message_t event;
     while (bridge_line_next(&self->line, &event)) {
-        // No event counts here.
+        // Events are not used here.
     }
     if (bridge_line_expire(&self->line, now_us) > 0U) {
         bridge_line_drop(&self->line, IWC_TIMEOUT);
     }
     if (self->line.state == BRIDGE_AWAY) {
-        // One of the gateway's places for stops only lasts a moment: no reason to come back sooner.
+        // A connection that the gateway accepts for stops only may end after a moment. Such an end does not shorten the
+        // next delay.
         if (now_us - self->since_us >= LASTING_US) {
             self->wait_us = SHORTEST_US;
         }
@@ -166,7 +167,7 @@ static void add_asker(bridge_stop_t *self, const bridge_stop_asker_t *asker) {
         }
     }
     if (asker->answer != NULL) {
-        asker->answer(asker->context, NULL); // It is delivered with the others; only its reply has no place.
+        asker->answer(asker->context, NULL); // The stop is sent with the others; only its reply has no place.
     }
 }
 

@@ -16,7 +16,8 @@ bool bridge_lease_open(bridge_lease_t *self, const char *socket, int epoll_fd) {
     return good;
 }
 
-/// Ends the connection of a place, and with it the gateway's lease if it was held there. Who asked is answered with `reply`.
+/// Ends the connection of a place, and the lease of the gateway if it was held there. A pending arm is answered with
+/// `reply`.
 static void set_free(bridge_place_t *place, const iwc_message_t *reply) {
     const bool asked = place->state == BRIDGE_ASKING;
     const bridge_asker_t asker = place->asker;
@@ -27,7 +28,7 @@ static void set_free(bridge_place_t *place, const iwc_message_t *reply) {
     place->asker.answer = NULL;
     place->key[0] = '\0';
     if (asked && asker.answer != NULL) {
-        asker.answer(asker.context, reply); // Before the line goes: the reply lies in it.
+        asker.answer(asker.context, reply); // Before the line is dropped, because it contains the reply.
     }
     bridge_line_drop(&place->line, IWC_CLOSED);
 }
@@ -111,7 +112,7 @@ bridge_lease_result_t bridge_lease_arm(bridge_lease_t *self, const char *name, c
     return BRIDGE_LEASE_OK;
 }
 
-/// Sends the arm as soon as the gateway has greeted.
+/// Sends the arm after the greeting of the gateway.
 static void go_on_asking(bridge_place_t *place, uint64_t now_us) {
     (void)bridge_line_greet(&place->line, now_us);
     if (place->line.state == BRIDGE_HERE && place->request[0] != '\0') {
@@ -139,7 +140,7 @@ bool bridge_lease_is_holder(const bridge_lease_t *self, const char *key) {
 static void take_driven(void *context, const iwc_message_t *reply) {
     bridge_driven_t *driven = context;
     const bridge_driven_t asked = *driven;
-    driven->place = NULL; // First: the answer may drive again.
+    driven->place = NULL; // Before the call, because the answer may drive again.
     if (asked.asker.answer != NULL) {
         asked.asker.answer(asked.asker.context, reply);
     }
@@ -218,7 +219,7 @@ static void step_place(bridge_place_t *place, uint64_t now_us) {
         go_on_asking(place, now_us);
     }
     while (bridge_line_next(&place->line, &event)) {
-        // It watches nothing.
+        // This connection watches nothing.
     }
     (void)bridge_line_expire(&place->line, now_us);
     const bool over = (place->state == BRIDGE_ASKING || place->state == BRIDGE_ENDING) && now_us >= place->until_us;
@@ -259,7 +260,7 @@ void bridge_movers_note(bridge_movers_t *self, const char *name, uint64_t now_us
             break;
         }
         if (self->source[i].us < self->source[at].us) {
-            at = i; // The oldest.
+            at = i; // The oldest entry.
         }
     }
     (void)snprintf(self->source[at].name, sizeof self->source[at].name, "%s", name);

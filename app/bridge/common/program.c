@@ -7,14 +7,14 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-/// What getopt tells of an option without a letter: an action, or the place of a key in the bridge's table.
+/// Values of getopt for options without a letter: an action, or the index of a key in the table of the bridge.
 enum { TO_DO = 256, TO_CHANGE = 512, PRINT = 1024 };
 
 #define COMMON 5U
 
-/// What the command line says.
+/// Contents of the command line.
 typedef struct {
-    const char *path; ///< NULL: none is named.
+    const char *path; ///< NULL: not named.
     const char *value[BRIDGE_OPTIONS_MAX];
     int action;
     bool print;
@@ -43,7 +43,7 @@ static void fill(const bridge_program_t *self, struct option options[COMMON + BR
     options[count] = (struct option){NULL, 0, NULL, 0};
 }
 
-/// BRIDGE_GO, or an exit code.
+/// Returns BRIDGE_GO, or an exit code.
 static int parse(const bridge_program_t *self, int count, char **arguments, wanted_t *out_wanted) {
     struct option options[COMMON + BRIDGE_OPTIONS_MAX + 1U];
     int option = 0;
@@ -78,7 +78,7 @@ static int parse(const bridge_program_t *self, int count, char **arguments, want
     return (optind < count) ? misuse(self, arguments[optind], "means nothing: there are options only") : BRIDGE_GO;
 }
 
-/// 0, or what reading returns on an error.
+/// Returns 0, or the error of reading.
 static int configure(const bridge_program_t *self, const wanted_t *wanted) {
     const char *path = (wanted->path != NULL) ? wanted->path : self->path;
     int error = 0;

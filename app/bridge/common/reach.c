@@ -17,7 +17,7 @@
 #define SOCKETS   "/proc/self/fd"
 #define BYTE_127  0x7FU
 #define V4_SHIFT  24U
-#define V4_OFFSET 12U ///< Of the IPv4 address in a mapped IPv6 address.
+#define V4_OFFSET 12U ///< Offset of the IPv4 address in a mapped IPv6 address.
 
 typedef union {
     struct sockaddr any;
@@ -45,7 +45,7 @@ static bool is_loopback(const address_t *address) {
     return IN6_IS_ADDR_LOOPBACK(v6) || (IN6_IS_ADDR_V4MAPPED(v6) && v6->s6_addr[V4_OFFSET] == BYTE_127);
 }
 
-/// True if the socket takes what comes from any peer.
+/// Returns true if the socket receives from any peer.
 static bool is_receiver(int fd, const address_t *address) {
     address_t peer;
     socklen_t size = sizeof peer;
@@ -54,7 +54,7 @@ static bool is_receiver(int fd, const address_t *address) {
         return option_of(fd, SO_ACCEPTCONN) != 0;
     case SOCK_DGRAM:
         return address->v4.sin_port != 0 &&
-               getpeername(fd, &peer.any, &size) != 0; // The port is at the same place in both.
+               getpeername(fd, &peer.any, &size) != 0; // Both families have the port at the same place.
     default:
         return true;
     }
@@ -64,7 +64,7 @@ static bool is_reachable(int fd, address_t *out_address) {
     socklen_t size = sizeof *out_address;
     memset(out_address, 0, sizeof *out_address);
     if (getsockname(fd, &out_address->any, &size) != 0) {
-        return false; // No socket.
+        return false; // Not a socket.
     }
     if (out_address->any.sa_family != AF_INET && out_address->any.sa_family != AF_INET6) {
         return false;
@@ -81,10 +81,10 @@ static void describe(int fd, const address_t *address, char out_text[BRIDGE_REAC
                    (option_of(fd, SO_TYPE) == SOCK_STREAM) ? "TCP" : "UDP", host, ntohs(address->v4.sin_port));
 }
 
-/// Called with each socket that receives from other machines; false ends the walk.
+/// Receives each socket that other machines can reach. Returns false to end the walk.
 typedef bool (*visit_t)(void *context, int fd, const address_t *address);
 
-/// False, with errno, if the descriptors cannot be read or a visit ended the walk.
+/// Returns false with errno if the descriptors cannot be read or a visit ended the walk.
 static bool walk(visit_t visit, void *context) {
     DIR *folder = opendir(SOCKETS);
     bool goes_on = folder != NULL;
@@ -150,7 +150,7 @@ bool bridge_reach_is_local(const char *program, const int *except, size_t count)
     return found == 0U;
 }
 
-/// What was received from other machines before is passed on while nothing acts on it yet.
+/// Waits until earlier input from other machines is passed on. The caller acts on no input yet.
 static bool await_empty(int fd) {
     const struct timespec pause = {0, 1000000};
     int waiting = 0;

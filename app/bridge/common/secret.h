@@ -5,13 +5,13 @@
 
 #include <stdbool.h>
 
-/// Bytes of a secret with its terminator.
+/// Size of a secret with its terminator.
 #define BRIDGE_SECRET_SIZE 33U
 
-/// A new secret from getrandom(). False: the kernel gives none, and `out` is empty.
+/// Draws a new secret from getrandom(). Returns false and sets `out` empty if the kernel returns no random bytes.
 bool bridge_secret_draw(char out[BRIDGE_SECRET_SIZE]);
 
-/// True if both texts are equal and not empty. The time does not depend on where they differ.
+/// Returns true if both texts are equal and not empty. The time does not depend on the position of a difference.
 bool bridge_secret_is(const char *secret, const char *given);
 
 #endif

@@ -17,14 +17,15 @@
 
 #define SHORTEST_US 500000U
 #define LONGEST_US  30000000U
-/// A connection that ends before this after it was accepted is a short one; so many in a row are mentioned, once a minute.
+/// A connection that ends earlier than SHORT_US after its acceptance is short. SHORT_MAX short ones in a row are
+/// logged, at most once a minute.
 #define SHORT_US      2000000U
 #define SHORT_MAX     3U
 #define SHORT_TOLD_US 60000000U
 #define LOOK_US       500000U
-/// Packets read at one go: a flood must not keep the gateway's words waiting.
+/// Packets that are read in one call, so that a flood does not delay messages of the gateway.
 #define PACKETS 32
-/// Messages that may wait in the library for a broker that does not read; the spool's are among them.
+/// Messages that may wait in the library for a broker that does not read. The messages of the spool are among them.
 #define BEHIND_MAX 64U
 #define GOODBYE_MS 200
 
@@ -47,7 +48,7 @@ static void on_connect(struct mosquitto *client, void *context, int code) {
     self->state = MQTT_UP;
     self->up_us = self->now_us;
     self->wait_us = SHORTEST_US;
-    // QoS 0: what is under way when the connection ends is not sent again.
+    // QoS 0: the broker does not send a message again that was under way when the connection ended.
     for (size_t i = 0; self->listener.topics[i] != NULL && result == MOSQ_ERR_SUCCESS; i++) {
         result = mosquitto_subscribe(client, &self->subscriptions[i], self->listener.topics[i], 0);
     }
@@ -63,7 +64,7 @@ static void on_connect(struct mosquitto *client, void *context, int code) {
     self->listener.up(self->listener.context);
 }
 
-/// `code` is the broker's reason if it gave one, which MQTT 5 has from 0x80 on; else one of the library.
+/// `code` is the reason of the broker, if it sent one (MQTT 5: from 0x80 on); otherwise it is a code of the library.
 static void on_disconnect(struct mosquitto *client, void *context, int code, const mosquitto_property *properties) {
     mqtt_broker_t *self = context;
     (void)client;
@@ -130,8 +131,8 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
     return mqtt_credentials_read(settings, &self->user, &self->password);
 }
 
-/// A broker that ends the connection just after it accepted it, again and again, has usually given its name to another client: MQTT 3.1.1
-/// has no word for that.
+/// Counts short connections. If the broker ends several connections just after it accepted them, another client usually
+/// has the same name. MQTT 3.1.1 has no code for that.
 static void judge_end(mqtt_broker_t *self) {
     const bool taken = self->refusal == MQTT_RC_SESSION_TAKEN_OVER;
     const bool was_short = self->state == MQTT_UP && self->now_us - self->up_us < SHORT_US;
@@ -170,12 +171,12 @@ static void lose(mqtt_broker_t *self, const char *why) {
     }
 }
 
-/// Of what libmosquitto promises for it: that no other thread is in the same client.
+/// Thread that connects. libmosquitto requires that no other thread uses the same client.
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
     const uint64_t one = 1;
     char address[MQTT_ADDRESS_SIZE];
-    const int port = (caller->host[0] == '/') ? 0 : caller->port; // A unix socket has none.
+    const int port = (caller->host[0] == '/') ? 0 : caller->port; // A unix socket has no port.
     (void)snprintf(address, sizeof address, "%s", caller->host);
     caller->peer = MQTT_PEER_ALLOWED;
     caller->result = MOSQ_ERR_ERRNO;
@@ -186,10 +187,10 @@ static void *call(void *context) {
         caller->result = mosquitto_connect(caller->client, address, port, caller->keepalive_s);
     }
     caller->error = errno;
-    if (caller->guarded && caller->result == MOSQ_ERR_SUCCESS) { // The one that is used.
+    if (caller->guarded && caller->result == MOSQ_ERR_SUCCESS) { // The connection that is used is judged, too.
         caller->peer = mqtt_peer_judge(mosquitto_socket(caller->client), &caller->allowed, &caller->uid);
         if (caller->peer == MQTT_PEER_UNKNOWN && mqtt_reason_is_refusal(mosquitto_socket(caller->client))) {
-            caller->peer = MQTT_PEER_ALLOWED; // It has ended the connection already: there is no process to name.
+            caller->peer = MQTT_PEER_ALLOWED; // The broker has already ended the connection.
         }
     }
     atomic_store(&caller->ended, true);
@@ -215,7 +216,7 @@ static bool set_up(mqtt_broker_t *self) {
     mosquitto_subscribe_callback_set(self->client, on_subscribe);
     mosquitto_publish_v5_callback_set(self->client, on_publish);
     mosquitto_message_v5_callback_set(self->client, on_message);
-    // No session expiry is told by MQTT 5: that is 0.
+    // MQTT 5 without a session expiry means an expiry of 0.
     return mosquitto_int_option(self->client, MOSQ_OPT_PROTOCOL_VERSION,
                                 is_5(self) ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311) == MOSQ_ERR_SUCCESS &&
            (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
@@ -341,7 +342,7 @@ int mqtt_broker_fd(const mqtt_broker_t *self, bool *out_writes) {
     return mosquitto_socket(self->client);
 }
 
-/// False: no memory, or a text that is none.
+/// Returns false if there is no memory or a text is not valid.
 static bool add_labels(const mqtt_labels_t *labels, mosquitto_property **out) {
     return (labels->expiry_s == 0U || mosquitto_property_add_int32(out, MQTT_PROP_MESSAGE_EXPIRY_INTERVAL,
                                                                    labels->expiry_s) == MOSQ_ERR_SUCCESS) &&

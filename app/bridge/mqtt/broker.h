@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// The one connection to the MQTT broker, kept up for ever, by libmosquitto. It waits for nothing.
+/// The only connection to the MQTT broker, by libmosquitto. The connection is retried without end. Only
+/// `mqtt_broker_close` waits.
 ///
 ///     AWAY --try--> CONNECTING --socket--> GREETING --CONNACK--> UP --lost--> AWAY, tried again after 0.5 s to 30 s
 ///
-/// "Not now" and "never" are different: a message that cannot be sent now is tried again by the caller; of one that this broker does not
-/// accept (too large, its rights) the caller is informed, and the connection goes on.
+/// "Not now" and "never" differ: the caller sends a message again that cannot be sent now. If this broker does not
+/// accept a message (size, rights), the caller is informed and the connection stays.
 ///
-/// CONNECTING asks for names and shakes hands, which may wait: a thread of its own does that, and touches nothing else. Clean sessions:
-/// the broker keeps nothing for this machine while it is away, so no command comes late from there.
+/// CONNECTING resolves names and shakes hands, which may wait: a separate thread does this and changes nothing else.
+/// Sessions are clean: the broker stores nothing for this machine while it is away, so no command arrives late.
 #ifndef MQTT_BROKER_H
 #define MQTT_BROKER_H
 
@@ -18,33 +19,33 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-/// A broker that has not answered for so long after the connection was made is lost, and the next host is tried.
+/// A connection without an answer of the broker (CONNACK) for this time is lost, and the next host is tried.
 #define MQTT_GREETING_US 10000000U
 
-/// What MQTT 5 carries beside a message; by 3.1.1 nothing of it is sent, and nothing comes.
+/// Properties of a message in MQTT 5. With 3.1.1 none is sent and none is received.
 typedef struct {
-    uint32_t expiry_s; ///< The broker drops what it could not deliver in this time; 0: never. Not read of what comes.
+    uint32_t expiry_s;       ///< Time after which the broker drops the message; 0: never. Not set on receipt.
     const char *answer_to;   ///< Response topic; NULL: none.
     const void *correlation; ///< Correlation data; NULL: none.
     uint16_t correlation_length;
 } mqtt_labels_t;
 
 typedef struct {
-    const char *program;       ///< For the log.
-    const char *name;          ///< Of the client at the broker; no other may have it.
-    const char *const *topics; ///< What it listens to, by QoS 0; ends with NULL.
-    const char *will;          ///< Where the broker says `offline` when this client is gone, retained; NULL: nowhere.
+    const char *program;       ///< Name of this program in the log.
+    const char *name;          ///< Name of the client at the broker; must be unique.
+    const char *const *topics; ///< Topics to subscribe to, with QoS 0; ends with NULL.
+    const char *will; ///< Topic where the broker publishes `offline`, retained, when this client is gone; NULL: none.
     void *context;
     void (*up)(void *context);
     void (*down)(void *context);
-    void (*sent)(void *context, int message);                     ///< The broker has confirmed it.
-    void (*refused)(void *context, int message, const char *why); ///< By MQTT 5: the broker does not accept it.
+    void (*sent)(void *context, int message);                     ///< The broker has confirmed the message.
+    void (*refused)(void *context, int message, const char *why); ///< MQTT 5: the broker does not accept the message.
     void (*came)(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
 } mqtt_broker_listener_t; ///< The texts must outlive the connection.
 
 typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_state_t;
 
-/// For the thread that connects.
+/// Data of the thread that connects.
 typedef struct {
     struct mosquitto *client;
     const char *host;
@@ -52,11 +53,11 @@ typedef struct {
     int keepalive_s;
     int result;
     int error;
-    bool guarded;         ///< The other end is judged before and after.
-    mqtt_peers_t allowed; ///< By these,
-    mqtt_peer_t peer;     ///< with this result
-    uid_t uid;            ///< and this user.
-    int wake;             ///< Where it tells that it has ended.
+    bool guarded;         ///< The process of the broker is judged before and after the connection.
+    mqtt_peers_t allowed; ///< Owners that are allowed.
+    mqtt_peer_t peer;     ///< Result of the judgement.
+    uid_t uid;            ///< Owner of that process.
+    int wake;             ///< Descriptor that wakes the main thread at the end.
     atomic_bool ended;
 } mqtt_caller_t;
 
@@ -66,56 +67,57 @@ typedef struct {
     mqtt_broker_state_t state;
     struct mosquitto *client; ///< NULL in MQTT_AWAY.
     mqtt_caller_t caller;
-    char host[MQTT_HOST_SIZE]; ///< The one it is at, or tries.
-    size_t next;               ///< Number of the one to try next.
+    char host[MQTT_HOST_SIZE]; ///< Host that is connected or tried.
+    size_t next;               ///< Number of the host to try next.
     char *user;                ///< NULL: none.
-    char *password;            ///< Behind `user`.
-    bool told_away;            ///< In the log; in every state: many tries in a row are one absence.
+    char *password;            ///< NULL if there is no `user`.
+    bool told_away;            ///< The absence is logged. Valid in every state: many tries in a row are one absence.
     int subscriptions[4];      ///< Message numbers, in the order of the listener's topics.
-    uint64_t up_us;            ///< When the broker accepted this connection.
-    unsigned short_ones;       ///< Connections in a row that ended at once after that.
-    uint64_t short_us;         ///< When the log may mention them again.
-    uint64_t taken;            ///< Connections that another client with this name has ended, as far as is known.
-    bool lost;                 ///< The library says so, from within a call of it; the state changes after that call.
-    int refusal;               ///< Of the last CONNACK, or by MQTT 5 of a message.
-    char words[160];           ///< What the library said last of its trouble.
+    uint64_t up_us;            ///< Time at which the broker accepted this connection.
+    unsigned short_ones;       ///< Short connections in a row.
+    uint64_t short_us;         ///< Time from which the log may report them again.
+    uint64_t taken;            ///< Connections that another client with this name has ended, as far as known.
+    bool lost;                 ///< Set by callbacks of the library; the state changes after the call.
+    int refusal;               ///< Reason of the last CONNACK, or of a DISCONNECT of MQTT 5.
+    char words[160];           ///< Last error or warning of the library.
     uint64_t now_us;
     uint64_t try_us;
     uint64_t wait_us;
     uint64_t random;
-    uint64_t until_us; ///< MQTT_GREETING: for CONNACK.
-    uint64_t look_us;  ///< When the library wants to look at its keepalive.
-    unsigned behind;   ///< Messages given while others were not gone yet.
-    uint64_t unsent;   ///< Messages not given because of too many of those.
-    const char *unfit; ///< Why the last message with MQTT_NEVER was none for this broker.
+    uint64_t until_us; ///< MQTT_GREETING: deadline of CONNACK.
+    uint64_t look_us;  ///< Next time at which the library checks its keepalive.
+    unsigned behind;   ///< Messages that were sent while others still waited in the library.
+    uint64_t unsent;   ///< Messages that were not sent, because too many waited or by an error.
+    const char *unfit; ///< Reason of the last MQTT_NEVER.
 } mqtt_broker_t;
 
-/// Reads the credentials and looks at the files of TLS. 0, or an exit code of sysexits with a line on stderr.
+/// Reads the credentials and checks the files of TLS. Returns 0, or an exit code of sysexits with a line on stderr.
 int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener);
 
-/// Says goodbye with `offline`, within 0.2 s. True: all is freed. False: its thread still waits for the network, so end by _exit().
+/// Publishes `offline` and disconnects, within 0.2 s. Returns true if all is freed. Returns false if its thread still
+/// waits for the network: the caller must then end by _exit().
 bool mqtt_broker_close(mqtt_broker_t *self);
 
 void mqtt_broker_step(mqtt_broker_t *self, uint64_t now_us);
 
-/// When `step` has something to do, whatever comes.
+/// Returns the next time at which `step` has work without input.
 uint64_t mqtt_broker_next_us(const mqtt_broker_t *self);
 
-/// For poll(): a descriptor, -1: none; and whether it waits to write.
+/// Returns the descriptor for poll(), or -1. Sets `*out_writes` if it waits to write.
 int mqtt_broker_fd(const mqtt_broker_t *self, bool *out_writes);
 
 typedef struct {
     int qos;
     bool retain;
-    bool spare; ///< Only if all before it is gone already: there will be a newer one.
+    bool spare; ///< Send only if no earlier message waits: a newer one follows.
     mqtt_labels_t labels;
 } mqtt_way_t;
 
 #define MQTT_NOT_NOW 0
 #define MQTT_NEVER   (-1)
 
-/// Hands a message over. Its number for `sent` or `refused`. MQTT_NOT_NOW: the broker is not there or does not read. MQTT_NEVER: this broker
-/// does not accept it, with the reason in `unfit`.
+/// Sends a message. Returns its number for `sent` or `refused`; MQTT_NOT_NOW if the broker is away or does not read;
+/// MQTT_NEVER if this broker does not accept it, with the reason in `unfit`.
 int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way);
 
 #endif

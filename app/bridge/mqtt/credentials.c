@@ -15,12 +15,12 @@ static int complain(int code, const char *path, const char *what) {
     return code;
 }
 
-/// Of a file with a secret in it. 0, or an exit code.
+/// Judges a file with a secret. Returns 0, or an exit code.
 static int judge_secret(int file, const char *path) {
     struct stat status = {0};
     const bool known = fstat(file, &status) == 0;
     const bool ours = known && (status.st_uid == geteuid() || status.st_uid == 0U);
-    // Root's may be read by the group that the bridge runs in: that is how an administrator gives it.
+    // A file of root may be readable by the group of the bridge: the administrator provides it in this way.
     const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
     return (ours && (status.st_mode & others) == 0U)
                ? 0

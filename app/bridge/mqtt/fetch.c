@@ -12,15 +12,15 @@
 #include <sysexits.h>
 
 #define MACHINE_SAYS_NO 1
-/// An answer that has not come by then is lost, or late.
+/// After this time an answer is lost or late.
 #define ANSWER_US 2000000U
-/// What is older is not quoted: the way back to the machine takes its part of the second that it has.
+/// An older quote is not used, because the way to the machine also counts as age, and the largest age is one second.
 #define QUOTE_US 300000U
-/// Before it is asked again after a refusal that may pass.
+/// Pause after a refusal that may be temporary.
 #define PAUSE_US 500000U
-/// A machine that says no so often in a row means it.
+/// Number of refusals in a row after which the fetch fails.
 #define REFUSED_MAX 6U
-/// Somebody who is there answers `hello` in this time.
+/// A machine that is at this broker answers `hello` within this time.
 #define STRANGE_US 6000000U
 
 const char *const fetch_endings[FETCH_FILES] = {".conf", ".jsonl", ".log"};
@@ -43,7 +43,7 @@ void fetch_begin(fetch_t *self, const char *id, const char *from, uint64_t patie
     self->next_us = now_us;
 }
 
-/// `stop-000017-wheel_lost`: by all of it, or by its number.
+/// Returns true if `name` is the full name (`stop-000017-wheel_lost`) or the number of the recording.
 static bool is_meant(const fetch_recording_t *recording, const char *name) {
     const char *digits = strchr(recording->name, '-');
     return strcmp(recording->name, name) == 0 ||
@@ -51,7 +51,7 @@ static bool is_meant(const fetch_recording_t *recording, const char *name) {
             strtoul(digits + 1, NULL, 10) == strtoul(name, NULL, 10));
 }
 
-/// The next file from `file` on that there is; DONE if there is none.
+/// Selects the next existing file from `file` on; DONE if there is none.
 static void next_file(fetch_t *self, size_t file, uint64_t now_us) {
     while (file < FETCH_FILES && !self->list[self->chosen].bytes[file].known) {
         file++;
@@ -108,7 +108,7 @@ static void write_command(fetch_t *self, const char **out_verb, char out_payload
     }
     iwn_out_close(&json, '}');
     const size_t length = iwn_out_finish(&json);
-    out_payload[(length > 0U) ? length - 1U : 0U] = '\0'; // Without the newline. All its parts are bounded, so it fits.
+    out_payload[(length > 0U) ? length - 1U : 0U] = '\0'; // Without the newline. All parts are bounded.
 }
 
 static void give_up(fetch_t *self) {
@@ -145,7 +145,7 @@ bool fetch_step(fetch_t *self, uint64_t now_us, const char **out_verb, char out_
     return true;
 }
 
-/// A text that moves no terminal.
+/// Copies a text without control characters of a terminal.
 static void read_text(iwn_json_t object, const char *name, char *out, size_t size) {
     char raw[256];
     iwn_json_t value;
@@ -162,7 +162,7 @@ static iwc_value_t read_number(iwn_json_t object, const char *name) {
     return (iwc_value_t){known, known ? iwn_json_integer(value) : 0};
 }
 
-/// What the gateway names its files by: it stands in names of files here, so nothing else may be in it.
+/// Checks a name of the gateway. The name becomes a file name here, so only these characters are allowed.
 static bool is_name(const char *name) {
     return strncmp(name, "stop-", 5) == 0 && strlen(name) < FETCH_NAME_SIZE - 8U &&
            strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_-") == strlen(name);
@@ -190,7 +190,7 @@ static void take_list(fetch_t *self, iwn_json_t root) {
     self->stage = FETCH_LISTED;
 }
 
-/// The next piece of the file that was asked for. What is damaged is asked again.
+/// Receives the next piece of the requested file. A damaged piece is requested again.
 static fetch_news_t take_piece(fetch_t *self, const iwc_message_t *reply, uint64_t now_us) {
     iwc_piece_t piece = self->piece;
     if (!iwc_piece_take(reply, self->bytes, &piece)) {
@@ -227,7 +227,7 @@ static bool is_one_of(const char *word, const char *const words[]) {
     return false;
 }
 
-/// A `no` that passes when it is asked again is; any other is told, and the end.
+/// Handles a refusal: a temporary one leads to a new request, any other is reported and ends the fetch.
 static void take_refusal(fetch_t *self, iwn_json_t root, uint64_t now_us) {
     static const char *const quotes[] = {"late", "other_boot", "early", "doubled", NULL};
     static const char *const passing[] = {"crowded", "not_delivered", NULL};
@@ -236,7 +236,7 @@ static void take_refusal(fetch_t *self, iwn_json_t root, uint64_t now_us) {
     read_text(root, "message", self->words, sizeof self->words);
     self->again++;
     self->refused++;
-    // The answer brought a new time to quote; but one that is late again and again is not to be asked without a pause.
+    // The answer brought a new time to quote. Repeated late answers lead to a pause.
     self->next_us = now_us + ((is_one_of(error, quotes) && self->refused < 3U) ? 0U : PAUSE_US);
     if (!is_one_of(error, quotes) && !is_one_of(error, passing) &&
         (strcmp(error, "denied") != 0 || self->refused >= REFUSED_MAX)) {
@@ -249,7 +249,7 @@ static bool is_true(iwn_json_t root, const char *name) {
     return iwn_json_find(root, name, &value) && iwn_json_kind(value) == IWN_JSON_TRUE;
 }
 
-/// An answer to the command under way. Its `boot` and `t_us` are the newest that there are.
+/// Handles an answer to the command under way. Its `boot` and `t_us` are the newest ones.
 static fetch_news_t take_answer(fetch_t *self, iwn_json_t root, const iwc_message_t *reply, uint64_t now_us) {
     fetch_news_t news = FETCH_NOTHING;
     const iwc_value_t t_us = read_number(root, "t_us");

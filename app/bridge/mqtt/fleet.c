@@ -20,7 +20,7 @@ void fleet_close(fleet_t *self) {
     self->machines = NULL;
 }
 
-/// Its row; a new one in its place. NULL: there are too many.
+/// Returns the row of a machine; adds it in sorted order if it is new. Returns NULL if there are too many.
 static fleet_machine_t *machine_of(fleet_t *self, const char *id) {
     size_t place = 0;
     while (place < self->count && strcmp(self->machines[place].id, id) < 0) {
@@ -91,7 +91,8 @@ static void take_state(fleet_machine_t *machine, const iwc_message_t *state, iwn
     read_contradictions(root, machine);
 }
 
-/// What was heard just now is the last; of what others have kept the later one. Its fields stand behind `path`.
+/// Stores a last stop. A live event replaces all others; of stored ones, the later one. Its fields have the prefix
+/// `path`.
 static void take_stop(fleet_machine_t *machine, const iwc_message_t *stop, const char *path, fleet_source_t source) {
     char cause[40];
     char sentence[40];
@@ -125,7 +126,7 @@ bool fleet_split(const char *topic, char out_id[MQTT_ID_SIZE], const char **out_
     return mqtt_settings_is_name(out_id);
 }
 
-/// False: it is no object, and counted.
+/// Returns false and counts the message if it is not a JSON object.
 static bool is_object(fleet_t *self, const char *payload, size_t length, iwn_json_t *out_root) {
     char fault[80];
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
@@ -163,7 +164,7 @@ void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t le
         return;
     }
     const iwc_message_t message = {.text = payload, .length = length, .is_event = true};
-    if (strcmp(what, "info") == 0) { // Retained: no sign of life.
+    if (strcmp(what, "info") == 0) { // Retained, so it does not show that the machine is online.
         take_stop(machine, &message, "last_stop.", FLEET_INFO);
         return;
     }
@@ -198,7 +199,7 @@ static void show_time(int64_t wall_us, FILE *out) {
     (void)fprintf(out, " %-14s", text);
 }
 
-/// An item, on how many machines it is contradicted.
+/// An assumption and the number of machines that contradict it.
 typedef struct {
     char word[32];
     unsigned machines;
@@ -239,7 +240,7 @@ void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out) {
         online += machine->online ? 1U : 0U;
         (void)fprintf(out, "%-20s %-8s %-10s", machine->id, machine->online ? "online" : "offline",
                       machine->online ? or_unknown(machine->state) : "--");
-        for (size_t side = 0; side < 2U; side++) { // Of who is away nobody knows how full they are now.
+        for (size_t side = 0; side < 2U; side++) { // The current charge of an offline machine is unknown.
             show_battery(machine->online ? machine->battery_dV[side] : (iwc_value_t){.known = false}, out);
         }
         (void)fprintf(out, " %-10s %-10s %-9s", or_unknown(machine->zero[0]), or_unknown(machine->zero[1]),
@@ -268,7 +269,7 @@ static const char *source_word(fleet_source_t source) {
 
 #define ROW_SIZE 1536U
 
-/// One machine as a JSON object; its length, without a newline.
+/// Writes one machine as a JSON object. Returns its length, without a newline.
 static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char line[ROW_SIZE]) {
     iwn_out_t json;
     iwn_out_init(&json, line, ROW_SIZE);

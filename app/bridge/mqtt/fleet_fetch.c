@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recordings: which a machine has, and one of them fetched into files here.
+// Verbs for recordings: lists the recordings of a machine, and fetches one of them into files.
 #include "fleet_verbs.h"
 
 #include "broker.h"
@@ -21,14 +21,14 @@
 #include <unistd.h>
 
 #define PATH_SIZE 1024U
-/// By MQTT 5 the broker drops a command that it could not deliver by then; the machine would drop it, too.
+/// With MQTT 5 the broker drops a command that it did not deliver in this time. The machine would refuse it, too.
 #define COMMAND_S 1U
 
-/// A file that is being written beside its place.
+/// A file that is written under a temporary name.
 typedef struct {
     char path[PATH_SIZE];
     char part[PATH_SIZE + 16U];
-    int fd; ///< -1: none.
+    int fd; ///< Descriptor; -1 if none.
 } part_t;
 
 typedef struct {
@@ -41,7 +41,7 @@ typedef struct {
     const char *listed[3];
     uint64_t now_us;
     uint64_t bytes;
-    int code; ///< Of trouble on this side; 0: none.
+    int code; ///< Exit code of a local error; 0: none.
     bool was_up;
 } asking_t;
 
@@ -50,7 +50,7 @@ static int complain(int code, const char *what, const char *why) {
     return code;
 }
 
-/// Their names, which must be free: what is there is not touched.
+/// Sets the names of the files. Existing files are not replaced.
 static int name_files(asking_t *self) {
     const char *name = self->fetch.list[self->fetch.chosen].name;
     const char *out = self->wanted->out;
@@ -94,13 +94,14 @@ static int write_piece(asking_t *self) {
     return code;
 }
 
-/// Never over another file. A link is as good as a rename, and works where that cannot refuse to replace; and the other way round.
+/// Moves the file to its name without replacing another file. The fallback serves file systems that support only one of
+/// both calls.
 static bool place(const part_t *part) {
     return fsync(part->fd) == 0 && (link(part->part, part->path) == 0 ||
                                     renameat2(AT_FDCWD, part->part, AT_FDCWD, part->path, RENAME_NOREPLACE) == 0);
 }
 
-/// Puts all of them into their places, that with the frames last; none if not all.
+/// Moves all files to their names, the one with the frames last. If one fails, the others are removed.
 static int place_files(const asking_t *self) {
     for (size_t i = 0; i < FETCH_FILES; i++) {
         if (self->parts[i].fd >= 0 && !place(&self->parts[i])) {
@@ -128,7 +129,7 @@ static void up(void *context) {
     self->was_up = true;
 }
 
-/// On a terminal, how far it is.
+/// Shows the progress on a terminal.
 static void show_progress(const asking_t *self) {
     const fetch_t *fetch = &self->fetch;
     int64_t all = 0;
@@ -145,7 +146,7 @@ static void came(void *context, const struct mosquitto_message *message, const m
     asking_t *self = context;
     char id[MQTT_ID_SIZE];
     const char *what = "";
-    (void)labels; // The answer has `seq`.
+    (void)labels; // The answer contains `seq`.
     if (self->code == 0 && fleet_split(message->topic, id, &what) && strcmp(id, self->fetch.id) == 0 &&
         fetch_take(&self->fetch, what, message->payload, (size_t)message->payloadlen, self->now_us) == FETCH_PIECE) {
         self->code = write_piece(self);
@@ -168,7 +169,7 @@ static void ask(asking_t *self) {
     (void)mqtt_broker_send(&self->broker, topic, payload, strlen(payload), way);
 }
 
-/// Until a stage is reached, it has failed, or somebody wants the end. An exit code.
+/// Runs until the stage is reached, the fetch has failed, or a signal asks for the end. Returns an exit code.
 static int run_to(asking_t *self, fetch_stage_t stage) {
     const uint64_t no_broker_us = bridge_now_us() + self->fetch.patience_us;
     while (self->code == 0 && self->fetch.stage != stage && self->fetch.stage != FETCH_FAILED) {
@@ -200,7 +201,7 @@ static bool make_name(char out[MQTT_SENDER_SIZE]) {
     return good;
 }
 
-/// Connects and gets the list, then does `rest`.
+/// Connects, fetches the list, then runs `rest`.
 static int with_list(const mqtt_settings_t *settings, const fleet_wanted_t *wanted, int (*rest)(asking_t *self)) {
     static asking_t self;
     self.wanted = wanted;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The console of a fleet: its command line.
+// Command line of the fleet console.
 #include "fleet_verbs.h"
 
 #include "begin/begin.h"
@@ -18,14 +18,14 @@
 
 typedef enum { TABLE, HISTORY, RECORDINGS, RECORDING, VERBS } verb_t;
 
-/// Where options are allowed.
+/// Verbs that allow an option.
 #define IN(verb)      (1U << (verb))
 #define IN_RECORDINGS (IN(RECORDINGS) | IN(RECORDING))
 #define EVERYWHERE    (IN(TABLE) | IN(HISTORY) | IN_RECORDINGS)
 
 typedef struct {
     verb_t verb;
-    const char *path; ///< Of the configuration; NULL: none is named.
+    const char *path; ///< Path of the configuration; NULL: not named.
     bool until;       ///< --until is given.
     unsigned used;    ///< Verbs in which all options that were given are allowed.
     fleet_wanted_t wanted;
@@ -48,7 +48,7 @@ __attribute__((format(printf, 1, 2))) static int misuse(const char *format, ...)
     return EX_USAGE;
 }
 
-/// -1: go on; else the exit code.
+/// Returns -1 to continue, otherwise the exit code.
 static int take_number(const char *option, uint64_t *out_number) {
     uint32_t number = 0;
     if (!settings_digits(optarg, strlen(optarg), &number) || number == 0U) {
@@ -124,7 +124,7 @@ static int take_option(words_t *self, int option) {
     }
 }
 
-/// The verb, and the names behind it.
+/// Parses the verb, and the names after it.
 static int take_words(words_t *self, int count, char **words) {
     static const char *const verbs[VERBS] = {
         [HISTORY] = "history", [RECORDINGS] = "recordings", [RECORDING] = "recording"};
@@ -151,7 +151,7 @@ static int take_words(words_t *self, int count, char **words) {
     return -1;
 }
 
-/// What cannot stand together.
+/// Refuses combinations that are not valid.
 static int judge(words_t *self) {
     history_config_t *span = &self->wanted.span;
     if ((self->used & IN(self->verb)) == 0U) {
@@ -171,7 +171,7 @@ static int judge(words_t *self) {
     return (span->since_us < span->until_us) ? -1 : misuse("--since must lie before --until");
 }
 
-/// -1: go on; else the exit code.
+/// Returns -1 to continue, otherwise the exit code.
 static int parse(words_t *self, int count, char **arguments) {
     static const struct option options[] = {
         {"config", required_argument, NULL, 'c'}, {"for", required_argument, NULL, 'f'},
@@ -214,7 +214,7 @@ int main(int count, char **arguments) {
     if (code > 0) {
         return code;
     }
-    if (words.verb != HISTORY) { // Which waits in a library that a signal does not wake: it just ends.
+    if (words.verb != HISTORY) { // HISTORY waits in a library that a signal does not wake; it just ends.
         (void)sigaction(SIGTERM, &action, NULL);
         (void)sigaction(SIGINT, &action, NULL);
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table, and the history.
+// Verbs for the table and the history.
 #include "fleet_verbs.h"
 
 #include "broker.h"
@@ -15,20 +15,21 @@
 #include <unistd.h>
 
 #define SHOW_US 1000000U
-/// The stream is read from so long before the span: a machine's clock may be ahead of the servers', and a gap at the beginning of the span
-/// shows only by the event before it. Of a single machine all of it is read.
+/// The stream is read from this time before the span on: the clock of a machine may be ahead of the servers, and a gap
+/// at the start of the span shows only by the event before it. For a single machine the whole stream is read.
 #define AHEAD_US 86400000000LL
-/// Each host gets the time that a broker has for its greeting, so that one host without an answer does not hide the next one.
+/// Time for each host, as long as for the greeting of a broker, so that a host without an answer does not hide the next
+/// one.
 #define INFO_HOST_US (MQTT_GREETING_US + 1000000U)
-/// If every host was tried and none is being tried, the wait ends so long after its begin: they refuse, and do not keep silent.
+/// If every host was tried and none is being tried, the hosts refuse: the wait ends this time after its start.
 #define INFO_LEAST_US 5000000U
-/// The longest wait for the next retained message, from the accepted connection on.
+/// Longest wait for the next retained message, from the accepted connection on.
 #define INFO_NEXT_US 1000000U
 
 typedef struct {
     fleet_t fleet;
     mqtt_broker_t broker;
-    char host[MQTT_HOST_SIZE]; ///< Whose stream told the last stops.
+    char host[MQTT_HOST_SIZE]; ///< Host of the stream that provided the last stops.
     uint64_t now_us;
 } console_t;
 
@@ -65,7 +66,7 @@ static bool take_stored(void *context, const char *topic, const char *payload, s
     return true;
 }
 
-/// What happened before this console began. Without a stream the machines' own word must do.
+/// Reads the stops before the start of this console. Without a stream the `info` of the machines is used.
 static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
     const stream_config_t config = {.event = "stop", .last = true, .take = take_stored, .context = self};
     char why[STREAM_WHY_SIZE];
@@ -79,7 +80,7 @@ static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
     }
 }
 
-/// Rewrites the file: whoever reads it finds it whole.
+/// Replaces the file by rename, so that readers always find a complete file.
 static int write_file(const console_t *self, const char *path) {
     char part[1024];
     const int length = snprintf(part, sizeof part, "%s.part", path);
@@ -98,7 +99,7 @@ static int write_file(const console_t *self, const char *path) {
     return 0;
 }
 
-/// False if nobody reads it.
+/// Returns false if the output is closed.
 static bool show(const console_t *self, const fleet_wanted_t *wanted) {
     if (wanted->json) {
         fleet_tell(&self->fleet, self->now_us, stdout);
@@ -182,9 +183,10 @@ static void info_came(void *context, const struct mosquitto_message *message, co
     history_take_info(self->history, message->topic, message->payload, (size_t)message->payloadlen);
 }
 
-/// What the machines retain of themselves at the broker. Without a broker the history says that its end is not checked. An exit code.
+/// Reads the retained `info` of the machines at the broker. Without a broker the history reports that its end is not
+/// checked. Returns an exit code.
 static int read_info(const mqtt_settings_t *settings, const fleet_wanted_t *wanted, history_t *history) {
-    static mqtt_broker_t broker; // A thread of it may wait for the network longer than this function.
+    static mqtt_broker_t broker; // Its thread may wait for the network longer than this function.
     asking_info_t self = {history, bridge_now_us()};
     char topic[64];
     char name[40];

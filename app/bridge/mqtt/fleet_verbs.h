@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What iwheel-fleet does: each verb asks a broker, or the stream behind it, and prints. None sends anything that moves, stops or changes a
+/// Verbs of iwheel-fleet: each verb queries a broker, or its stream, and prints. No verb moves, stops or changes a
 /// machine.
 #ifndef MQTT_FLEET_VERBS_H
 #define MQTT_FLEET_VERBS_H
@@ -8,35 +8,34 @@
 
 #include <signal.h>
 
-/// What the command line says.
+/// Contents of the command line.
 typedef struct {
-    const char *id;   ///< Of a machine; NULL: none is named.
-    const char *name; ///< Of a recording; NULL: the newest.
-    const char *
-        out; ///< Where its frames go; NULL: a name of its own, here. Of the table: a file that is rewritten every second.
-    uint64_t seconds;      ///< The table, once after so long; 0: until it is told to end.
-    uint64_t wait_s;       ///< For a machine that does not answer.
-    bool json;             ///< Objects, one a line.
-    history_config_t span; ///< Of the history.
+    const char *id;        ///< Id of a machine; NULL: none.
+    const char *name;      ///< Name of a recording; NULL: the newest.
+    const char *out;       ///< File of the frames, or the table's file, rewritten every second; NULL: default.
+    uint64_t seconds;      ///< Table: print once after this time; 0: until a signal.
+    uint64_t wait_s;       ///< Longest wait for a machine that does not answer.
+    bool json;             ///< JSON: one object a line.
+    history_config_t span; ///< Span of the history.
     const volatile sig_atomic_t *end_asked;
 } fleet_wanted_t;
 
-/// For a listener that does not need them: it sends by QoS 0 only, which is neither confirmed nor refused.
+/// Callbacks without effect for a listener that sends with QoS 0 only: such messages are neither confirmed nor refused.
 void fleet_ignore(void *context);
 void fleet_ignore_sent(void *context, int message);
 void fleet_ignore_refused(void *context, int message, const char *why);
 
-/// All of these: an exit code, with what is wrong told on stderr.
+/// All verbs return an exit code and print errors on stderr.
 ///
-/// The table of machines.
+/// Prints the table of machines.
 int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
-/// What happened in a span of time.
+/// Prints the events of a span of time.
 int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
 int fleet_verb_recordings(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
-/// Fetches one of them into files of this machine, all of them whole or none.
+/// Fetches a recording into local files, either all of them or none.
 int fleet_verb_recording(const mqtt_settings_t *settings, const fleet_wanted_t *wanted);
 
 #endif

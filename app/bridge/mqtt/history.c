@@ -44,7 +44,7 @@ bool history_when(const char *text, int64_t *out_us) {
         }
         const int day = parts.tm_mday;
         const time_t seconds = utc ? timegm(&parts) : mktime(&parts);
-        if (seconds <= 0 || parts.tm_mday != day) { // 30 February is none, though it can be counted.
+        if (seconds <= 0 || parts.tm_mday != day) { // 30 February is not a date, though mktime accepts it.
             return false;
         }
         *out_us = (int64_t)seconds * 1000000;
@@ -86,7 +86,7 @@ history_machine_t *history_machine(history_t *self, const char *id) {
     return machine;
 }
 
-/// `id` is `BOOT-NUMBER`.
+/// Parses `id`, which is `BOOT-NUMBER`.
 static bool read_id(const iwc_message_t *event, char out_boot[MQTT_BOOT_SIZE], uint64_t *out_number) {
     char id[48];
     fleet_text(event, "id", id, sizeof id);
@@ -95,13 +95,13 @@ static bool read_id(const iwc_message_t *event, char out_boot[MQTT_BOOT_SIZE], u
         strspn(dash + 1, "0123456789") != strlen(dash + 1)) {
         return false;
     }
-    *dash = '\0'; // Shorter than MQTT_BOOT_SIZE by now.
+    *dash = '\0'; // The part before it is shorter than MQTT_BOOT_SIZE.
     memcpy(out_boot, id, (size_t)(dash - id) + 1U);
     *out_number = strtoull(dash + 1, NULL, 10);
     return *out_number > 0U;
 }
 
-/// The run of the bridge that it is of; a new one in place of the oldest.
+/// Returns the index of the run of the bridge with this boot id; a new run replaces the oldest.
 static size_t run_of(history_machine_t *machine, const char *boot) {
     for (size_t i = 0; i < HISTORY_BOOTS; i++) {
         if (strcmp(machine->runs[i].boot, boot) == 0) {
@@ -114,13 +114,14 @@ static size_t run_of(history_machine_t *machine, const char *boot) {
     return next;
 }
 
-/// What lies between `before`, unless it is 0, and `now`; counted from 1 on where it began anew.
+/// Returns the number of events between `before` and `now`; 0 if `before` is 0. If the numbers restarted, it counts
+/// from 1 on.
 static uint64_t gap(uint64_t before, uint64_t now) {
     const uint64_t from = (now > before) ? before : 0U;
     return (before > 0U) ? now - from - 1U : 0U;
 }
 
-/// Remembers that the events between these two are missing; the oldest such gap is forgotten for it.
+/// Stores the gap of missing events between these two; it replaces the oldest gap.
 static void open_gap(history_machine_t *machine, uint64_t before, uint64_t now) {
     if (gap(before, now) > 0U) {
         machine->gaps[machine->next_gap] = (history_gap_t){(now > before) ? before + 1U : 1U, now - 1U};
@@ -128,7 +129,7 @@ static void open_gap(history_machine_t *machine, uint64_t before, uint64_t now) 
     }
 }
 
-/// True of an event that was missing until now: one that was set aside, or sent again.
+/// Returns true for an event that was missing until now, because it was set aside or sent again.
 static bool close_gap(history_machine_t *machine, uint64_t number) {
     for (size_t i = 0; i < HISTORY_GAPS; i++) {
         history_gap_t *one = &machine->gaps[i];
@@ -136,7 +137,7 @@ static bool close_gap(history_machine_t *machine, uint64_t number) {
             continue;
         }
         const history_gap_t whole = *one;
-        *one = (history_gap_t){number + 1U, whole.last}; // Without the number: its upper part, and its lower one.
+        *one = (history_gap_t){number + 1U, whole.last}; // The upper part of the gap, then the lower one.
         if (one->first > one->last) {
             *one = (history_gap_t){0};
         }
@@ -146,18 +147,18 @@ static bool close_gap(history_machine_t *machine, uint64_t number) {
     return false;
 }
 
-/// One less of what is still to be reported, or of what was.
+/// Subtracts one from the pending count, or if that is 0 from the reported one.
 static void take_back(uint64_t *pending, uint64_t *reported) {
     uint64_t *from = (*pending > 0U) ? pending : reported;
     *from -= (*from > 0U) ? 1U : 0U;
 }
 
-/// False: it is a double.
+/// Returns false for a duplicate.
 static bool note(history_t *self, history_machine_t *machine, const iwc_message_t *event, bool is_stop) {
     char boot[MQTT_BOOT_SIZE];
     uint64_t number = 0;
     if (!read_id(event, boot, &number)) {
-        return true; // Who sends no id cannot be told apart; better twice than not at all.
+        return true; // Events without an id cannot be compared; a duplicate is better than a loss.
     }
     const size_t run = run_of(machine, boot);
     if (number <= machine->runs[run].number) {
@@ -186,14 +187,14 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
     return true;
 }
 
-/// What is missing has been reported, or lies before the span.
+/// Clears the gap, because it is reported or lies before the span.
 static void forget_gap(history_machine_t *machine) {
     machine->missing = 0;
     machine->unheard = 0;
     machine->began = false;
 }
 
-/// Of an event that is no stop, what is in it that tells most.
+/// Writes the most important fields of an event that is not a stop.
 static void write_fields(const iwc_message_t *event, const char *name, char *out, size_t size) {
     static const struct {
         const char *event;
@@ -213,7 +214,7 @@ static void write_fields(const iwc_message_t *event, const char *name, char *out
             size_t length = 0;
             const char *raw = iwc_json(event, forms[i].fields[k], &length);
             fleet_text(event, forms[i].fields[k], text, sizeof text);
-            if (raw != NULL && raw[0] != '"' && length < sizeof text) { // A number or a truth.
+            if (raw != NULL && raw[0] != '"' && length < sizeof text) { // A number or a boolean.
                 memcpy(text, raw, length);
                 text[length] = '\0';
             }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the stream lacks at its end, by what the machines say of themselves, and why.
+// Events that the stream lacks at its end, by the `info` of the machines, and the cause.
 #include "history.h"
 
 #include "iwheel_northbound/json_out.h"
@@ -36,7 +36,7 @@ void history_take_info(history_t *self, const char *topic, const char *payload, 
     }
 }
 
-/// Stops that its `info` knows of and the stream does not have, as far as they may lie in the span.
+/// Returns the number of stops that its `info` counts and the stream does not have, as far as they may lie in the span.
 static uint64_t stops_behind(const history_t *self, const history_machine_t *machine) {
     const history_info_t *info = &machine->info;
     const bool later = machine->stop_wall_us > 0 && info->stop_wall_us > machine->stop_wall_us;
@@ -44,16 +44,16 @@ static uint64_t stops_behind(const history_t *self, const history_machine_t *mac
         machine->stop_wall_us >= self->config.until_us) {
         return 0;
     }
-    if (machine->stop == 0) { // The stream has none: at least this one.
+    if (machine->stop == 0) { // The stream has no stop: at least this one is missing.
         return (info->stop_wall_us < self->config.until_us) ? 1U : 0U;
     }
     if (info->stop > machine->stop) {
         return (uint64_t)(info->stop - machine->stop);
     }
-    return later ? (uint64_t)info->stop : 0U; // The gateway began anew, and counts from one.
+    return later ? (uint64_t)info->stop : 0U; // The gateway restarted and counts from one.
 }
 
-/// Events likewise. The number of an event never begins anew.
+/// Returns the same for events. The number of an event never restarts.
 static uint64_t events_behind(const history_t *self, const history_machine_t *machine) {
     const uint64_t there = machine->number + machine->info.waiting;
     return (machine->number > 0U && machine->info.last > there && machine->event_us < self->config.until_us)
@@ -61,7 +61,7 @@ static uint64_t events_behind(const history_t *self, const history_machine_t *ma
                : 0U;
 }
 
-/// Why events may be missing, as far as the machine knows it.
+/// Writes why events may be missing, as far as the machine knows.
 void history_cause(const history_machine_t *machine, char *out, size_t size) {
     const history_info_t *info = &machine->info;
     if (!info->known || strcmp(info->boot, machine->runs[machine->run].boot) != 0) {
@@ -74,7 +74,7 @@ void history_cause(const history_machine_t *machine, char *out, size_t size) {
     }
 }
 
-/// One line, or two.
+/// Prints up to three lines about one machine.
 static void show_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
     char words[256];
     char when[HISTORY_TIME_SIZE];

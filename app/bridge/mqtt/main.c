@@ -12,7 +12,7 @@
 
 static int loop(mqtt_bridge_t *bridge) {
     bridge_service_t service;
-    if (!bridge_reach_is_local("iwheel-mqtt", NULL, 0)) { // It connects to others and accepts nobody.
+    if (!bridge_reach_is_local("iwheel-mqtt", NULL, 0)) { // It connects to others and accepts no connection.
         return EX_UNAVAILABLE;
     }
     bridge_service_open(&service);
@@ -51,7 +51,7 @@ static int run(const mqtt_settings_t *settings) {
     }
     code = loop(&bridge);
     if (!mqtt_bridge_close(&bridge)) {
-        _exit(code); // A thread still waits for the network: nothing of it may be torn down under it.
+        _exit(code); // A thread still waits for the network and uses the memory.
     }
     return code;
 }

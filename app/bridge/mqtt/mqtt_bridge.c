@@ -42,14 +42,14 @@ static void tell_info(mqtt_bridge_t *self) {
                               .unsent = self->broker.unsent,
                               .stop = &self->stop};
     const size_t length = mqtt_tell_info(&info, buffer(self));
-    self->info_due = false; // Before: a refusal of this one makes none due at once.
+    self->info_due = false; // Set before publishing, so that a refusal of this message does not make it due again.
     const int message = mqtt_bridge_publish(self, "info", NULL, length, retained);
     self->info_due = message == MQTT_NOT_NOW;
     self->info_us = self->now_us;
     self->told_waiting = self->spool.waiting;
 }
 
-/// A machine whose gateway is away is as good as away.
+/// Publishes the availability. A machine without its gateway is offline.
 static void tell_availability(mqtt_bridge_t *self, bool always) {
     const bool online = self->link.state == BRIDGE_LINK_HERE && self->state_length > 0U;
     if (online != self->online || always) {
@@ -60,7 +60,8 @@ static void tell_availability(mqtt_bridge_t *self, bool always) {
     }
 }
 
-/// An event that is worth to be kept; `stop_us` is the wall clock of the newest stop, by which one is known that happened unseen.
+/// Adds an event to the spool. `stop_us` is the wall clock of the newest stop; it shows later whether a stop was
+/// missed.
 static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
     if (length == 0U) {
         self->spool.dropped++;
@@ -69,7 +70,8 @@ static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uin
     (void)mqtt_spool_add(&self->spool, name, self->payload, length, stop_us);
 }
 
-/// Of an event, or of a reply to `why`. A gateway that began anew knows none; the one before it is still this machine's last.
+/// Stores the last stop from an event or from a reply to `why`. A gateway that restarted knows none; the one before it
+/// then stays the last stop of this machine.
 static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
     mqtt_stop_t *last = &self->stop;
     if (iwc_integer(stop, "number").value <= 0) {
@@ -102,7 +104,7 @@ static void take_why(void *context, const iwc_message_t *reply) {
     }
 }
 
-/// What makes a state worth sending at once: everything in it that is no measurement.
+/// Writes the part of a state that is not a measurement. If it changes, the state is sent immediately.
 static void read_condition(const iwc_message_t *state, char *out, size_t size) {
     char machine[16];
     char cause[32];
@@ -117,13 +119,13 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
                    iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
 }
 
-/// How often the gateway is asked to tell it.
+/// Returns the rate at which the gateway must send its state.
 static uint32_t rate_hz(uint32_t every_ms) {
     return (every_ms < 1000U) ? 1000U / every_ms : 1U;
 }
 
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
-    // By MQTT 5: what is older than the next one is of no use.
+    // MQTT 5: a state that is older than the next one is useless.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
     if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) !=
         MQTT_NOT_NOW) {
@@ -138,7 +140,8 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     memcpy(self->state, state->text, state->length);
     self->state_length = state->length;
     read_condition(state, condition, sizeof condition);
-    // Half a line early: the gateway's period and ours must not beat, however unevenly its lines come.
+    // Sends half a gateway period early, so that the periods of the gateway and of the bridge do not beat, even if
+    // lines arrive unevenly.
     const uint32_t every_ms = self->settings->state.every_ms;
     const uint32_t line_ms = 1000U / rate_hz(every_ms);
     if (strcmp(condition, self->condition) != 0 ||
@@ -151,7 +154,8 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     }
 }
 
-/// A person of this bridge who asks holds the lease before the reply is here: only another client's lease ends ours.
+/// Ends the lease of this bridge only if another client holds it. A person of this bridge who arms holds the lease
+/// before the reply arrives.
 static void take_lease(mqtt_bridge_t *self, const iwc_message_t *event) {
     const iwc_value_t holder = iwc_integer(event, "holder");
     bool ours = false;
@@ -285,7 +289,8 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     const mqtt_broker_listener_t broker = {
         "iwheel-mqtt", self->name,  self->topics,     self->will,          self,
         broker_up,     broker_down, mqtt_events_sent, mqtt_events_refused, mqtt_bridge_command};
-    // Nobody who knows the machine's id can take this name at a broker and so keep the bridge away.
+    // A client that knows the id of the machine cannot guess the random part of the name, so it cannot take the name at
+    // a broker and keep the bridge away.
     const bool random = make_boot(self->boot);
     (void)snprintf(self->name, sizeof self->name, "iwheel-%s-%s", settings->machine.id, self->boot);
     mqtt_topic(settings->machine.id, "availability", NULL, self->will);
@@ -368,6 +373,6 @@ bool mqtt_bridge_close(mqtt_bridge_t *self) {
     mqtt_bridge_stop_if_ours(self);
     bridge_lease_close(&self->lease);
     bridge_link_close(&self->link);
-    const bool done = mqtt_broker_close(&self->broker); // First: what it confirms is kept.
+    const bool done = mqtt_broker_close(&self->broker); // Before the spool, which stores the confirmations.
     return mqtt_spool_close(&self->spool) && done;
 }

@@ -8,10 +8,10 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A sender who was silent so long may count anew: what it sent before is late by now, whatever its `seq`.
+/// After this time without a command a sender may restart its `seq`: its earlier commands are late by then.
 #define FORGET_US (MQTT_TTL_MAX_MS * 1000ULL)
 
-/// The fields of a verb, and whether it permits motion or clears a latch. The gateway judges which of them are needed.
+/// Fields of a verb, and whether it permits motion or clears a latch. The gateway checks which fields are required.
 typedef struct {
     const char *word;
     bool permits;
@@ -50,7 +50,7 @@ static bool drop(mqtt_order_t *order, mqtt_verdict_t verdict, const char *why) {
     return false;
 }
 
-/// A whole number of the command's; false: there is none.
+/// Reads an integer of the command. Returns false if there is none.
 static bool number_of(iwn_json_t root, const char *name, int64_t *out_number) {
     iwn_json_t value;
     if (!iwn_json_find(root, name, &value) || iwn_json_kind(value) != IWN_JSON_INTEGER) {
@@ -75,7 +75,8 @@ static bool is_one_of(iwn_json_t name, const char *const words[]) {
     return false;
 }
 
-/// Copies a field of the verb's. Numbers, texts and one truth only: what is written anew cannot be another request in disguise.
+/// Copies a field of the verb. Only numbers, texts and one boolean are rewritten, so the field cannot hide another
+/// request.
 static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
     char text[256];
     iwn_json_t value;
@@ -106,7 +107,7 @@ static bool is_stop(mqtt_verb_t verb) {
     return verb == MQTT_STOP || verb == MQTT_ESTOP;
 }
 
-/// The key of a command that drives, and whether it is for a deflected stick: both do not depend on its age or sender.
+/// Reads the key of a drive command, and whether it is not zero. Both are independent of its age and sender.
 static bool read_drive(iwn_json_t root, mqtt_order_t *order) {
     iwn_json_t value;
     for (size_t i = 0; forms[order->verb].fields[i] != NULL; i++) {
@@ -116,7 +117,7 @@ static bool read_drive(iwn_json_t root, mqtt_order_t *order) {
     return !iwn_json_find(root, "key", &value) || text_of(root, "key", order->key, sizeof order->key);
 }
 
-/// No field but those of every command and of this one.
+/// Returns true if there are only fields that are common to all commands, or of this verb.
 static bool is_of_fields(iwn_json_t root, mqtt_verb_t verb) {
     static const char *const common[] = {"boot", "t_us", "ttl_ms", "seq", "from", NULL};
     iwn_json_t rest = iwn_json_inside(root);
@@ -159,11 +160,12 @@ static bool write_request(iwn_json_t root, mqtt_order_t *order) {
         order->request[0] = '\0';
         return false;
     }
-    order->request[length - 1U] = '\0'; // The newline: a client's library adds its own.
+    order->request[length - 1U] = '\0'; // Without the newline, which the library of a client adds.
     return true;
 }
 
-/// Where this sender's `seq` is kept; the longest silent one's place, if it has none. MQTT_SENDERS: all are taken.
+/// Returns the index of the `seq` of this sender; otherwise that of the sender that was silent for longest.
+/// MQTT_SENDERS: all are in use.
 static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_us) {
     size_t oldest = 0;
     for (size_t i = 0; i < MQTT_SENDERS; i++) {
@@ -178,7 +180,7 @@ static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_
     return free ? oldest : MQTT_SENDERS;
 }
 
-/// Until when it counts, in ms after what it quotes; 0: `ttl_ms` is none.
+/// Returns the largest age in ms after the quoted time; 0 if `ttl_ms` is not valid.
 static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t verb) {
     const int64_t most_ms = forms[verb].permits ? (int64_t)rules->ttl_ms : (int64_t)MQTT_TTL_MAX_MS;
     int64_t asked_ms = most_ms;
@@ -210,7 +212,7 @@ static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_u
 }
 
 static bool judge_count(mqtt_judge_t *self, uint64_t now_us, mqtt_order_t *order) {
-    if (is_stop(order->verb)) { // Twice is harmless; and anybody could use up its sender's numbers, or all places.
+    if (is_stop(order->verb)) { // A duplicate is harmless, and any client could use up the numbers or places.
         return true;
     }
     const size_t place = place_of(self, order->from, now_us);
@@ -237,7 +239,7 @@ static bool find_verb(const char *word, mqtt_verb_t *out_verb) {
     return false;
 }
 
-/// Where the answer goes, and with what: as MQTT 5 tells it beside the command, else to `from`.
+/// Reads the destination and the correlation data of the answer: from the MQTT 5 properties, otherwise `from`.
 static bool read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command, mqtt_order_t *order) {
     const size_t begin = (rules->replies != NULL) ? strlen(rules->replies) : 0U;
     memcpy(order->to, order->from, sizeof order->to);
@@ -258,7 +260,7 @@ static bool read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command
     return true;
 }
 
-/// Who says which verb, in which object.
+/// Parses the sender, the verb and the JSON object.
 static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
     char fault[80];
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);

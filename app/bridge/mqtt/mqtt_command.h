@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: MIT
-/// Whether a command that came by MQTT still counts, and what it asks of the gateway. All that the bridge reads of what others send.
+/// Judges whether a command from MQTT is still valid, and converts it into a request to the gateway. The bridge parses
+/// no other input of senders.
 ///
-/// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine's and says who it is `from`, with a
-/// `seq` that rises. Its age is this machine's monotonic time since `t_us`: no other clock takes part. Whatever is retained, late, doubled,
-/// out of order or from another run of the bridge is dropped and counted. A stop needs its age only: no `seq` and no number of senders refuses
-/// it. `from` is a label: whoever may write there may use any. The right to drive is the `key` of the reply to `arm`.
+/// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine, and has a sender
+/// name `from` and a `seq` that increases. Its age is the monotonic time of this machine since `t_us`; no other clock
+/// is used. Commands that are retained, late, duplicated, out of order or from another run of the bridge are dropped
+/// and counted. A stop only needs its age: neither `seq` nor the number of senders refuses it. `from` is a label: any
+/// client with the right to publish may use any name. The right to drive is the `key` of the reply to `arm`.
 ///
-/// A response topic of MQTT 5 counts only among this machine's replies: nobody makes the bridge write where only it may.
+/// A response topic of MQTT 5 is valid only among the replies of this machine, so that no client makes the bridge write
+/// to other topics.
 #ifndef MQTT_COMMAND_H
 #define MQTT_COMMAND_H
 
 #include "iwheel_northbound/json_in.h"
 
-/// No command counts longer.
+/// Largest age of a command.
 #define MQTT_TTL_MAX_MS 1000U
-/// Bytes of a longer command are not looked at.
+/// Largest command in bytes. A longer one is not parsed.
 #define MQTT_COMMAND_MAX 4096U
 #define MQTT_SENDER_SIZE 33U
-/// Bytes of a key with its terminator.
+/// Size of a key with its terminator.
 #define MQTT_KEY_SIZE 33U
-/// Bytes of correlation data that are given back.
+/// Largest correlation data in bytes that are returned.
 #define MQTT_CORRELATION_MAX 64U
 #define MQTT_SENDERS         16U
-/// Bytes of `boot` with its terminator.
+/// Size of `boot` with its terminator.
 #define MQTT_BOOT_SIZE 17U
 
 typedef enum {
-    MQTT_HELLO, ///< Only asks for `boot` and `t_us`, which it need not know.
+    MQTT_HELLO, ///< Requests `boot` and `t_us`, and needs to quote neither.
     MQTT_STOP,
     MQTT_ESTOP,
     MQTT_ARM,
@@ -39,31 +42,31 @@ typedef enum {
     MQTT_VERBS
 } mqtt_verb_t;
 
-/// Why a command is dropped; for each there is a word and a counter.
+/// Result of a command. Each has a word and a counter.
 typedef enum {
     MQTT_TAKEN,
     MQTT_RETAINED,
-    MQTT_GARBLED, ///< No such verb, no JSON, a field that is missing, unknown or none of its kind.
+    MQTT_GARBLED, ///< No JSON, unknown verb or field, or a field that is missing or of a wrong type.
     MQTT_OTHER_BOOT,
     MQTT_LATE,
-    MQTT_EARLY,   ///< It quotes a time that has not come yet.
-    MQTT_DOUBLED, ///< Its `seq` does not rise.
-    MQTT_CROWDED, ///< More than MQTT_SENDERS within a second.
-    MQTT_DENIED,  ///< Not configured.
+    MQTT_EARLY,   ///< It quotes a time in the future.
+    MQTT_DOUBLED, ///< Its `seq` does not increase.
+    MQTT_CROWDED, ///< More than MQTT_SENDERS senders within a second.
+    MQTT_DENIED,  ///< Not enabled in the configuration.
     MQTT_VERDICTS
 } mqtt_verdict_t;
 
 typedef struct {
-    const char *boot; ///< Of this run.
-    uint32_t ttl_ms;  ///< Of commands that permit motion or clear a latch, at most MQTT_TTL_MAX_MS.
+    const char *boot; ///< Boot id of this run.
+    uint32_t ttl_ms;  ///< Age limit of commands that permit motion or clear a latch, at most MQTT_TTL_MAX_MS.
     bool may_drive;
     bool may_reset;
-    const char *replies; ///< `iwheel/ID/reply/`: what a response topic must begin with.
+    const char *replies; ///< `iwheel/ID/reply/`: required prefix of a response topic.
 } mqtt_rules_t;
 
-/// As it came.
+/// Command as received.
 typedef struct {
-    const char *verb; ///< The last part of its topic, terminated.
+    const char *verb; ///< Last part of its topic, terminated.
     const char *payload;
     size_t length;
     bool retained;
@@ -72,22 +75,22 @@ typedef struct {
     size_t correlation_length;
 } mqtt_command_t;
 
-/// What it comes to.
+/// Judged command.
 typedef struct {
     mqtt_verdict_t verdict;
     mqtt_verb_t verb;
-    char from[MQTT_SENDER_SIZE];               ///< Empty: not known, so there is nobody to answer.
-    char to[MQTT_SENDER_SIZE];                 ///< Who gets the answer: `from`, or who the response topic names.
-    uint8_t correlation[MQTT_CORRELATION_MAX]; ///< To be told with the answer.
+    char from[MQTT_SENDER_SIZE]; ///< Sender; empty: unknown, so there is no answer.
+    char to[MQTT_SENDER_SIZE];   ///< Destination of the answer: `from`, or the name in the response topic.
+    uint8_t correlation[MQTT_CORRELATION_MAX]; ///< Returned with the answer.
     uint16_t correlation_length;
-    int64_t seq;             ///< 0: not known.
+    int64_t seq;             ///< 0: unknown.
     bool moves;              ///< A well-formed command with a value that is not zero, dropped or not.
-    char key[MQTT_KEY_SIZE]; ///< Of a command that drives; empty: it has none.
-    char why[160];           ///< Cause and cure, unless it is taken.
-    char request[1024];      ///< For the gateway, unless it is dropped or MQTT_HELLO.
+    char key[MQTT_KEY_SIZE]; ///< Key of a command that drives; empty: none.
+    char why[160];           ///< Cause and fix, unless it is taken.
+    char request[1024];      ///< Request to the gateway, unless the command is dropped or MQTT_HELLO.
 } mqtt_order_t;
 
-/// Who sent what last. All zero at first.
+/// Last command of each sender. All zero at first.
 typedef struct {
     struct {
         char name[MQTT_SENDER_SIZE];
@@ -98,11 +101,11 @@ typedef struct {
     iwn_work_t work;
 } mqtt_judge_t;
 
-/// Judges one command that came at `now_us`, and counts it.
+/// Judges one command that arrived at `now_us`, and counts it.
 void mqtt_judge(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
                 mqtt_order_t *out_order);
 
-/// The word for it, as in `error` and in the counters.
+/// Returns the word of a verdict, as in `error` and in the counters.
 const char *mqtt_verdict_word(mqtt_verdict_t verdict);
 const char *mqtt_verb_word(mqtt_verb_t verb);
 

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// What the bridge hands to the broker, in order, and what becomes of a message that the broker does not accept.
+// Sends messages to the broker in order, and handles messages that the broker does not accept.
 #include "mqtt_bridge.h"
 
 #include <string.h>
 
 #define ASIDE_FIRST_US   5000000U
 #define ASIDE_LONGEST_US 3600000000U
-/// Between two lines in the log about messages that were not accepted.
+/// Shortest interval of log lines about messages that were not accepted.
 #define REFUSED_US 10000000U
-/// After a loss events wait so long for the broker to answer what came before them.
+/// After a loss, events wait up to this time for the answer to the messages before them.
 #define PROOF_US 5000000U
 
 static const mqtt_way_t once = {.qos = 1};
 
-/// The log's next line names an event, if one is among them.
+/// Counts a refusal. The next log line names an event, if there is one.
 static void count_refusal(mqtt_bridge_t *self, const char *topic, const char *why, bool is_event) {
     mqtt_refusals_t *refusals = &self->refusals;
     if (is_event || !refusals->has_event) {
@@ -44,7 +44,8 @@ int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name,
     return mqtt_bridge_publish_to(self, topic, length, way);
 }
 
-/// The event does not block those behind it: it waits until events that are set aside are tried again.
+/// Sets an event aside, so that it does not block later events. It waits until events that are set aside are tried
+/// again.
 static void set_aside(mqtt_bridge_t *self, uint64_t number) {
     if (self->spool.aside == 0U) {
         self->refusals.wait_us = ASIDE_FIRST_US;
@@ -54,7 +55,7 @@ static void set_aside(mqtt_bridge_t *self, uint64_t number) {
     self->info_due = true;
 }
 
-/// The next one to be sent; false: there is none.
+/// Finds the next event to send. Returns false if there is none.
 static bool next_event(mqtt_bridge_t *self, mqtt_spool_event_t *out_event) {
     while (mqtt_spool_after(&self->spool, self->sent_number, out_event)) {
         if (!out_event->aside || self->refusals.tries) {
@@ -65,8 +66,9 @@ static bool next_event(mqtt_bridge_t *self, mqtt_spool_event_t *out_event) {
     return false;
 }
 
-/// Hands the broker what it has not got, a few at a time: order is kept, and what is lost with the connection is sent again. After a loss
-/// one by one, and when the broker has answered what came before, so that it shows with which of them the connection ends.
+/// Sends events that the broker does not have, a few at a time: the order is preserved, and events lost with the
+/// connection are sent again. After a loss they are sent one by one, after the broker has answered the messages before
+/// them. This shows which event ends the connection.
 void mqtt_events_send(mqtt_bridge_t *self) {
     mqtt_spool_event_t event;
     char topic[MQTT_TOPIC_SIZE];
@@ -91,7 +93,8 @@ void mqtt_events_send(mqtt_bridge_t *self) {
     }
 }
 
-/// Begins to try what is set aside, or ends it. With nothing under way all events up to the newest that was sent are set aside.
+/// Begins or ends the try of events that are set aside. While nothing is under way, all waiting events up to the newest
+/// sent one are set aside.
 static void try_aside(mqtt_bridge_t *self) {
     mqtt_refusals_t *refusals = &self->refusals;
     mqtt_spool_event_t event;
@@ -109,7 +112,7 @@ static void try_aside(mqtt_bridge_t *self) {
     }
 }
 
-/// From the oldest on, so that a restart of the process sends again what was under way, in order.
+/// Settles from the oldest on, so that a restart of the process sends again the events that were under way, in order.
 static void settle_events(mqtt_bridge_t *self) {
     while (self->inflights > 0U && self->inflight[0].fate != MQTT_WAITS) {
         const mqtt_inflight_t oldest = self->inflight[0];
@@ -130,7 +133,7 @@ static void settle_events(mqtt_bridge_t *self) {
     self->info_due = self->info_due || (self->told_waiting > 0U && self->spool.waiting == 0U);
 }
 
-/// Its place under way; NULL: it is no event.
+/// Returns the entry of an event under way; NULL if the message is not an event.
 static mqtt_inflight_t *inflight_of(mqtt_bridge_t *self, int message) {
     for (size_t i = 0; i < self->inflights; i++) {
         if (self->inflight[i].message == message) {
@@ -153,7 +156,7 @@ void mqtt_events_sent(void *context, int message) {
 void mqtt_events_refused(void *context, int message, const char *why) {
     mqtt_bridge_t *self = context;
     mqtt_inflight_t *event = inflight_of(self, message);
-    mqtt_spool_event_t kept;
+    mqtt_spool_event_t stored;
     char topic[MQTT_TOPIC_SIZE] = "a message";
     self->refusals.works = self->refusals.works || message == self->refusals.proof;
     if (event == NULL) {
@@ -165,19 +168,19 @@ void mqtt_events_refused(void *context, int message, const char *why) {
         }
         const bool due = self->info_due;
         count_refusal(self, topic, why, false);
-        self->info_due = due || strcmp(topic + strlen(topic) - 5U, "/info") != 0; // Which would be refused again.
+        self->info_due = due || strcmp(topic + strlen(topic) - 5U, "/info") != 0; // An info would be refused again.
         return;
     }
-    if (!event->aside && mqtt_spool_after(&self->spool, event->number - 1U, &kept)) {
-        mqtt_topic(self->settings->machine.id, "event", kept.name, topic);
+    if (!event->aside && mqtt_spool_after(&self->spool, event->number - 1U, &stored)) {
+        mqtt_topic(self->settings->machine.id, "event", stored.name, topic);
         count_refusal(self, topic, why, true);
     }
     event->fate = MQTT_REFUSED;
     settle_events(self);
 }
 
-/// The connection ended with events under way. The first of them is the cause if the broker confirmed others in this connection, and if
-/// it happens again and again.
+/// Judges a connection that ended with events under way. The first of them is the cause if the broker confirmed others
+/// in this connection, and if this repeats.
 static void judge_loss(mqtt_bridge_t *self) {
     mqtt_refusals_t *refusals = &self->refusals;
     if (refusals->tries) {

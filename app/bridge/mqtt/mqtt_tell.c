@@ -19,7 +19,7 @@ const char *mqtt_topic_verb(const char *id, const char *topic) {
     return (strncmp(topic, begin, length) == 0) ? topic + length : NULL;
 }
 
-/// Members of ours that are not closed yet, then those of `text`, an object, without its first `skip` bytes.
+/// Joins the open object of the bridge and the members of the object `text` without its first `skip` bytes.
 static size_t join(iwn_out_t *out, mqtt_buffer_t buffer, const char *text, size_t length, size_t skip) {
     const bool empty = length <= skip + 1U;
     const size_t begun = out->length;
@@ -41,7 +41,7 @@ static iwn_out_t begin(mqtt_buffer_t buffer) {
     return out;
 }
 
-/// Closes the object; its length without a newline.
+/// Closes the object. Returns its length without a newline.
 static size_t end(iwn_out_t *out) {
     iwn_out_close(out, '}');
     const size_t length = iwn_out_finish(out);
@@ -118,7 +118,7 @@ size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *o
         iwn_out_text(&out, "key", order->key);
     }
     const char *comma = (reply != NULL) ? memchr(reply->text, ',', reply->length) : NULL;
-    if (comma != NULL) { // Behind the id, which is of no use to others.
+    if (comma != NULL) { // After the id, which has no use for other clients.
         return join(&out, buffer, reply->text, reply->length, (size_t)(comma - reply->text) + 1U);
     }
     iwn_out_bool(&out, "ok", order->verdict == MQTT_TAKEN);
@@ -194,7 +194,7 @@ typedef struct {
     const char *kind; ///< sensor or binary_sensor
     const char *key;
     const char *name;
-    const char *value; ///< In value_json, by Jinja.
+    const char *value; ///< Jinja expression over value_json.
     const char *unit;
     const char *class;
 } sensor_t;
@@ -202,7 +202,8 @@ typedef struct {
 static const sensor_t sensors[] = {
     {"sensor", "state", "State", "value_json.state", NULL, NULL},
     {"sensor", "cause", "Stopped by", "value_json.cause or 'nothing'", NULL, NULL},
-    // None is "unknown" in Home Assistant: without a line nobody knows of a button. A line that cannot be read counts as pressed.
+    // None is unknown in Home Assistant: without an estop line the state of a button is unknown. A line that cannot be
+    // read counts as pressed.
     {"binary_sensor", "estop", "Emergency stop pressed",
      "None if value_json.estop.state == 'none' else 'OFF' if value_json.estop.state == 'released' else 'ON'", NULL,
      "problem"},
@@ -230,12 +231,12 @@ void mqtt_sensor_topics(const mqtt_settings_t *settings, char out[MQTT_TOPIC_SIZ
                    settings->machine.id);
 }
 
-/// What Home Assistant keeps long-term statistics of: a distance only grows in sum, the others are measured.
+/// Returns the class of long-term statistics in Home Assistant: a distance is a total, the others are measurements.
 static const char *state_class_of(const sensor_t *sensor) {
     if (sensor->unit == NULL) {
         return NULL;
     }
-    return (strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
+    return (sensor->class != NULL && strcmp(sensor->class, "distance") == 0) ? "total" : "measurement";
 }
 
 static void tell_origin(iwn_out_t *out) {

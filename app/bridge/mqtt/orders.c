@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Commands of the bridge: judged, asked of the gateway, answered.
+// Commands to the bridge: judges them, asks the gateway, and sends the answers.
 #include "mqtt_bridge.h"
 
 #include "iwheel_northbound/json_out.h"
 
 #include <string.h>
 
-/// Nobody waits longer for an answer.
+/// Expiry of an answer: no client waits longer.
 #define ANSWER_S 10U
 
-/// What was asked of the gateway, and for whom.
+/// Request to the gateway, and its sender.
 typedef struct {
     mqtt_bridge_t *bridge;
     mqtt_order_t order;
     bool used;
 } waiting_t;
 
-/// Each kind has places of its own: questions cannot use up those of a stop or of the person who drives.
+/// Kinds of requests. Each kind has its own places, so that questions cannot use up the places of stops or of the
+/// person who drives.
 typedef enum { QUESTION, LEASE, STOP, KINDS } kind_t;
 #define PLACES 64U
 
@@ -29,7 +30,7 @@ static kind_t kind_of(mqtt_verb_t verb) {
     return (verb == MQTT_ARM || verb == MQTT_DRIVE || verb == MQTT_TWIST) ? LEASE : QUESTION;
 }
 
-/// NULL: all places of its kind are taken.
+/// Returns a free place; NULL if all places of the kind are in use.
 static waiting_t *place_for(mqtt_bridge_t *self, const mqtt_order_t *order) {
     waiting_t *places = waiting[kind_of(order->verb)];
     for (size_t i = 0; i < PLACES; i++) {
@@ -52,7 +53,7 @@ static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_mes
     }
 }
 
-/// An answer in the gateway's form.
+/// Sends a refusal in the form of a gateway reply.
 static void decline(mqtt_bridge_t *self, const mqtt_order_t *order, const char *error, const char *message) {
     char text[512];
     iwn_out_t out;
@@ -99,7 +100,7 @@ static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
         decline(self, order, "busy", "too many questions wait for the gateway; ask again later");
         return;
     }
-    // Without a place a stop gets no answer, and is delivered.
+    // A stop without a place gets no answer, but is delivered.
     if (!bridge_link_ask(&self->link, order->request, (place != NULL) ? take_answer : NULL, place, self->now_us)) {
         if (place != NULL) {
             place->used = false;
@@ -108,7 +109,8 @@ static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
     }
 }
 
-/// The source of a deflected stick, whose next command would move the wheels as soon as they may; NULL: there is none.
+/// Returns the sender of a nonzero command, whose next command would move the wheels as soon as they are armed; NULL if
+/// there is none.
 static const char *mover(const mqtt_bridge_t *self, const mqtt_order_t *order) {
     iwc_message_t state;
     const char *holder = bridge_lease_name(&self->lease);
@@ -181,7 +183,7 @@ static void carry_out(mqtt_bridge_t *self, const mqtt_order_t *order) {
         drive(self, order);
     } else {
         if (kind_of(order->verb) == STOP) {
-            bridge_lease_end(&self->lease, self->now_us); // A command of the former holder comes too late.
+            bridge_lease_end(&self->lease, self->now_us); // A later command of the former holder is refused.
         }
         ask(self, order);
     }

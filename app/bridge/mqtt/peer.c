@@ -17,7 +17,7 @@
 
 #define ACCEPT_US 1000000U
 #define WAIT_US   10000U
-/// An address and a port as /proc/net/tcp6 writes them.
+/// Size of an address and a port as /proc/net/tcp6 prints them.
 #define END_SIZE 48U
 
 mqtt_peers_t mqtt_peers_of(const char *user) {
@@ -38,7 +38,7 @@ static mqtt_peer_t judge(uid_t uid, const mqtt_peers_t *allowed) {
     return MQTT_PEER_STRANGER;
 }
 
-/// The kernel prints each 32-bit word of an address as this machine's number.
+/// Writes an address as the kernel prints it: each 32-bit word in the byte order of this machine.
 static void write_end(const void *address, size_t words, in_port_t port, char out[END_SIZE]) {
     uint32_t word[4] = {0};
     size_t used = 0;
@@ -49,15 +49,15 @@ static void write_end(const void *address, size_t words, in_port_t port, char ou
     (void)snprintf(out + used, END_SIZE - used, ":%04X", (unsigned)ntohs(port));
 }
 
-/// An IPv4 end as a socket for both versions has it.
+/// Writes an IPv4 address as a socket for both versions prints it.
 static void write_mapped(const struct sockaddr_in *end, char out[END_SIZE]) {
     uint8_t mapped[16] = {[10] = 0xFFU, [11] = 0xFFU};
     memcpy(mapped + 12, &end->sin_addr, sizeof end->sin_addr);
     write_end(mapped, 4, end->sin_port, out);
 }
 
-/// The owner of the socket with these ends. False: there is none, or it has no inode: a connection that is not accepted yet, or is over,
-/// which the kernel would show as root's.
+/// Finds the owner of the socket with these addresses. Returns false if there is none, or if it has no inode: the
+/// kernel shows a connection that is not accepted yet, or is closed, as owned by root.
 static bool find_owner(const char *table, const char *local, const char *remote, uid_t *out_uid) {
     char line[512];
     bool found = false;
@@ -86,7 +86,7 @@ typedef union {
     struct sockaddr_un local;
 } end_t;
 
-/// Of the other end: what is remote here is local there.
+/// Finds the owner of the other socket: the remote address here is its local address.
 static bool find_tcp_owner(const end_t *here, const end_t *there, uid_t *out_uid) {
     char ends[2][END_SIZE];
     if (there->any.sa_family == AF_INET6) {
@@ -156,7 +156,7 @@ static mqtt_peer_t probe_path(const char *path, const mqtt_peers_t *allowed, uid
     return probe((const struct sockaddr *)&address, sizeof address, allowed, out_uid);
 }
 
-/// Only loopback, whatever else the name stands for.
+/// Returns true for a loopback address. Other addresses of the name are not used.
 static bool is_loopback(const struct sockaddr *address) {
     end_t end = {.any = {.sa_family = AF_UNSPEC}};
     if (address->sa_family == AF_INET) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Sensors for Home Assistant, and whether the broker passes them on.
+// Publishes sensors for Home Assistant, and checks whether the broker returns them.
 #include "mqtt_bridge.h"
 
 #include <string.h>
 
-/// For all sensors to come back from the broker.
+/// Time in which all sensors must return from the broker.
 #define SENSORS_US 5000000U
 
 void mqtt_sensors_send(mqtt_bridge_t *self) {
@@ -25,14 +25,15 @@ void mqtt_sensors_take(mqtt_bridge_t *self, const struct mosquitto_message *mess
     for (size_t i = 0; i < self->sensors_sent &&
                        mqtt_tell_sensor(self->settings, i, topic, (mqtt_buffer_t){self->payload, sizeof self->payload});
          i++) {
-        // A retained one is of an earlier time, when the broker may have had other rights.
+        // A retained message is from an earlier time, when the broker may have had other rights.
         if (strcmp(topic, message->topic) == 0 && !message->retain) {
             self->sensors_seen |= UINT32_C(1) << i;
         }
     }
 }
 
-/// By MQTT 3.1.1 a broker confirms what its rights forbid and drops it: only what comes back is there.
+/// Reports sensors that did not return. With MQTT 3.1.1 a broker confirms a message that its rights forbid, and drops
+/// it; only a returned message was accepted.
 void mqtt_sensors_poll(mqtt_bridge_t *self) {
     const size_t seen = (size_t)__builtin_popcount(self->sensors_seen);
     if (self->sensors_us == 0U || self->now_us < self->sensors_us) {

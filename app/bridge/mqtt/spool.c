@@ -18,17 +18,17 @@
 static const char magic[8] = {'i', 'w', 's', 'p', 'o', 'o', 'l', '1'};
 static const char fresh[] = MQTT_SPOOL_FILE ".new";
 
-/// A record: length of what follows its head, and its CRC-32; then a letter, a number and the mark; of an event its name with a NUL, and
-/// its payload. What is confirmed is told by a record with the number up to which.
+/// A record: length after the head and CRC-32 (head); then a letter, a number and the mark; for an event also its name
+/// with a NUL, and its payload. A CONFIRMED record has the number up to which events are confirmed.
 #define SIZE_MIN  (2U * (size_t)MQTT_SPOOL_EVENT_MAX)
 #define HEAD_SIZE 8U
 #define BODY_SIZE 17U
 #define CONFIRMED 'c'
-#define ACCEPTED  'a' ///< As CONFIRMED, of this event alone.
+#define ACCEPTED  'a' ///< Like CONFIRMED, but only for this event.
 #define EVENT     'e'
-#define ASIDE     'r' ///< An event that the broker does not accept; read from a file it is an EVENT again.
+#define ASIDE     'r' ///< An event that the broker does not accept. When a file is read it becomes an EVENT.
 #define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
-/// No event has a number above: one more must always be possible.
+/// Largest number of an event, so that one more is always possible.
 #define NUMBER_MAX ((uint64_t)INT64_MAX)
 
 static void put(uint8_t *at, uint64_t number, size_t bytes) {
@@ -61,7 +61,7 @@ static uint64_t mark_of(const uint8_t *record) {
     return get(record + HEAD_SIZE + 9U, 8);
 }
 
-/// Completes a record whose rest, of so many bytes, is there.
+/// Completes a record whose rest, with this number of bytes, is already written.
 static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint64_t number, size_t rest) {
     record[HEAD_SIZE] = letter;
     put(record + HEAD_SIZE + 1U, number, 8);
@@ -70,7 +70,7 @@ static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint
     put(record + 4, iwn_line_crc(0, record + HEAD_SIZE, BODY_SIZE + rest), 4);
 }
 
-/// Removes the record at this place; those before it, which are set aside, move up.
+/// Removes the record at this place; earlier records, which are set aside, move up.
 static void forget_at(mqtt_spool_t *self, size_t at) {
     const size_t length = length_of(self->data + at);
     self->waiting--;
@@ -79,7 +79,8 @@ static void forget_at(mqtt_spool_t *self, size_t at) {
     self->begin += length;
 }
 
-/// Room for so many bytes behind the newest; at most the whole.
+/// Returns room for this number of bytes after the newest record; drops the oldest ones if necessary. `length` is at
+/// most the whole size.
 static uint8_t *make_room(mqtt_spool_t *self, size_t length) {
     while (self->end - self->begin + length > self->size) {
         forget_at(self, self->begin);
@@ -99,7 +100,7 @@ static void forget_until(mqtt_spool_t *self, uint64_t number) {
     }
 }
 
-/// Where the event with this number is; `end`: there is none.
+/// Returns the place of the event with this number; `end` if there is none.
 static size_t place_of(const mqtt_spool_t *self, uint64_t number) {
     size_t at = self->begin;
     while (at < self->end && number_of(self->data + at) != number) {
@@ -115,7 +116,7 @@ static void forget_one(mqtt_spool_t *self, uint64_t number) {
     }
 }
 
-/// A new letter for a record in memory, with its CRC.
+/// Changes the letter of a record in memory, and its CRC.
 static void set_letter(uint8_t *record, uint8_t letter) {
     record[HEAD_SIZE] = letter;
     put(record + 4, iwn_line_crc(0, record + HEAD_SIZE, length_of(record) - HEAD_SIZE), 4);
@@ -158,7 +159,7 @@ static void close_file(mqtt_spool_t *self) {
     self->file = -1;
 }
 
-/// The whole spool into a file of its own, which then takes the old one's place: at any time there is one that is whole.
+/// Writes the whole spool into a new file, which then replaces the old one. A complete file exists at any time.
 static bool write_anew(mqtt_spool_t *self) {
     uint8_t first[DONE_SIZE];
     uint8_t last[DONE_SIZE];
@@ -190,7 +191,7 @@ static bool write_anew(mqtt_spool_t *self) {
     return true;
 }
 
-/// A half record must not stay: what comes after it would not be read.
+/// Appends a record. An incomplete record is removed, because records after it would not be read.
 static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
     if (self->behind || self->file_bytes + length > 2U * self->size) {
         return write_anew(self);
@@ -228,7 +229,7 @@ static size_t read_event(mqtt_spool_t *self, const uint8_t *record, size_t lengt
     return length;
 }
 
-/// One record of a file; its length, or 0: from here on there is none.
+/// Reads one record of a file. Returns its length, or 0 at the end of the valid records.
 static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left) {
     if (left < HEAD_SIZE + BODY_SIZE || get(record, 4) < BODY_SIZE || get(record, 4) > MQTT_SPOOL_EVENT_MAX ||
         length_of(record) > left) {

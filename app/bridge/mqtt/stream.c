@@ -14,7 +14,7 @@
 #define TRIES      10U
 #define TOPIC_SIZE 256U
 
-/// What is open at the library, in the order in which it was opened.
+/// Open objects of the library, in the order of opening.
 typedef struct {
     natsOptions *options;
     natsConnection *connection;
@@ -44,8 +44,8 @@ static bool is_address(const char *host) {
     return inet_pton(AF_INET, host, bytes) == 1 || inet_pton(AF_INET6, host, bytes) == 1;
 }
 
-/// As certificates, names and addresses are told apart; libnats compares names only, so that an address is left to who signed it: the
-/// fleet's certificates say which of them are servers.
+/// Certificates distinguish names and addresses, but libnats compares only names. For an address the signer of the
+/// certificate decides: the certificates of a fleet state which hosts are servers.
 static natsStatus use_tls(natsOptions *options, const mqtt_settings_t *settings, const char *host) {
     natsStatus status = natsOptions_SetSecure(options, true);
     if (status == NATS_OK) {
@@ -84,7 +84,7 @@ static natsStatus connect_to(reader_t *self, const mqtt_settings_t *settings, co
     return (status == NATS_OK) ? natsConnection_JetStream(&self->stream, self->connection, &asking) : status;
 }
 
-/// The first of the hosts that answers.
+/// Connects to the first host that answers.
 static int find_server(reader_t *self, const mqtt_settings_t *settings, char out_host[MQTT_HOST_SIZE],
                        char out_why[STREAM_WHY_SIZE]) {
     char told[STREAM_WHY_SIZE / 2U] = "";
@@ -104,7 +104,7 @@ static int find_server(reader_t *self, const mqtt_settings_t *settings, char out
                 (unsigned)settings->broker.stream_port, told);
 }
 
-/// The consumer is of the kind that forgets itself: nothing is written down for it, and what it was handed is not confirmed.
+/// Subscribes with an ephemeral consumer: the servers store nothing for it, and messages are not confirmed.
 static natsStatus subscribe(reader_t *self, const stream_config_t *config, jsErrCode *out_code) {
     char subject[TOPIC_SIZE];
     jsSubOptions options;
@@ -118,7 +118,7 @@ static natsStatus subscribe(reader_t *self, const stream_config_t *config, jsErr
     return js_SubscribeSync(&self->events, self->stream, subject, NULL, &options, out_code);
 }
 
-/// How many events wait for it.
+/// Counts the events that wait.
 static natsStatus count(const reader_t *self, uint64_t *out_events) {
     jsConsumerInfo *info = NULL;
     const natsStatus status = natsSubscription_GetConsumerInfo(&info, self->events, NULL, NULL);
@@ -129,7 +129,7 @@ static natsStatus count(const reader_t *self, uint64_t *out_events) {
     return status;
 }
 
-/// Hands one event on; its number of events that follow it in `*out_left`.
+/// Passes one event on; sets `*out_left` to the number of events after it.
 static natsStatus take_one(natsMsg *message, stream_take_t take, void *context, uint64_t *out_left) {
     char topic[TOPIC_SIZE];
     jsMsgMetaData *place = NULL;
@@ -163,7 +163,7 @@ static natsStatus read_all(const reader_t *self, stream_take_t take, void *conte
     return status;
 }
 
-/// One try. `*trouble` is the servers' own word for it, if they had one.
+/// Tries once to read. `*trouble` is the error code of the servers, if they sent one.
 static natsStatus try_to_read(reader_t *self, const stream_config_t *config, stream_take_t take, void *context,
                               jsErrCode *trouble) {
     const char *words = NULL;
@@ -173,10 +173,10 @@ static natsStatus try_to_read(reader_t *self, const stream_config_t *config, str
     }
     const bool forbidden =
         status != NATS_OK && natsConnection_GetLastError(self->connection, &words) == NATS_NOT_PERMITTED;
-    return forbidden ? NATS_NOT_PERMITTED : status; // Who may not ask gets no answer, else.
+    return forbidden ? NATS_NOT_PERMITTED : status; // Without this, a client without the right would see a timeout.
 }
 
-/// Counts what is handed on: a reading that has begun is not begun again.
+/// Counts the events that are passed on: a read that has passed on events is not repeated.
 typedef struct {
     stream_take_t take;
     void *context;
@@ -189,7 +189,7 @@ static bool take_counted(void *context, const char *topic, const char *payload, 
     return self->take(self->context, topic, payload, length, stored_us);
 }
 
-/// Servers that have just lost one of theirs ask it for a while yet.
+/// Returns true for a temporary error: servers that have just lost one of them still ask it for a while.
 static bool may_pass(natsStatus status, jsErrCode trouble) {
     return status != NATS_OK && status != NATS_NOT_PERMITTED && trouble != JSStreamNotFoundErr;
 }

@@ -1,32 +1,35 @@
 // SPDX-License-Identifier: MIT
-/// The stream of events that a cluster of nats-servers keeps (share/fleet/stream makes it), read by libnats. It changes nothing there.
+/// Reads the stream of events of a cluster of nats-servers (share/fleet/stream creates it) by libnats. It changes
+/// nothing there.
 ///
-/// Reading waits for the network: for programs that have nothing else to do meanwhile. Each host is tried for 2 s; servers that have
-/// just lost one of theirs are asked up to ten times; a stream that falls silent in the middle is given up after 5 s. With TLS the name of the server is checked as its certificate has it.
+/// Reading waits for the network, so it is for programs without other work. Each host is tried for 2 s. Servers that
+/// have just lost one of them are asked up to ten times. A stream without a message for 5 s is given up. With TLS the
+/// name of the server is checked against its certificate.
 #ifndef MQTT_STREAM_H
 #define MQTT_STREAM_H
 
 #include "mqtt_settings.h"
 
-/// Its name at the servers.
+/// Name of the stream at the servers.
 #define STREAM_NAME     "iwheel"
 #define STREAM_WHY_SIZE 512U
 
-/// One event: where and what was published, and the servers' wall clock when they stored it. False: that is enough.
+/// Receives one event: its topic and payload, and the wall clock of the servers at its storage. Returns false to end
+/// the reading.
 typedef bool (*stream_take_t)(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
 
-/// What is wanted of it, and who takes it.
+/// Selection of events, and their receiver.
 typedef struct {
-    const char *machine; ///< NULL: of all.
-    const char *event;   ///< NULL: all.
-    bool last;           ///< Of each machine and event only the last one.
-    int64_t since_us;    ///< Unless `last`: wall clock of the servers, from which on they have stored it.
+    const char *machine; ///< NULL: all machines.
+    const char *event;   ///< NULL: all events.
+    bool last;           ///< Only the last event of each machine and kind.
+    int64_t since_us; ///< Time of storage from which on events are read, by the clock of the servers; not with `last`.
     stream_take_t take;
-    void *context; ///< For `take`.
+    void *context; ///< Context of `take`.
 } stream_config_t;
 
-/// Reads what is there now, in the order in which it was stored. 0 with the host that served in `out_host`; else an exit code of sysexits,
-/// with cause and cure in `out_why`.
+/// Reads the stored events in the order of their storage. Returns 0 and sets `out_host` to the host that served;
+/// otherwise returns an exit code of sysexits, with cause and fix in `out_why`.
 int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, char out_host[MQTT_HOST_SIZE],
                 char out_why[STREAM_WHY_SIZE]);
 

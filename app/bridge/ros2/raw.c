@@ -31,12 +31,12 @@ static bool data_equals(const struct ddsi_serdata *one, const struct ddsi_serdat
     return true; // There is no key: all are of one instance.
 }
 
-static size_t kept(const ros_raw_t *raw) {
+static size_t stored(const ros_raw_t *raw) {
     return (raw->size < ROS_RAW_MAX) ? raw->size : ROS_RAW_MAX;
 }
 
 static uint32_t data_size(const struct ddsi_serdata *base) {
-    return (uint32_t)kept(&data_of(base)->raw);
+    return (uint32_t)stored(&data_of(base)->raw);
 }
 
 /// The part of one fragment that is still missing.

@@ -52,12 +52,12 @@ static const ros_topic_t commanded[ROS_COMMAND_READERS] = {
     {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false}};
 static const ros_topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
 
-dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept) {
+dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool retained) {
     const dds_data_representation_id_t classic = DDS_DATA_REPRESENTATION_XCDR1;
     dds_qos_t *qos = dds_create_qos();
     dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
     dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, depth);
-    dds_qset_durability(qos, kept ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+    dds_qset_durability(qos, retained ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
     dds_qset_writer_data_lifecycle(qos, false);
     dds_qset_data_representation(qos, 1, &classic);
     dds_qset_userdata(qos, user_data, strlen(user_data));
@@ -113,8 +113,8 @@ static bool open_topics(ros_t *self) {
         if (i == WRITES_TF && !self->settings.odometry.tf) {
             continue;
         }
-        self->writers[i] =
-            ros_writer(self, topic_of(self, topic), ros_qos(topic->hash, topic->kept ? 1 : 10, true, topic->kept));
+        self->writers[i] = ros_writer(self, topic_of(self, topic),
+                                      ros_qos(topic->hash, topic->retained ? 1 : 10, true, topic->retained));
         good = good && self->writers[i] > 0;
     }
     for (unsigned i = 0; i < ROS_COMMAND_READERS && self->settings.drive.enabled; i++) {

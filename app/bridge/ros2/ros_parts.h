@@ -20,7 +20,7 @@ typedef struct {
     const char *name; ///< With a leading / outside of the namespace.
     const dds_topic_descriptor_t *type;
     const char *hash;
-    bool kept; ///< Late readers get the last one: transient local.
+    bool retained; ///< Late readers get the last one: transient local.
 } ros_topic_t;
 
 typedef enum {
@@ -73,7 +73,7 @@ struct ros {
 void ros_name(const ros_t *self, const char *name, const char *prefix, const char *suffix, char out[ROS_NAME_SIZE]);
 
 /// The caller, or who makes the entity with it, deletes it.
-dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept);
+dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool retained);
 dds_entity_t ros_reader(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react);
 dds_entity_t ros_writer(ros_t *self, dds_entity_t topic, dds_qos_t *qos);
 

@@ -297,13 +297,13 @@ static void hold_back(ros_t *self, const ros_reply_t *reply) {
 }
 
 void ros_send_replies(ros_t *self) {
-    size_t kept = 0;
+    size_t left = 0;
     for (size_t i = 0; i < ROS_WAITING && self->waiting[i].used; i++) {
         ros_reply_t *reply = &self->waiting[i];
         if (bridge_now_us() >= reply->until_us || can_read(self, reply)) {
             write_reply(self, reply);
-        } else if (kept++ < i) {
-            self->waiting[kept - 1U] = *reply;
+        } else if (left++ < i) {
+            self->waiting[left - 1U] = *reply;
             reply->used = false;
         }
     }

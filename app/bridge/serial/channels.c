@@ -16,7 +16,7 @@ static relay_channel_t *channel_of(relay_t *self, const sock_client_t *client) {
     return NULL;
 }
 
-/// Its client leaves it; the board is told.
+/// Ends the use of a channel by its client; the board is informed.
 static void release(relay_channel_t *channel) {
     channel->state = RELAY_FREE;
     channel->client = IW_CLIENT_NONE;
@@ -24,7 +24,7 @@ static void release(relay_channel_t *channel) {
     channel->queue.count = 0;
 }
 
-/// The free one that was used longest ago: what is still on its way on it reaches nobody.
+/// Returns the free channel that was unused for longest, so that replies on the way reach no other client.
 static relay_channel_t *free_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
@@ -44,7 +44,7 @@ static void turn_away(relay_t *self, sock_client_t *client, const char *why) {
     sock_client_finish(client, self->now_us);
 }
 
-/// An answer to a `drive` comes no later, unless it is lost: a longest line may be before it.
+/// Returns the time after which the answer to a `drive` is lost: a line of the largest size may precede it.
 static uint64_t hold_us(const relay_t *self) {
     return 30000U + (uint64_t)4608U * 10U * 1000000U / self->settings->board.baud;
 }
@@ -52,7 +52,7 @@ static uint64_t hold_us(const relay_t *self) {
 static void welcome(void *context, sock_client_t *client) {
     relay_t *self = (relay_t *)context;
     if (client->right == SOCK_STOP) {
-        return; // A guest: guests.c carries out its one line.
+        return; // A guest: guests.c executes its one line.
     }
     relay_channel_t *channel = free_channel(self);
     if (self->link.state == SERIAL_SILENT || channel == NULL) {
@@ -68,7 +68,8 @@ static void welcome(void *context, sock_client_t *client) {
     serial_queue_init(&channel->queue, hold_us(self));
 }
 
-/// Called once or oftener: who has gone holds no lease. Who only asks gets the answers it waits for.
+/// Called once or more often: a client that is gone holds no lease. A client that only reads still receives its
+/// replies.
 static void leave(void *context, sock_client_t *client) {
     relay_channel_t *channel = channel_of((relay_t *)context, client);
     if (channel != NULL && channel->granted) {
@@ -76,7 +77,7 @@ static void leave(void *context, sock_client_t *client) {
     }
 }
 
-/// A refusal takes its turn among the answers.
+/// Queues a refusal in the order of the replies.
 static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_t error, const char *message) {
     serial_request_t *place = serial_queue_place(&channel->queue);
     *place = (serial_request_t){.state = SERIAL_ANSWERED, .id = *id, .error = error};
@@ -86,7 +87,8 @@ static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_
     serial_queue_put(&channel->queue);
 }
 
-/// Puts what a command quotes before the rest of it; its length, 0 also if no stamp had been heard by then.
+/// Writes the quote of a command before its other fields. Returns the length; 0 also if there was no stamp at that
+/// time.
 static size_t write_quoted(relay_t *self, const serial_request_t *request, size_t length, char *json) {
     iwn_quote_t quote = {.seq = request->number};
     char plain[SERIAL_JSON_MAX];
@@ -98,7 +100,7 @@ static size_t write_quoted(relay_t *self, const serial_request_t *request, size_
     return iwn_quote_write(&quote, plain, length, json, SERIAL_JSON_MAX);
 }
 
-/// Why a request that came then is not sent any more; NULL: it is.
+/// Returns the reason why a request from that time is no longer sent; NULL if it is sent.
 static const char *too_late(const relay_t *self, const relay_channel_t *channel, serial_kind_t kind, uint64_t came_us) {
     if (kind != SERIAL_MOVES && kind != SERIAL_GRANTS) {
         return NULL;
@@ -164,14 +166,14 @@ static void carry_out(void *context, sock_client_t *client, const char *line, si
         const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
         forward(self, channel, &request, iwn_json_root(line), sock_client_sent_us(client, self->now_us, since_us));
     }
-    client->held = serial_queue_is_full(&channel->queue); // The next line stays where it is.
+    client->held = serial_queue_is_full(&channel->queue); // The next line stays in the socket.
 }
 
 sock_handler_t relay_handler(relay_t *self) {
     return (sock_handler_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
 }
 
-/// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
+/// Passes a reply: `rest` is the part after `ok` in the board's reply, and the client receives it with its own id.
 static void pass_reply(relay_t *self, sock_client_t *owner, const serial_request_t *request, const char *rest,
                        size_t length) {
     sock_client_t *client = relay_guest_or(self, owner, request);
@@ -203,7 +205,7 @@ static void tell_answered(relay_t *self, relay_channel_t *channel, sock_client_t
     }
 }
 
-/// The text goes on behind what stands in `*at` and is `words`.
+/// Advances `*at` if the text there is `words`.
 static bool skip(const char **at, const char *end, const char *words) {
     const size_t length = strlen(words);
     const bool there = (size_t)(end - *at) >= length && memcmp(*at, words, length) == 0;
@@ -211,7 +213,7 @@ static bool skip(const char **at, const char *end, const char *words) {
     return there;
 }
 
-/// `{"id":17,"ok":true`: the number, and whether it says yes; `*at` is behind it.
+/// Reads `{"id":17,"ok":true`: the number and the result. `*at` is then after it.
 static bool read_reply(const char **at, const char *end, uint64_t *out_number, bool *out_ok) {
     *out_number = 0;
     if (!skip(at, end, "{\"id\":")) {
@@ -233,7 +235,7 @@ static void take_reply(relay_t *self, relay_channel_t *channel, sock_client_t *c
     bool ok;
     if (!read_reply(&at, end, &number, &ok) ||
         !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
-        return; // It was given up, and its client told so.
+        return; // The request was given up, and its client informed.
     }
     if (number == channel->arm_number) {
         channel->armed_us = self->now_us;
@@ -256,7 +258,7 @@ void relay_take_line(relay_t *self, const iwn_line_t *line) {
     const bool hello = begins(line, "{\"event\":\"hello\"");
     if (client == NULL || (channel->state != RELAY_WELCOMED && !hello) ||
         line->length + 1U > sizeof self->clients.line) {
-        return; // Of whoever had this channel before.
+        return; // The event is for the former client of this channel.
     }
     if (begins(line, "{\"id\":")) {
         take_reply(self, channel, client, line);
@@ -285,7 +287,7 @@ void relay_drop_clients(relay_t *self) {
         drop_client(self, &self->channel[i]);
     }
     if (self->out_sent == 0U) {
-        self->out_length = 0; // Half a line is ended, or the next one would be lost too.
+        self->out_length = 0; // An incomplete line is ended, or the next one would be lost too.
     }
 }
 
@@ -307,7 +309,7 @@ static void poll_channel(relay_t *self, relay_channel_t *channel) {
         return;
     }
     tell_answered(self, channel, client);
-    client->owed = channel->queue.count > 0U; // Who has said all it has to say is kept for its answers.
+    client->owed = channel->queue.count > 0U; // A client that has ended stays for its replies.
     if (client->held && !serial_queue_is_full(&channel->queue)) {
         client->held = false;
         sock_client_check_caught_up(client, self->now_us);
@@ -339,7 +341,7 @@ static size_t write_line(uint8_t channel, const char *json, size_t length, char 
     return iwn_line_write(&(iwn_line_t){.channel = channel, .json = json, .length = length}, out, size);
 }
 
-/// Coming and going goes before everything else.
+/// Opening and closing of channels precede everything else.
 static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
     char json[64];
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {

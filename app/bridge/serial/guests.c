@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A request as it goes over the line; and clients beyond the maximum, which have no channel of it: their stops go by those of others.
+// Requests on the line, and clients beyond the maximum, which have no channel: their stop requests use the channels of
+// others.
 #include "relay.h"
 
 size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size) {
@@ -19,7 +20,7 @@ size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t 
     return (text.length + 1U < size) ? text.length : 0U;
 }
 
-/// The open channel with the fewest requests; NULL: none has room.
+/// Returns the open channel with the fewest requests; NULL if none has room.
 static relay_channel_t *quietest_channel(relay_t *self) {
     relay_channel_t *found = NULL;
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
@@ -33,7 +34,7 @@ static relay_channel_t *quietest_channel(relay_t *self) {
     return found;
 }
 
-/// A stop of a client for which there is no channel goes by another's.
+/// Sends a stop request of a client without a channel on the channel of another client.
 static bool forward_stop(relay_t *self, sock_client_t *client, const iwn_request_t *asked, iwn_json_t root) {
     relay_channel_t *channel = quietest_channel(self);
     if (channel == NULL) {
@@ -47,7 +48,7 @@ static bool forward_stop(relay_t *self, sock_client_t *client, const iwn_request
         return false;
     }
     serial_queue_put(&channel->queue);
-    client->owed = true; // Until the board has answered, or its time is over.
+    client->owed = true; // Until the board has answered, or its time has expired.
     return true;
 }
 

@@ -9,12 +9,12 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-/// Asks the board who it is, for two seconds.
+/// Asks the board for its identity for two seconds.
 static int check(const serial_settings_t *settings, relay_t *relay) {
     serial_port_t port;
     serial_link_t *link = &relay->link;
     char words[512];
-    char ask[64] = "\n"; // Half a line of before ends here.
+    char ask[64] = "\n"; // Ends an incomplete line.
     const iwn_line_t question = {.json = RELAY_ASK, .length = sizeof RELAY_ASK - 1U};
     const size_t length = 1U + iwn_line_write(&question, &ask[1], sizeof ask - 1U);
     (void)puts("ok    configuration");

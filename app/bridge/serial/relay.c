@@ -12,16 +12,16 @@
 #include <sys/signalfd.h>
 #include <sysexits.h>
 
-/// Every descriptor at once, so that one that is not told of has nothing to tell.
+/// One event per descriptor, so that a descriptor without an event has nothing to read.
 #define EVENTS_PER_WAIT (SOCK_CLIENTS_MAX + 6)
-/// Read of the port in one cycle.
+/// Number of reads of the port in one cycle.
 #define READS_PER_CYCLE 4U
-/// What waits in the kernel's buffer on purpose, so that the line never pauses: it is as old as that when it leaves.
+/// Largest time of bytes in the kernel's buffer, so that the line never pauses: a line is that old when it is sent.
 #define AHEAD_US 2000U
-/// Of opening the port again.
+/// Interval of attempts to open the port.
 #define BACKOFF_MIN_US 100000U
 #define BACKOFF_MAX_US 2000000U
-/// As rarely the loop comes round when there is nothing to do.
+/// Longest wait of the loop.
 #define IDLE_US 1000000U
 
 static void watch_port(relay_t *self, int operation) {
@@ -30,7 +30,7 @@ static void watch_port(relay_t *self, int operation) {
     (void)epoll_ctl(self->clients.epoll_fd, operation, self->port.fd, &interest);
 }
 
-/// For clients that come, and for the log unless it has been said.
+/// Sets the reason for clients that connect, and logs it if it is new.
 static void set_trouble(relay_t *self, const char *words) {
     if (strcmp(self->trouble, words) != 0) {
         (void)snprintf(self->trouble, sizeof self->trouble, "%s", words);
@@ -38,9 +38,9 @@ static void set_trouble(relay_t *self, const char *words) {
     }
 }
 
-/// It will be opened again, later each time until a board answers.
+/// Closes the port and opens it again later, with a longer delay each time until a board answers.
 static void lose_port(relay_t *self, const char *words) {
-    serial_port_close(&self->port); // Which takes it out of the epoll set.
+    serial_port_close(&self->port); // This also removes it from the epoll set.
     relay_drop_clients(self);
     serial_link_init(&self->link, self->now_us);
     self->out_length = 0;
@@ -50,7 +50,7 @@ static void lose_port(relay_t *self, const char *words) {
     set_trouble(self, words);
 }
 
-/// 0, or the errno of opening it.
+/// Opens the port. Returns 0 or the errno.
 static int open_port(relay_t *self) {
     char why[512];
     const int error =
@@ -63,14 +63,14 @@ static int open_port(relay_t *self) {
     serial_trouble_begin(&self->judged, self->now_us);
     self->asked_us = 0;
     self->free_us = self->now_us;
-    memcpy(self->out, "\n", 1); // Ends half a line of whoever wrote before.
+    memcpy(self->out, "\n", 1); // Ends an incomplete line of another program.
     self->out_length = 1;
     self->out_sent = 0;
     watch_port(self, EPOLL_CTL_ADD);
     return 0;
 }
 
-/// The board is there, or has started anew: whoever was served by the one of before is closed.
+/// The board has answered, or has restarted: clients of the board before are closed.
 static void greet(relay_t *self) {
     sock_log(&self->log, SOCK_LOG_INFO, "board on %s: start %s, version %s", self->settings->board.port,
              self->link.boot, (self->link.version[0] != '\0') ? self->link.version : "unknown");
@@ -117,7 +117,7 @@ static void read_port(relay_t *self) {
     }
 }
 
-/// Why no board answers, by the bytes since the last time. The log gets each loss of a board that was there.
+/// Sets the reason why no board answers, by the bytes since the last time. The log gets each loss of a board.
 static void explain(relay_t *self, bool fell_silent) {
     const serial_place_t place = {self->settings->board.port, self->settings->board.baud};
     const serial_report_t report = serial_trouble_judge(&self->judged, &self->link.noise, self->now_us);
@@ -139,12 +139,12 @@ static void poll_link(relay_t *self) {
         (self->port.fd >= 0 && self->link.state == SERIAL_SILENT && self->now_us >= self->judged.judge_us)) {
         explain(self, fell_silent);
     }
-    if (fell_silent) { // Its clients are told why.
+    if (fell_silent) { // Its clients are informed.
         relay_drop_clients(self);
     }
 }
 
-/// Writes what is to be written, as far as it goes; a new line only when the ones before have left.
+/// Writes as far as possible; a new line only when the lines before have been sent.
 static void write_port(relay_t *self) {
     const bool waited = self->out_length > 0U;
     while (self->port.fd >= 0) {
@@ -168,7 +168,7 @@ static void write_port(relay_t *self) {
         }
         self->out_sent += (size_t)count;
         if (self->out_sent < self->out_length) {
-            break; // Full: its next room wakes us.
+            break; // The buffer is full; room in it wakes the loop.
         }
         self->out_length = 0;
     }
@@ -177,7 +177,7 @@ static void write_port(relay_t *self) {
     }
 }
 
-/// What the kernel holds back for so long is old by now, and so is all that would follow it.
+/// Bytes that the kernel holds for so long are old, and so are all bytes after them.
 static void poll_port(relay_t *self) {
     if (self->port.fd < 0 && self->now_us >= self->retry_us) {
         (void)open_port(self);
@@ -216,7 +216,7 @@ static uint64_t earlier(uint64_t a_us, uint64_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-/// When the loop must come round by itself.
+/// Returns the time of the next action without input.
 static uint64_t next_us(const relay_t *self) {
     const bool busy = sock_clients_count(&self->clients) > 0U;
     uint64_t then_us = self->now_us + (busy ? RELAY_ALIVE_US / 2U : IDLE_US);
@@ -232,7 +232,7 @@ static uint64_t next_us(const relay_t *self) {
     return waits ? earlier(then_us, self->free_us - AHEAD_US) : then_us;
 }
 
-/// The loop was away: what its clients sent meanwhile must not be taken for new.
+/// Handles a loop that was delayed: requests that arrived in the meantime must not count as new.
 static void judge_gap(relay_t *self) {
     if (self->planned_us == 0U || self->now_us <= self->planned_us + RELAY_GAP_US) {
         return;
@@ -249,7 +249,7 @@ static void judge_gap(relay_t *self) {
     }
 }
 
-/// True if somebody wants to be let in.
+/// Returns true if a connection waits.
 static bool note_event(relay_t *self, const struct epoll_event *event, bool *out_end) {
     switch (event->data.u64) {
     case SOCK_TAG_SIGNAL:
@@ -273,7 +273,7 @@ static bool note_event(relay_t *self, const struct epoll_event *event, bool *out
     }
 }
 
-/// The clients are read before the board: a stamp that came while a command waited is not quoted by it.
+/// Reads the clients before the board, so that a command never quotes a stamp that arrived while it waited.
 static void cycle(relay_t *self, bool somebody_knocks) {
     sock_service_clients(&self->clients, IW_CLIENT_NONE);
     if (self->port.fd >= 0) {
@@ -303,7 +303,7 @@ static int loop(relay_t *self) {
             if (errno != EINTR) {
                 return EX_SOFTWARE;
             }
-            continue; // It has found nothing out: what waits is not to be taken for new.
+            continue; // The wait has no result: waiting bytes must not count as new.
         }
         self->now_us = iwl_clock_now_us();
         self->clients.now_us = self->now_us;
@@ -337,7 +337,7 @@ static int open_sockets(relay_t *self) {
 }
 
 static void compose(relay_t *self, const serial_settings_t *settings) {
-    (void)signal(SIGPIPE, SIG_IGN); // Before the first line of the log, whose reader may be gone.
+    (void)signal(SIGPIPE, SIG_IGN); // Before the first log line, whose reader may be gone.
     memset(self, 0, sizeof *self);
     self->settings = settings;
     self->port.fd = -1;
@@ -355,11 +355,12 @@ static void compose(relay_t *self, const serial_settings_t *settings) {
     self->log.program = "iwheel-serial";
 }
 
-/// The port first: who cannot have it must not take the sockets either. One that is not there yet may come.
+/// Opens the port first: a relay that cannot have the port must not take the sockets. A port that does not exist yet is
+/// awaited.
 static int open_all(relay_t *self) {
     int result = open_loop(self);
     if (result == 0 && open_port(self) == EBUSY) {
-        return EX_UNAVAILABLE; // Has been said.
+        return EX_UNAVAILABLE; // The reason was printed.
     }
     return result;
 }
@@ -380,7 +381,7 @@ int relay_run(relay_t *self, const serial_settings_t *settings) {
         result = loop(self);
         bridge_service_tell(&self->service, "STOPPING=1");
         relay_drop_clients(self);
-        write_port(self); // As far as it goes: the board also ends who says nothing.
+        write_port(self); // As far as possible: the board also ends clients after silence.
         sock_service_close_all(&self->clients);
     }
     serial_port_close(&self->port);

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// Its stamps are worth nothing any more.
+/// The stamps are void.
 static void fall_silent(serial_link_t *self) {
     self->state = SERIAL_SILENT;
     self->stamps = 0;
@@ -22,7 +22,8 @@ static serial_stamp_t *newest(serial_link_t *self) {
     return &self->stamp[(self->stamps - 1U) % SERIAL_STAMPS];
 }
 
-/// Of stamps that come close together the newest is kept only once another is far enough away: the ring reaches back.
+/// Of stamps that arrive close together, stores the newest one only when another is far enough away, so that the ring
+/// covers more time.
 static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
     const bool close =
         self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].received_us < SERIAL_STAMP_US;
@@ -45,7 +46,7 @@ static bool is_boot(const char *text) {
     return strlen(text) == IWN_LINE_BOOT && strspn(text, "0123456789abcdef") == IWN_LINE_BOOT;
 }
 
-/// The event `link`. A boot that differs is another board, or the same after a reset.
+/// Handles the event `link`. Another boot id is another board, or the same after a reset.
 static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
     char boot[IWN_LINE_BOOT + 1U];
     iwn_json_t value;
@@ -72,7 +73,7 @@ static void take_complaint(serial_link_t *self, iwn_json_t event) {
     }
 }
 
-/// Channel 0.
+/// Handles channel 0.
 static serial_news_t take_event(serial_link_t *self, iwn_json_t event) {
     iwn_json_t name;
     if (!iwn_json_find(event, "event", &name)) {
@@ -100,7 +101,7 @@ static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t n
     }
     self->received_us = now_us;
     serial_link_forget_noise(self);
-    // A board's time falls when it starts anew, whatever it says of itself.
+    // The time of a board decreases when it restarts, whatever it reports.
     const bool fell = self->state == SERIAL_LINKED && self->stamps > 0U && line->t_us < newest(self)->t_us;
     if (fell) {
         fall_silent(self);

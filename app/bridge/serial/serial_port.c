@@ -32,7 +32,8 @@ bool serial_port_has_baud(uint32_t baud) {
     return speed_of(baud) != B0;
 }
 
-/// A line of /proc/locks, such as "1: FLOCK  ADVISORY  WRITE 4711 00:1c:23 0 EOF": who locks this file; 0: it is another line.
+/// Parses a line of /proc/locks, such as "1: FLOCK  ADVISORY  WRITE 4711 00:1c:23 0 EOF". Returns the process that
+/// locks this file; 0 if the line is about another file.
 static long holder_in(char *line, const struct stat *status) {
     char *rest = line;
     char *word[6];
@@ -51,7 +52,7 @@ static long holder_in(char *line, const struct stat *status) {
     return ours ? strtol(word[4], NULL, 10) : 0;
 }
 
-/// The process that holds the lock of this port, by the kernel's list; 0: it cannot be told.
+/// Returns the process that holds the lock of this port, by the kernel's list; 0 if unknown.
 static long holder_of(const char *path) {
     struct stat status;
     char line[256];
@@ -90,7 +91,7 @@ static int complain(const char *path, int error, char *out_why, size_t size) {
     return error;
 }
 
-/// 8N1, nothing translated, no modem lines: a reset of the board by DTR is not ours to give.
+/// Sets 8N1 without translation and without modem lines: the relay must not reset the board by DTR.
 static int configure(int fd, uint32_t baud) {
     struct termios mode;
     const speed_t speed = speed_of(baud);
@@ -100,7 +101,7 @@ static int configure(int fd, uint32_t baud) {
     cfmakeraw(&mode);
     mode.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS | HUPCL);
     mode.c_cflag |= (tcflag_t)(CLOCAL | CREAD);
-    mode.c_cc[VMIN] = 1; // So that 0 bytes mean a port that has gone.
+    mode.c_cc[VMIN] = 1; // So that 0 bytes mean that the port is gone.
     mode.c_cc[VTIME] = 0;
     if (cfsetispeed(&mode, speed) != 0 || cfsetospeed(&mode, speed) != 0 || tcsetattr(fd, TCSANOW, &mode) != 0 ||
         tcgetattr(fd, &mode) != 0) {
@@ -109,7 +110,8 @@ static int configure(int fd, uint32_t baud) {
     return (cfgetospeed(&mode) == speed) ? 0 : EINVAL; // tcsetattr succeeds if any part of it did.
 }
 
-/// The lock keeps out another relay, whoever it runs as; the exclusive mode everybody but root who opens the port from now on.
+/// The lock excludes another relay of any user. The exclusive mode excludes all programs except those of root that open
+/// the port later.
 static int claim(int fd) {
     if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
         return errno;
@@ -134,13 +136,13 @@ int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char 
 void serial_port_close(serial_port_t *self) {
     if (self->fd >= 0) {
         (void)ioctl(self->fd, TIOCNXCL);
-        (void)tcflush(self->fd, TCIOFLUSH); // Or the last close waits for a cable that nobody reads.
+        (void)tcflush(self->fd, TCIOFLUSH); // Otherwise the last close waits for a cable without a reader.
         (void)close(self->fd);
         self->fd = -1;
     }
 }
 
-/// What a call has moved; nothing for now is no fault.
+/// Returns the number of bytes of a call. Nothing for now is not an error.
 static ssize_t moved(ssize_t count) {
     return (count >= 0) ? count : (errno == EAGAIN || errno == EINTR) ? 0 : -1;
 }

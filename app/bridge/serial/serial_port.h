@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The serial port: opened for this program alone, set to eight bits without any translation, and written to without ever waiting.
+/// The serial port: opened for this program only, set to eight bits without translation, and written without waiting.
 #ifndef SERIAL_PORT_H
 #define SERIAL_PORT_H
 
@@ -9,22 +9,22 @@
 #include <sys/types.h>
 
 typedef struct {
-    int fd; ///< -1: not open.
+    int fd; ///< Descriptor; -1 if not open.
 } serial_port_t;
 
-/// Opens `path` with this many bits a second. 0; or an errno, with cause and cure in `out_why`: EBUSY means that another program
-/// has it. What waits in it is thrown away.
+/// Opens `path` with this bit rate. Returns 0, or an errno with cause and fix in `out_why`. EBUSY: another program has
+/// it. Waiting bytes are dropped.
 int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size);
 void serial_port_close(serial_port_t *self);
 
-/// Bytes, 0 if there are none for now, -1 if the port has gone.
+/// Returns the number of bytes, 0 if there are none now, -1 if the port is gone.
 ssize_t serial_port_read(const serial_port_t *self, char *out, size_t size);
 ssize_t serial_port_write(const serial_port_t *self, const char *bytes, size_t length);
 
-/// Throws away what the kernel has not sent yet.
+/// Drops the bytes that the kernel has not sent yet.
 void serial_port_discard(const serial_port_t *self);
 
-/// True if a port can be set to this rate.
+/// Returns true if a port can be set to this rate.
 bool serial_port_has_baud(uint32_t baud);
 
 #endif

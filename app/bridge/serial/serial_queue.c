@@ -26,7 +26,7 @@ bool serial_queue_is_full(const serial_queue_t *self) {
     return self->count == SERIAL_QUEUE_SIZE;
 }
 
-/// The one at this place, counted from the oldest.
+/// Returns the request at this place, counted from the oldest.
 static serial_request_t *at(serial_queue_t *self, unsigned index) {
     return &self->ring[(self->first + index) % SERIAL_QUEUE_SIZE];
 }
@@ -41,7 +41,7 @@ static void refuse(serial_request_t *request, iwn_error_t error, const char *rea
     request->reason = reason;
 }
 
-/// What waits and could move the wheels, or could not be told from such a thing later, gives way.
+/// Replaces waiting requests that could move the wheels, or that could later be mistaken for such a request.
 static void overtake(serial_queue_t *self, const serial_request_t *newer) {
     for (unsigned i = 0; i < self->count; i++) {
         serial_request_t *request = at(self, i);
@@ -66,7 +66,7 @@ void serial_queue_put(serial_queue_t *self) {
     self->count++;
 }
 
-/// How long its state may last.
+/// Returns the longest time in the state of a request.
 static uint64_t limit_us(const serial_request_t *request) {
     if (request->state == SERIAL_WAITING && request->kind != SERIAL_ASKS) {
         return (request->kind == SERIAL_MOVES) ? SERIAL_FRESH_US : SERIAL_GRANT_US;
@@ -102,7 +102,7 @@ void serial_queue_age(serial_queue_t *self, uint64_t now_us) {
     }
 }
 
-/// When something happens to one of them by itself.
+/// Returns the time at which a request changes its state without input.
 static uint64_t turn_us(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
     const uint64_t held_us = request->sent_us + self->hold_us;
     if (request->state == SERIAL_SENT && request->kind == SERIAL_STOPS) {
@@ -125,7 +125,7 @@ uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us) {
     return next_us;
 }
 
-/// Those after the last stop wait for answers; those before it go with it.
+/// Returns the requests after the last stop. Those before it end with the stop.
 static unsigned behind_stops(serial_queue_t *self) {
     unsigned end = 0;
     for (unsigned i = 0; i < self->count; i++) {
@@ -136,7 +136,7 @@ static unsigned behind_stops(serial_queue_t *self) {
     return end;
 }
 
-/// A `drive` that has been on its way for so long.
+/// Returns true for a `drive` that has been on the line for this time.
 static bool holds_no_more(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
     return request->kind == SERIAL_MOVES && now_us >= request->sent_us + self->hold_us;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// What may be configured of the relay: share/serial.conf.
+/// Configuration of the relay: share/serial.conf.
 #ifndef SERIAL_SETTINGS_H
 #define SERIAL_SETTINGS_H
 
 #include "config/settings.h"
 
-/// Read when no `-c FILE` is given. Its absence is no error then.
+/// Default file. If it is absent, the defaults apply.
 #define SERIAL_SETTINGS_PATH "/etc/iwheel/serial.conf"
 
 typedef struct {
@@ -18,7 +18,7 @@ typedef struct {
         uint16_t mode;
         char group[33];
         uint32_t max_clients;
-        char watch_socket[SETTINGS_PATH_SIZE]; ///< none: there is none.
+        char watch_socket[SETTINGS_PATH_SIZE]; ///< "none" if there is none.
         uint16_t watch_mode;
         char watch_group[33];
         uint32_t max_watchers;

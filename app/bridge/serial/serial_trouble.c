@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-/// More than one byte in so many that is no text: the baud rate is another.
+/// If more than one byte of this number is not text, the bit rate is another.
 #define ODD_SHARE 8U
 
 void serial_trouble_begin(serial_trouble_t *self, uint64_t now_us) {
@@ -26,7 +26,7 @@ static serial_trouble_kind_t kind_of(const serial_noise_t *noise) {
                                                                                       : SERIAL_TROUBLE_NO_LINE;
 }
 
-/// A change costs a part of the burst. False if nothing is left of it.
+/// Counts a change. Returns false if no more changes may be logged.
 static bool spend(serial_trouble_t *self, uint64_t now_us) {
     const uint64_t from_us = (self->spent_us > now_us) ? self->spent_us : now_us;
     if (from_us > now_us + (uint64_t)(SERIAL_TROUBLE_BURST - 1U) * SERIAL_TROUBLE_REFILL_US) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One request: judged, answered, or passed on to the gateway (web_ask.c).
+// Handles one request: judges it, and answers it or passes it on to the gateway (web_ask.c).
 #include "call.h"
 
 #include <stdlib.h>
@@ -31,8 +31,8 @@ void web_call_resume(web_call_t *self) {
     }
 }
 
-/// Nothing is loaded from elsewhere, nothing frames the page, and nobody is told where a reader came from. Of what the machine does
-/// nothing is kept; the page's files may be, but are asked for each time.
+/// Adds headers: the page loads nothing from other sites, no site frames it, and no referrer is sent. Answers about the
+/// machine are not stored. Files of the page may be stored, but the browser must revalidate them.
 static void add_headers(struct MHD_Response *response, const char *type, bool is_file) {
     static const char *const headers[][2] = {
         {"Content-Security-Policy",
@@ -61,19 +61,19 @@ static enum MHD_Result send_response(const web_call_t *self, unsigned status, st
         (void)MHD_add_response_header(response, "WWW-Authenticate", "IWheel");
     }
     if (status == 400U || status == 413U) {
-        (void)MHD_add_response_header(response, "Connection", "close"); // What follows is no request of its own.
+        (void)MHD_add_response_header(response, "Connection", "close"); // The bytes that follow are not a request.
     }
     const enum MHD_Result result = MHD_queue_response(self->connection, status, response);
     MHD_destroy_response(response);
     return result;
 }
 
-/// `text` may be changed by others afterwards, or belongs to the answer.
+/// Sends `text`: the library copies it or owns it, depending on `mode`.
 static enum MHD_Result send_text(const web_call_t *self, const char *text, size_t length,
                                  enum MHD_ResponseMemoryMode mode) {
     const char *type = (self->verdict.route != NULL) ? self->verdict.route->type : "application/json";
     void *bytes = NULL;
-    memcpy(&bytes, &text, sizeof bytes); // The library takes what it only reads without const.
+    memcpy(&bytes, &text, sizeof bytes); // The parameter of the library is not const, although it only reads.
     return send_response(self, self->status, MHD_create_response_from_buffer(length, bytes, mode), type);
 }
 
@@ -117,7 +117,7 @@ static enum MHD_Result send_challenge(web_call_t *self) {
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }
 
-/// Answered from the newest state: a viewer never asks the gateway anything.
+/// Answers from the newest state: a viewer causes no request to the gateway.
 static enum MHD_Result send_status(web_call_t *self) {
     size_t length = 0;
     const char *text = web_link_status(&self->server->link, self->server->now_us, &length);
@@ -174,7 +174,7 @@ static enum MHD_Result send_stops(web_call_t *self) {
     FILE *out = open_memstream(&text, &length);
     if (out != NULL) {
         (void)fputs("{\"ok\":true,\"stops\":[", out);
-        for (size_t i = 0; i < WEB_STOPS_KEPT && self->server->link.stops[i] != NULL; i++) {
+        for (size_t i = 0; i < WEB_STOPS_STORED && self->server->link.stops[i] != NULL; i++) {
             (void)fprintf(out, "%s%s", (i > 0) ? "," : "", self->server->link.stops[i]);
         }
         (void)fputs("]}\n", out);
@@ -202,7 +202,7 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
     }
     size_t taken = web_reader_take(&self->reader, &server->link.feed, out, size);
     if (taken == 0U && server->now_us - self->told_us >= WEB_PULSE_US && size >= sizeof pulse) {
-        memcpy(out, pulse, sizeof pulse); // Shows both ends that the other is there.
+        memcpy(out, pulse, sizeof pulse); // Shows both ends that the other end is online.
         taken = sizeof pulse;
     }
     if (taken == 0U) {
@@ -256,7 +256,7 @@ static bool has_body(struct MHD_Connection *connection) {
     return header(connection, "Transfer-Encoding") != NULL || (length != NULL && strcmp(length, "0") != 0);
 }
 
-/// Headers of which a second one would be read by some programs and the first by others.
+/// Counts headers that may occur only once: some programs read the first one, others the last one.
 typedef struct {
     unsigned count[4];
     bool has_blank;
@@ -322,7 +322,7 @@ void *web_call_new(void *context, const char *target, struct MHD_Connection *con
     return self;
 }
 
-// NOLINTNEXTLINE(readability-function-size): the library says what it takes.
+// NOLINTNEXTLINE(readability-function-size): the library defines the parameters.
 enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,
                                 const char *version, const char *upload, size_t *upload_size, void **place) {
     web_call_t *self = *place;
@@ -335,7 +335,7 @@ enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection
     }
     if (self->state == WEB_CALL_NEW) {
         begin(self, url, method);
-        // A body is not awaited; all else is answered when the library asks again.
+        // Bodies are refused immediately; other requests are answered when the library calls again.
         return (self->verdict.status != 413U && self->verdict.status != 400U)
                    ? MHD_YES
                    : web_call_refuse(self, self->verdict.status, self->verdict.error, self->verdict.message);

@@ -6,7 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// In one step: what else there is to do must not wait.
+/// Largest number of connections that one step accepts, so that other work does not wait.
 #define AT_ONCE 64U
 
 bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]) {
@@ -19,14 +19,14 @@ bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]) {
     return true;
 }
 
-/// He stays in the library's hands, or is gone.
+/// Removes a guest from the list: the library has the connection, or it is closed.
 static void forget(web_door_t *self, unsigned at) {
     self->count--;
     memmove(&self->guests[at], &self->guests[at + 1U], (self->count - at) * sizeof self->guests[0]);
 }
 
 static void show_out_oldest(web_door_t *self) {
-    (void)close(self->guests[0].fd); // Which takes it out of the epoll, too.
+    (void)close(self->guests[0].fd); // This also removes it from the epoll set.
     forget(self, 0);
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// Where who has connected waits until he says something: so those that say nothing cost a descriptor, and keep nobody out.
+/// Waiting room for new connections until they send something. A connection that sends nothing costs only a descriptor
+/// and keeps no other client out.
 ///
-/// Everybody has WEB_DOOR_GRACE_US to speak. After that the oldest makes room when the room is full; until then newcomers wait in the
-/// kernel's queue, and come in at WEB_DOOR_MAX per grace or faster.
+/// Each connection has WEB_DOOR_GRACE_US to send. After that time the oldest one is closed when the room is full. Until
+/// then new connections wait in the queue of the kernel, so at least WEB_DOOR_MAX are accepted per grace time.
 #ifndef WEB_DOOR_H
 #define WEB_DOOR_H
 
@@ -12,7 +13,7 @@
 #define WEB_DOOR_LISTENERS 2U
 #define WEB_DOOR_MAX       256U
 #define WEB_DOOR_GRACE_US  50000U
-/// Who says nothing is not kept longer, even if there is room.
+/// A connection that sends nothing for this time is closed, even if there is room.
 #define WEB_DOOR_US 5000000U
 
 typedef struct {
@@ -21,27 +22,29 @@ typedef struct {
 } web_guest_t;
 
 typedef struct {
-    int listen_fds[WEB_DOOR_LISTENERS]; ///< -1: there is none.
-    int epoll_fd;                       ///< For poll(): a waiting connection has sent something, or left.
+    int listen_fds[WEB_DOOR_LISTENERS]; ///< -1: none.
+    int epoll_fd;                       ///< For poll(): a waiting connection has sent something or has closed.
     unsigned count;
-    uint64_t crowded_out;             ///< Who made room for others.
-    web_guest_t guests[WEB_DOOR_MAX]; ///< The oldest first.
+    uint64_t crowded_out;             ///< Connections that were closed to make room.
+    web_guest_t guests[WEB_DOOR_MAX]; ///< Oldest first.
 } web_door_t;
 
-/// Owns listening sockets that do not block (-1: none). False, with errno: no room can be made; they are closed.
+/// Takes over listening sockets that do not block (-1: none). Returns false with errno and closes them if there is no
+/// epoll descriptor.
 bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]);
 void web_door_close(web_door_t *self);
 
-/// Lets in who can be let in, and shows out who must go.
+/// Accepts new connections if there is room, and closes those whose time is over.
 void web_door_step(web_door_t *self, uint64_t now_us);
 
-/// Somebody who has spoken, and is no guest any more: a descriptor for the caller. -1: nobody.
+/// Removes a connection that has sent something or has closed, and passes its descriptor to the caller. Returns -1 if
+/// there is none.
 int web_door_take(web_door_t *self);
 
-/// For poll(): there is a newcomer on this listening socket; -1: the room is full.
+/// Returns the descriptor for poll() of this listening socket; -1 if the room is full.
 int web_door_fd(const web_door_t *self, unsigned listener, uint64_t now_us);
 
-/// When `step` has something to do, whatever comes.
+/// Returns the time of the next work of `step` without input.
 uint64_t web_door_next_us(const web_door_t *self, uint64_t now_us);
 
 #endif

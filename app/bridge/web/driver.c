@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// Of the pad: a full turn on the spot in six seconds.
+/// Largest yaw rate of the pad: a full turn on the spot in six seconds.
 #define YAW_MAX_MRAD_S 1000
 
 void web_driver_begin(web_driver_t *self, uint64_t now_us) {

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// Shared by the feed and by the readers that are in the middle of it.
+/// One message, shared by the feed and by readers that are sending it.
 struct web_message {
     unsigned holders;
     size_t length;
@@ -43,7 +43,7 @@ bool web_feed_add(web_feed_t *self, const char *name, const char *json, size_t l
     if (message == NULL) {
         return false;
     }
-    web_message_t **place = is_state ? &self->state : &self->events[self->count % WEB_FEED_KEPT];
+    web_message_t **place = is_state ? &self->state : &self->events[self->count % WEB_FEED_STORED];
     let_go(*place);
     *place = message;
     *(is_state ? &self->states : &self->count) += 1U;
@@ -57,7 +57,7 @@ void web_feed_forget(web_feed_t *self) {
 
 void web_feed_free(web_feed_t *self) {
     web_feed_forget(self);
-    for (size_t i = 0; i < WEB_FEED_KEPT; i++) {
+    for (size_t i = 0; i < WEB_FEED_STORED; i++) {
         let_go(self->events[i]);
         self->events[i] = NULL;
     }
@@ -72,10 +72,10 @@ void web_reader_end(web_reader_t *self) {
     self->sending = NULL;
 }
 
-/// Events before the state: what happened led to it.
+/// Returns the next message. Events precede the state, because they led to it.
 static web_message_t *next(web_reader_t *self, web_feed_t *feed) {
     char json[64];
-    const uint64_t oldest = (feed->count > WEB_FEED_KEPT) ? feed->count - WEB_FEED_KEPT : 0U;
+    const uint64_t oldest = (feed->count > WEB_FEED_STORED) ? feed->count - WEB_FEED_STORED : 0U;
     if (self->event < oldest) {
         const int length =
             snprintf(json, sizeof json, "{\"event\":\"lost\",\"count\":%" PRIu64 "}", oldest - self->event);
@@ -83,7 +83,7 @@ static web_message_t *next(web_reader_t *self, web_feed_t *feed) {
         return make("lost", json, (size_t)length);
     }
     if (self->event < feed->count) {
-        return hold(feed->events[self->event++ % WEB_FEED_KEPT]);
+        return hold(feed->events[self->event++ % WEB_FEED_STORED]);
     }
     if (self->state != feed->states && feed->state != NULL) {
         self->state = feed->states;

@@ -14,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/// Phones refuse a server's certificate that is valid for more than 825 days.
+/// Days of validity. Phones refuse a certificate that is valid for more than 825 days.
 #define DAYS_VALID 820
 #define DAY_S      86400
 #define NAME_SIZE  65U
@@ -26,7 +26,7 @@ static int complain(const char *what, const char *why) {
 }
 
 bool web_lan_address(char out[INET_ADDRSTRLEN]) {
-    // An address for documentation: nothing is sent to it, the kernel only selects the interface.
+    // An address for documentation: the kernel only selects the interface, and no packet is sent.
     struct sockaddr_in there = {.sin_family = AF_INET, .sin_port = htons(9)};
     struct sockaddr_in here = {.sin_family = AF_INET};
     socklen_t size = sizeof here;
@@ -48,7 +48,7 @@ static void host_name(char out[NAME_SIZE]) {
     out[NAME_SIZE - 1U] = '\0';
 }
 
-/// Next to its place first, then moved: no program reads half of it. Only its owner may read it.
+/// Writes a new file and renames it, so that no program reads an incomplete file. Only the owner may read it.
 static bool write_file(const char *path, const gnutls_datum_t *data) {
     char beside[128];
     (void)snprintf(beside, sizeof beside, "%s.new", path);
@@ -61,7 +61,7 @@ static bool write_file(const char *path, const gnutls_datum_t *data) {
     return written && rename(beside, path) == 0;
 }
 
-/// Names and addresses by which a browser may call this machine.
+/// Adds the names and addresses by which a browser may call this machine.
 static int name_subject(gnutls_x509_crt_t certificate) {
     char name[NAME_SIZE];
     char local[NAME_SIZE + 6U];
@@ -131,7 +131,7 @@ static int make_pair(const web_settings_t *settings) {
     return code;
 }
 
-/// True if there is a certificate that is not over yet. The bridge judges itself whether the key fits.
+/// Returns true if there is a certificate that has not expired. The start of the bridge checks whether the key matches.
 static bool is_good(const web_settings_t *settings) {
     gnutls_datum_t text = {NULL, 0};
     gnutls_x509_crt_t certificate = NULL;
@@ -146,10 +146,10 @@ static bool is_good(const web_settings_t *settings) {
     return good;
 }
 
-/// `names` of the configuration stay; the machine's own is one more.
+/// Adds the names of this machine to `hosts` of the configuration.
 static void add_host(web_settings_t *settings) {
     char name[NAME_SIZE];
-    char all[sizeof settings->web.hosts + 2U * NAME_SIZE + 16U];
+    char all[sizeof settings->web.hosts + 2U * (size_t)NAME_SIZE + 16U];
     host_name(name);
     (void)snprintf(all, sizeof all, "%s %s %s.local", web_settings_hosts(settings), name, name);
     if (strlen(all) < sizeof settings->web.hosts) {

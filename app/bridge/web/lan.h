@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// `--lan`: the page for phones of the same network, with a certificate of its own. It changes where the bridge listens, never what it permits.
+/// `--lan`: the page for phones in the same network, with its own certificate. It changes where the bridge listens, not
+/// what it permits.
 #ifndef WEB_LAN_H
 #define WEB_LAN_H
 
@@ -7,11 +8,11 @@
 
 #include <netinet/in.h>
 
-/// Lets the page be reached by IPv4 from other machines. A certificate that the configuration names stays; else one is made next to the
-/// token, once, and again when it is over. 0, or an exit code with a line on stderr.
+/// Opens the page to other machines by IPv4. A configured certificate is used; otherwise a certificate is made next to
+/// the token, and made again when it has expired. Returns 0, or an exit code with a line on stderr.
 int web_lan_prepare(web_settings_t *settings);
 
-/// The address by which other machines reach this one; false: there is none.
+/// Writes the address by which other machines reach this machine. Returns false if there is none.
 bool web_lan_address(char out[INET_ADDRSTRLEN]);
 
 #endif

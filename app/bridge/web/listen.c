@@ -15,7 +15,7 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-/// The first descriptor that systemd passes (sd_listen_fds(3)).
+/// First descriptor that systemd passes (sd_listen_fds(3)).
 #define FIRST_FD 3
 
 static int complain(const char *what, const char *fix) {
@@ -35,7 +35,7 @@ static int listen_unix(const char *path) {
     const int other = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (connect(other, (const struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED &&
         is_socket(path)) {
-        (void)unlink(path); // Left behind by a bridge that was killed. A file or a link is not ours, and stays.
+        (void)unlink(path); // Left by a bridge that was killed. A regular file or a link stays.
     }
     (void)close(other);
     const mode_t before = umask(0117);
@@ -100,7 +100,7 @@ static int listen_tcp(const char *text, uint32_t port) {
     return fd;
 }
 
-/// The addresses that must be ours: that of `listen`, and of loopback both families. Returns how many.
+/// Writes the addresses that the page needs: `listen`, and for loopback both families. Returns their number.
 static unsigned wanted(const web_settings_t *settings, const char *out[WEB_DOOR_LISTENERS]) {
     const char *listen = settings->web.listen;
     const bool loopback = strcmp(listen, "127.0.0.1") == 0 || strcmp(listen, "::1") == 0;
@@ -109,7 +109,7 @@ static unsigned wanted(const web_settings_t *settings, const char *out[WEB_DOOR_
     return loopback ? 2U : 1U;
 }
 
-/// Without IPv6 no process can bind its loopback.
+/// Returns true if IPv6 is missing: then no process can bind its loopback.
 static bool has_none(int error) {
     return error == EAFNOSUPPORT || error == EADDRNOTAVAIL;
 }
@@ -139,7 +139,7 @@ static unsigned count_passed(void) {
     return (count > 0 && count < 100) ? (unsigned)count : 0U;
 }
 
-/// The passed socket that listens on this address, by the kernel's word; -1: there is none.
+/// Returns the passed socket that listens on this address, as the kernel reports; -1 if there is none.
 static int find_passed(unsigned count, const char *text, uint32_t port) {
     address_t address;
     (void)make_address(text, port, &address);
@@ -156,7 +156,7 @@ static int find_passed(unsigned count, const char *text, uint32_t port) {
     return -1;
 }
 
-/// True if no socket can have the loopback of IPv6: systemd leaves it out then.
+/// Returns true if no socket can bind the IPv6 loopback: systemd then omits it.
 static bool lacks_v6(const web_settings_t *settings) {
     const int fd = listen_tcp("::1", settings->web.port);
     if (fd >= 0) {

@@ -23,7 +23,7 @@ static bool is_dark(const QRcode *code, int x, int y) {
 }
 #endif
 
-/// Two rows of squares in one of characters: upper and lower half blocks, dark on light whatever the terminal's colours.
+/// Prints a QR code: one line of characters has two rows of squares, as half blocks, dark on light in any terminal.
 static void print_qr(const char *text) {
 #ifdef IWHEEL_WEB_QR
     QRcode *code = (isatty(STDOUT_FILENO) == 1) ? QRcode_encodeString(text, 0, QR_ECLEVEL_L, QR_MODE_8, 1) : NULL;
@@ -117,7 +117,7 @@ static int loop(web_server_t *server) {
     }
 }
 
-/// `shows`: the address for a phone, with the token, as soon as it can be reached there.
+/// Runs the bridge. `shows`: prints the address for a phone, with the token, as soon as the bridge listens.
 static int run(const web_settings_t *settings, bool shows) {
     static web_server_t server;
     bridge_service_take_signals();

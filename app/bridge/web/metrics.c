@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// One figure, in the base units of OpenMetrics: the gateway's whole number divided by 10 to the power of `digits`.
+/// One metric in the base units of OpenMetrics: the integer of the gateway divided by 10 to the power of `digits`.
 typedef struct {
     const char *path;
     const char *name;
@@ -94,7 +94,7 @@ static void write_figure(const iwc_message_t *state, const figure_t *figure, boo
     }
 }
 
-/// A set of words of which one is true.
+/// Writes a set of words, one of which is true.
 static void write_words(const iwc_message_t *state, const char *path, const char *name, const char *const *words,
                         FILE *out) {
     write_head(out, name, "stateset", path);
@@ -103,7 +103,7 @@ static void write_words(const iwc_message_t *state, const char *path, const char
     }
 }
 
-/// The next whole number of a list, or -1 at its end.
+/// Returns the next integer of a list, or -1 at its end.
 static int64_t next_in_list(const char **at, const char *end) {
     while (*at < end && (**at < '0' || **at > '9')) {
         (*at)++;
@@ -180,7 +180,7 @@ static void write_state(const iwc_message_t *state, FILE *out) {
     write_gaps(state, out);
 }
 
-/// Every cause from the start, so that the first stop is an increase.
+/// Writes every cause from the start, so that the first stop is an increase.
 static void write_stops(const web_tally_t *stops, FILE *out) {
     static const char name[] = "iwheel_stops";
     write_head(out, name, "counter",

@@ -10,7 +10,7 @@
 #include <strings.h>
 
 #define FILE_MAX 1000000L
-/// CRC-32 and length of the unpacked bytes, at the end of what gzip makes (RFC 1952).
+/// Size of the CRC-32 and length of the unpacked bytes at the end of a gzip file (RFC 1952).
 #define GZIP_TRAILER 8U
 
 char *page_read_all(const char *path, size_t *out_length) {
@@ -30,7 +30,7 @@ char *page_read_all(const char *path, size_t *out_length) {
     return (fitting != NULL) ? fitting : text;
 }
 
-/// Without a tag the browser asks for the whole file each time.
+/// Sets the tag. Without a tag the browser reads the whole file each time.
 static void make_tag(page_body_t *self) {
     unsigned char sum[32];
     self->tag[0] = '\0';
@@ -84,7 +84,7 @@ void page_file_free(page_file_t *self) {
     *self = (page_file_t){.plain = {.text = NULL}};
 }
 
-/// True if this entry of Accept-Encoding is gzip with a weight above 0.
+/// Returns true if this entry of Accept-Encoding is gzip with a weight above 0.
 static bool is_gzip(const char *entry, size_t length) {
     static const char name[] = "gzip";
     const size_t word = strcspn(entry, " \t;,");

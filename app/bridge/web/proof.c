@@ -51,7 +51,8 @@ static web_session_t *find(web_proofs_t *self, const char *id) {
     return NULL;
 }
 
-/// A place for a new session. A session whose first nonce may still count keeps its place, or its first request could come again.
+/// Returns a place for a new session. A session whose first nonce may still be valid keeps its place, because its first
+/// request could otherwise be repeated.
 static web_session_t *find_place(web_proofs_t *self, uint64_t now_us) {
     web_session_t *oldest = &self->sessions[0];
     for (size_t i = 0; i < WEB_SESSIONS; i++) {
@@ -71,7 +72,7 @@ static bool is_fresh(web_proofs_t *self, const char *nonce, uint64_t now_us) {
            (bridge_secret_is(self->nonce[0], nonce) || bridge_secret_is(self->nonce[1], nonce));
 }
 
-/// Each number once, and none that is older than the window.
+/// Accepts each number once, and none that is older than the window.
 static bool count_up(web_session_t *self, uint64_t sequence) {
     if (sequence > self->newest) {
         const uint64_t by = sequence - self->newest;

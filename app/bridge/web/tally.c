@@ -18,7 +18,7 @@ static unsigned cause_of(const iwc_message_t *stop) {
     return IW_CAUSE_NONE;
 }
 
-/// Stops between the last one and this one. After a new start the gateway counts from 1.
+/// Returns the number of stops between the last one and this one. After a restart the gateway counts from 1.
 static uint64_t count_missed(const web_tally_t *self, int64_t number) {
     return (uint64_t)((number > self->number) ? number - self->number - 1 : number - 1);
 }

@@ -13,7 +13,7 @@ static bool complain(const web_token_t *self, const char *what, FILE *err) {
     return false;
 }
 
-/// Beside its place first, then moved: nobody ever reads half of it.
+/// Writes a new file and renames it, so that no program reads an incomplete file.
 static bool make(const web_token_t *self, FILE *err) {
     char token[WEB_TOKEN_SIZE];
     char beside[128];
@@ -56,7 +56,7 @@ static int open_file(const web_token_t *self) {
     return open(self->path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
 }
 
-/// The same of one that is in force, made if it must be. -1 after a complaint.
+/// Opens the token file, and makes a new one if necessary. Returns -1 after a complaint.
 static int open_in_force(const web_token_t *self, FILE *err) {
     struct stat status = {0};
     int file = open_file(self);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a request asks of the gateway: questions, stops, and the lease of the person who drives.
+// Requests to the gateway: questions, stops, and the lease of the person who drives.
 #include "call.h"
 
 #include <inttypes.h>
@@ -21,7 +21,8 @@ static void keep(web_call_t *self, unsigned status, const char *before, const ch
     }
 }
 
-/// The reply has the key: the gateway's, or the bridge's where the gateway (a board) has no random numbers.
+/// Starts driving. The reply contains the key: that of the gateway, or that of the bridge if the gateway (a board) has
+/// no random numbers.
 static void begin_driving(web_call_t *self, const iwc_message_t *reply) {
     char key[BRIDGE_SECRET_SIZE];
     char before[BRIDGE_SECRET_SIZE + 16U];
@@ -50,7 +51,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
     web_call_resume(self);
 }
 
-/// Ends the wait of a suspended call, if the gateway could not be asked.
+/// Ends the wait of a suspended call if the gateway cannot be asked.
 static enum MHD_Result went_out(web_call_t *self, bool asked) {
     static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"";
     char text[256];
@@ -63,7 +64,7 @@ static enum MHD_Result went_out(web_call_t *self, bool asked) {
 }
 
 static enum MHD_Result ask(web_call_t *self, const char *request) {
-    web_call_suspend(self); // First: the answer may be there immediately.
+    web_call_suspend(self); // First, because the answer may arrive immediately.
     return went_out(self,
                     bridge_link_ask(&self->server->link.gateway, request, take_answer, self, self->server->now_us));
 }
@@ -83,12 +84,12 @@ static enum MHD_Result ask_recording(web_call_t *self) {
     return ask(self, request);
 }
 
-/// The name of a page, for messages.
+/// Writes the name of a page for messages.
 static void name_of(const web_call_t *self, char out[BRIDGE_NAME_SIZE]) {
     (void)snprintf(out, BRIDGE_NAME_SIZE, "web page %" PRIu64, self->session);
 }
 
-/// Why it does not count by its age; NULL: it counts.
+/// Returns why the age of the request is not valid; NULL if it is valid.
 static const char *age_wrong(const web_call_t *self, int64_t *out_t_us) {
     const char *boot = web_call_argument(self, "boot");
     if (boot == NULL || strcmp(boot, self->server->boot) != 0) {
@@ -103,7 +104,7 @@ static enum MHD_Result refuse_stick(web_call_t *self, const char *who) {
     return web_call_refuse(self, 409, "stale_command", text);
 }
 
-/// The source of this bridge that sent a nonzero command just now; NULL: there is none.
+/// Returns the source of this bridge that sent a nonzero command just now; NULL if there is none.
 static const char *who_moves(const web_call_t *self, const char *except) {
     const web_server_t *server = self->server;
     iwc_message_t state;
@@ -134,7 +135,7 @@ static enum MHD_Result ask_arm(web_call_t *self) {
     if (result == BRIDGE_LEASE_BUSY) {
         return web_call_refuse(self, 409, "busy", "another page is asking for the lease; try again");
     }
-    web_call_suspend(self); // First: the answer may be there immediately.
+    web_call_suspend(self); // First, because the answer may arrive immediately.
     return went_out(self, result == BRIDGE_LEASE_OK);
 }
 
@@ -158,12 +159,12 @@ static enum MHD_Result ask_drive(web_call_t *self) {
     }
     (void)snprintf(request, sizeof request, "{\"cmd\":\"twist\",\"v_mm_s\":%d,\"yaw_mrad_s\":%d}", (int)twist.v_mm_s,
                    (int)twist.yaw_mrad_s);
-    web_call_suspend(self); // First: the answer may be there immediately.
+    web_call_suspend(self); // First, because the answer may arrive immediately.
     return went_out(self, bridge_lease_drive(&server->link.lease, key, request, (bridge_asker_t){take_answer, self},
                                              server->now_us) == BRIDGE_LEASE_OK);
 }
 
-/// A reset clears the stop that its person saw, and no later one.
+/// A reset clears the stop that the person saw, and no later one.
 static enum MHD_Result ask_reset(web_call_t *self) {
     char request[128];
     int64_t t_us = 0;
@@ -187,7 +188,7 @@ static enum MHD_Result ask_reset(web_call_t *self) {
 
 static enum MHD_Result ask_stop(web_call_t *self) {
     const bool latches = self->verdict.route->verb == WEB_ESTOP;
-    // Its reply, or that of the next one, comes; the key counts no more from here on.
+    // The key is invalid from here on. The page still receives a reply: to this stop, or to a later one.
     web_driver_end(&self->server->driver);
     bridge_lease_end(&self->server->link.lease, self->server->now_us);
     return ask(self, latches ? "{\"cmd\":\"estop\",\"reason\":\"web page\"}" : "{\"cmd\":\"stop\"}");

@@ -87,13 +87,13 @@ bool web_recording_name(const char *text) {
     return false;
 }
 
-/// Bytes of the host in `host[:port]`.
+/// Returns the length of the host in `host[:port]`.
 static size_t host_length(const char *host) {
     const char *bracket = (host[0] == '[') ? strchr(host, ']') : NULL;
     return (bracket != NULL) ? (size_t)(bracket - host) + 1U : strcspn(host, ":");
 }
 
-/// An address cannot be taken over by a name server, so whoever calls us by one means us.
+/// Returns true for an address. A name server cannot redirect an address, so the request is for this machine.
 static bool is_address(const char *host, size_t length) {
     char text[INET6_ADDRSTRLEN];
     struct in6_addr address;
@@ -128,7 +128,7 @@ static bool is_our_name(const web_rules_t *rules, const char *host) {
     return is_address(host, length) || is_listed("localhost", host, length) || is_listed(rules->hosts, host, length);
 }
 
-/// True unless a browser says that another site asks.
+/// Returns true unless the browser reports that another site sends the request.
 static bool is_our_page(const web_asked_t *asked) {
     const char *origin = asked->origin;
     if (asked->site != NULL && strcmp(asked->site, "same-origin") != 0 && strcmp(asked->site, "none") != 0) {
@@ -167,7 +167,7 @@ static web_verdict_t refuse(unsigned status, const char *error, const char *mess
     return (web_verdict_t){status, error, message, NULL};
 }
 
-/// A link to the page from another site is followed, like any other link; nothing is told by it.
+/// A link from another site to the page is allowed, like any link; it reveals nothing.
 static bool is_navigation(const web_route_t *route, const web_asked_t *asked) {
     return route != NULL && strcmp(route->path, "/") == 0 && asked->origin == NULL;
 }

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #define STALE_US 2000000U
-/// The frames after a stop are there then.
+/// Delay after a stop until the frames after it are recorded.
 #define WHY_US 2500000U
-/// All places for questions are in use.
+/// Delay of another try when all places for questions are in use.
 #define WHY_AGAIN_US 200000U
 
 static char *copy_of(const iwc_message_t *message) {
@@ -29,11 +29,11 @@ static void keep_stop(web_link_t *self, const iwc_message_t *reply) {
     if (copy == NULL) {
         return;
     }
-    // The same stop again, now with its frames, or its recording: in place of the first.
+    // The same stop again, now with its frames or its recording, replaces the first reply.
     const bool same = self->stops[0] != NULL && (uint64_t)number.value == self->stop_number;
-    free(self->stops[same ? 0 : WEB_STOPS_KEPT - 1U]);
+    free(self->stops[same ? 0 : WEB_STOPS_STORED - 1U]);
     if (!same) {
-        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_KEPT - 1U) * sizeof self->stops[0]);
+        memmove(&self->stops[1], &self->stops[0], (WEB_STOPS_STORED - 1U) * sizeof self->stops[0]);
     }
     self->stops[0] = copy;
     self->stop_number = (uint64_t)number.value;
@@ -70,7 +70,7 @@ static void take_event(void *context, const iwc_message_t *message, uint64_t now
     if (strcmp(name, "stop") == 0) {
         bridge_lease_end(&self->lease, now_us);
         web_tally_take(&self->tally, message, true);
-        keep_stop(self, message); // Another one may come before its frames do.
+        keep_stop(self, message); // Another stop may happen before the frames are recorded.
         (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = now_us + WHY_US;
     }
@@ -110,7 +110,7 @@ void web_link_close(web_link_t *self) {
     bridge_link_close(&self->gateway);
     forget_state(self);
     web_feed_free(&self->feed);
-    for (size_t i = 0; i < WEB_STOPS_KEPT; i++) {
+    for (size_t i = 0; i < WEB_STOPS_STORED; i++) {
         free(self->stops[i]);
     }
 }
@@ -146,7 +146,7 @@ bool web_link_state(const web_link_t *self, uint64_t now_us, iwc_message_t *out_
 char *web_link_status(const web_link_t *self, uint64_t now_us, size_t *out_length) {
     static const char yes[] = "{\"ok\":true,";
     iwc_message_t state;
-    const char *rest = web_link_state(self, now_us, &state) ? strchr(state.text, ',') : NULL; // Behind "event":"state".
+    const char *rest = web_link_state(self, now_us, &state) ? strchr(state.text, ',') : NULL; // After the event name.
     char *text = (rest != NULL) ? malloc(state.length + sizeof yes) : NULL;
     if (text != NULL) {
         *out_length = (size_t)sprintf(text, "%s%s", yes, rest + 1);

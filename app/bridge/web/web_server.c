@@ -16,10 +16,10 @@
 #define LOOK_US         1000000U
 #define LONGEST_WAIT_MS 250
 #define NEWCOMERS_MAX   16U
-/// Of a fleet's table: a thousand machines are some 500 kB.
+/// Largest table of a fleet: a thousand machines need about 500 kB.
 #define FLEET_BYTES_MAX 1048576
-/// Of a request with its headers, and of what is answered at a time.
-#define MEMORY_PER_CONNECTION 16384U
+/// Memory of a connection: for a request with its headers, and for a part of the answer.
+#define BYTES_PER_CONNECTION 16384U
 
 static int complain(int code, const char *what, const char *cure) {
     (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, cure);
@@ -57,7 +57,7 @@ static int read_page(web_server_t *self) {
     return 0;
 }
 
-/// False if others may read the file. A file that is not there is judged when it is read.
+/// Returns false if other users may read the file. A missing file is reported when it is read.
 static bool is_secret(const char *path) {
     struct stat status;
     return stat(path, &status) != 0 || (status.st_mode & 0027U) == 0U;
@@ -84,7 +84,7 @@ static int read_certificate(web_server_t *self) {
                                           "cannot be read; give a PEM file that the bridge's user may read");
 }
 
-/// Called at both ends of a connection.
+/// Callback of the library at the start and the end of a connection.
 static void take_peer(void *context, struct MHD_Connection *connection, void **place,
                       enum MHD_ConnectionNotificationCode what) {
     web_server_t *self = context;
@@ -111,12 +111,12 @@ static void take_peer(void *context, struct MHD_Connection *connection, void **p
 }
 
 __attribute__((format(printf, 2, 0))) static void say_nothing(void *context, const char *format, va_list list) {
-    (void)context; // What hostile peers send is no news.
+    (void)context; // Input of hostile peers is not logged.
     (void)format;
     (void)list;
 }
 
-/// As the library does, but what holds a NUL stays as it was sent, and so is no path or name of ours.
+/// Unescapes like the library, except that a text with a NUL stays as received and so matches no path or name.
 static size_t unescape(void *context, struct MHD_Connection *connection, char *text) {
     (void)context;
     (void)connection;
@@ -124,7 +124,7 @@ static size_t unescape(void *context, struct MHD_Connection *connection, char *t
 }
 
 static struct MHD_Daemon *start(web_server_t *self) {
-    // TLS 1.2 and 1.3 with authenticated encryption and forward secrecy, nothing else.
+    // Only TLS 1.2 and 1.3 with authenticated encryption and forward secrecy.
     static char priorities[] = "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-CIPHER-ALL:+AES-256-GCM:+AES-128-GCM:"
                                "+CHACHA20-POLY1305:-MAC-ALL:+AEAD:-KX-ALL:+ECDHE-ECDSA:+ECDHE-RSA";
     const struct MHD_OptionItem tls[] = {
@@ -139,7 +139,7 @@ static struct MHD_Daemon *start(web_server_t *self) {
     return MHD_start_daemon(
         flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL, MHD_OPTION_ARRAY,
         (self->certificate != NULL) ? tls : plain, MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
-        MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_PER_CONNECTION,
+        MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)BYTES_PER_CONNECTION,
         MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self, MHD_OPTION_NOTIFY_CONNECTION, take_peer, self,
         MHD_OPTION_URI_LOG_CALLBACK, web_call_new, self, MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL,
         MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
@@ -191,7 +191,7 @@ void web_server_close(web_server_t *self) {
     }
     if (self->daemon != NULL) {
         (void)MHD_run(self->daemon);
-        web_link_close(&self->link); // Answers what still waits.
+        web_link_close(&self->link); // Answers pending requests.
         MHD_stop_daemon(self->daemon);
     }
     if (self->door.listen_fds[0] >= 0) {
@@ -210,7 +210,7 @@ static void show_out(web_peer_t *peer) {
     (void)shutdown(peer->fd, SHUT_RDWR);
 }
 
-/// Half a request, or none, holds a connection no longer than this.
+/// Closes connections whose request is not complete within WEB_HEADER_US.
 static void close_idle_peers(const web_server_t *self) {
     for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
         if (peer->state == WEB_PEER_IDLE && self->now_us - peer->since_us > WEB_HEADER_US) {
@@ -219,7 +219,8 @@ static void close_idle_peers(const web_server_t *self) {
     }
 }
 
-/// Connections that are let in between two rounds of the library: what they sent is looked at before they could have to make room.
+/// Returns the number of connections to accept between two rounds of the library: their requests are then read before
+/// they could be closed to make room.
 static unsigned newcomers_max(const web_server_t *self) {
     const unsigned quarter = self->settings->web.max_connections / 4U;
     return (quarter < NEWCOMERS_MAX) ? quarter : NEWCOMERS_MAX;
@@ -229,13 +230,14 @@ unsigned web_server_streams_max(const web_server_t *self) {
     return self->settings->web.max_connections * 5U / 8U;
 }
 
-/// The oldest without the token makes room; without such a one, the oldest that asks nothing. NULL: there is nobody.
+/// Returns the connection to close: the oldest one without a proof, otherwise the oldest one without a request. NULL if
+/// there is none.
 static web_peer_t *who_makes_room(const web_server_t *self) {
     web_peer_t *stranger = NULL;
     web_peer_t *idle = NULL;
     for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
         if (peer->since_us == self->now_us) {
-            continue; // Let in since the library's last round: what it asks was not read yet.
+            continue; // Accepted after the last round of the library: its request is not read yet.
         }
         if (peer->state != WEB_PEER_LEAVING && !peer->known) {
             stranger = peer;
@@ -254,7 +256,7 @@ static unsigned count_peers(const web_server_t *self) {
     return count;
 }
 
-/// Who has spoken at the door comes in.
+/// Passes connections that have sent something from the waiting room to the library.
 static void let_in(web_server_t *self) {
     const unsigned newcomers = newcomers_max(self);
     unsigned count = count_peers(self);
@@ -274,7 +276,7 @@ static void let_in(web_server_t *self) {
             count--;
         }
         (void)getpeername(fd, (struct sockaddr *)&address, &size);
-        // What the library does not take it closes.
+        // The library closes a connection that it refuses.
         count += (MHD_add_connection(self->daemon, fd, (struct sockaddr *)&address, size) == MHD_YES) ? 1U : 0U;
     }
 }
@@ -283,12 +285,13 @@ static void look_at_token(web_server_t *self) {
     bool changed = false;
     (void)web_token_refresh(&self->token, &changed, stderr);
     for (web_call_t *stream = self->streams; changed && stream != NULL; stream = stream->next) {
-        stream->verdict.route = NULL; // Begun with a token that is none any more.
+        stream->verdict.route = NULL; // Begun with a token that is no longer valid.
         web_call_resume(stream);
     }
 }
 
-/// The page that drives is silent, so no hand holds the pad. Another client's lease is not ours to end.
+/// Ends driving and sends `stop` if the page that drives sends nothing: then no person holds the pad. A lease of
+/// another client is not changed.
 static void let_go(web_server_t *self) {
     bridge_lease_t *lease = &self->link.lease;
     if (bridge_lease_key(lease) == NULL) {

@@ -24,7 +24,8 @@ static const char *wrong_listen(const char *text) {
     return good ? NULL : "is no address; write one, such as 127.0.0.1, or unix:PATH";
 }
 
-/// It becomes part of JSON and of a link: an address of https or http, and nothing that needs an escape.
+/// Returns why a text is not valid. It becomes part of JSON and of a link, so it must be an address of https or http
+/// without characters that need an escape.
 static const char *wrong_page(const char *text) {
     static const char permitted[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789:/._-{}[]";
     const bool is_address = strncmp(text, "https://", 8) == 0 || strncmp(text, "http://", 7) == 0;

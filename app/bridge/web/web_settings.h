@@ -1,48 +1,47 @@
 // SPDX-License-Identifier: MIT
-/// What may be configured of the web bridge: share/web.conf.
+/// Configuration of the web bridge: share/web.conf.
 #ifndef WEB_SETTINGS_H
 #define WEB_SETTINGS_H
 
 #include "config/settings.h"
 
-/// Read when no `-c FILE` is given. Its absence is no error then.
+/// Default file without `-c FILE`. It may be absent.
 #define WEB_SETTINGS_PATH "/etc/iwheel/web.conf"
 
 typedef struct {
     struct {
         char socket[108];
-        uint32_t rate_hz; ///< Of the event `state`, 1..100.
+        uint32_t rate_hz; ///< Rate of the event `state`, 1..100.
     } gateway;
     struct {
         char listen[108]; ///< An address, or `unix:PATH`.
         uint32_t port;
-        char hosts
-            [201]; ///< Names beside `listen` and localhost by which the page may be called, separated by blanks; none.
+        char hosts[201]; ///< More names of the page, besides `listen` and localhost, separated by blanks; or none.
         char token_file[108];
-        uint32_t token_hours; ///< 0: no end.
+        uint32_t token_hours; ///< Hours of validity; 0: no end.
         uint32_t max_connections;
-        char page[108];        ///< Folder of the page's files.
-        char certificate[108]; ///< none: without TLS.
+        char page[108];        ///< Folder of the files of the page.
+        char certificate[108]; ///< Path of the file; none: without TLS.
         char key[108];
     } web;
     struct {
-        char source[108];       ///< What iwheel-fleet writes; none: there is no page of a fleet.
-        char machine_page[128]; ///< Address of a machine's own page, with `{machine}` for its name; none.
+        char source[108];       ///< File of iwheel-fleet; none: no page of a fleet.
+        char machine_page[128]; ///< Address of the page of a machine, with `{machine}` for its id; or none.
     } fleet;
     struct {
         bool enabled;
         bool allow_reset;
         uint32_t max_speed_mm_s;
-        uint32_t ttl_ms; ///< Older drive commands are dropped.
+        uint32_t ttl_ms; ///< Largest age of a drive command.
     } drive;
 } web_settings_t;
 
-/// The defaults.
+/// Default values.
 extern const web_settings_t web_settings_standard;
 
 extern const settings_form_t web_settings_form;
 
-/// True if `listen` is a unix socket; then its path is behind `unix:`.
+/// Returns true if `listen` is a unix socket; its path follows `unix:`.
 bool web_settings_is_unix(const web_settings_t *settings);
 
 bool web_settings_has_tls(const web_settings_t *settings);

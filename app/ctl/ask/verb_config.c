@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The configuration of a gateway that keeps it itself, which is a board behind iwheel-serial.
+// Configuration of a gateway that stores it itself: a board behind iwheel-serial.
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
 #include "text/ctl_text.h"
@@ -13,7 +13,7 @@ static void print_pair(const char *key, const char *value) {
     (void)putchar('\n');
 }
 
-/// "drive.lease_ms = 300", of one key or of all, and whether it is in force.
+/// Prints "drive.lease_ms = 300" for one key or all keys, and whether the configuration is in force.
 static void print_keys(json_t *reply, const char *only) {
     size_t i = 0;
     json_t *entry = NULL;
@@ -28,7 +28,8 @@ static void print_keys(json_t *reply, const char *only) {
     }
 }
 
-/// The request that the words mean; NULL after telling what is wrong with them. `*out_only`: of the keys this one is told.
+/// Returns the request for the words; NULL after it has reported what is wrong with them. `*out_only` is the only key
+/// to print.
 static json_t *compose(int count, char **words, const char **out_only) {
     const char *what = (count > 0) ? words[0] : "show";
     const bool sets = strcmp(what, "set") == 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What is assumed about the wheels, what is known, and the operator's word on it.
+// Assumptions about the wheels, their state, and their confirmation by the operator.
 #include "config/similar.h"
 #include "inspect/assumption.h"
 #include "talk/ctl.h"
@@ -14,7 +14,7 @@
 
 #define LINE 512U
 
-/// A board has no room for sentences: what it tells in figures gets the daemon's words.
+/// Adds the sentences of the daemon to the figures of a board, which has no room for sentences.
 static void explain(const char *name, json_t *entry) {
     char text[INSPECT_SOURCE_SIZE];
     iw_assumption_item_t item;
@@ -50,11 +50,11 @@ void ctl_explain_assumptions(json_t *assumptions) {
     }
 }
 
-/// "force_unit_left = cN: at rest, raw / offset is ...", and what a contradiction costs.
+/// Prints "force_unit_left = cN: at rest, raw / offset is ...", and what a contradiction disables.
 static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
     char line[LINE];
     const char *disabled = json_string_value(json_object_get(entry, "disabled"));
-    const bool told = json_object_get(entry, "value") != NULL; // A board's snapshot has not all of them.
+    const bool told = json_object_get(entry, "value") != NULL; // The snapshot of a board does not have all values.
     (void)snprintf(line, sizeof line, "%.64s%s%.64s: %.256s", name, told ? " = " : "",
                    told ? text_word(entry, "value") : "", text_word(entry, "reason"));
     paper_wrap(paper, label, tone, line);
@@ -99,7 +99,7 @@ int verb_ledger(ctl_t *self, int count, char **words) {
     return code;
 }
 
-/// ITEM [VALUE] [--how TEXT], in any order. NULL after telling what is wrong with the words.
+/// Reads ITEM [VALUE] [--how TEXT], in any order. Returns NULL after it has reported what is wrong with the words.
 static json_t *compose(int count, char **words, const char **out_item) {
     char *plain[3] = {NULL, NULL, NULL};
     const char *how = NULL;
@@ -131,7 +131,7 @@ static json_t *compose(int count, char **words, const char **out_item) {
     return request;
 }
 
-/// The gateway knows no such item: perhaps one that is spelt nearly so.
+/// Suggests an item with a similar name after the gateway refused an unknown one.
 static void suggest(const char *item) {
     const char *best = NULL;
     size_t best_distance = SETTINGS_WORD_STRANGE;

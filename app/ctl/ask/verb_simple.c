@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Verbs that are one request and one answer.
+// Verbs with one request and one answer.
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
 #include "text/ctl_text.h"
@@ -17,7 +17,7 @@ static void print_line(const char *text) {
     (void)putchar('\n');
 }
 
-/// Unless --json is given, prints the state the gateway is in now and what it means.
+/// Prints the present state of the gateway and its meaning, unless --json is given.
 static void tell_state(const ctl_t *self, const json_t *reply) {
     static const struct {
         const char *state;
@@ -92,7 +92,7 @@ int verb_release(ctl_t *self, int count, char **words) {
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "release"));
 }
 
-/// "left: zero is 12.318 N now (40 samples, 0.110 N noise); it was 12.300 N (wheel)".
+/// Prints the new zero of a wheel, its samples and noise, and the former zero with its source.
 static void print_tare(const json_t *reply, const char *side) {
     char offset[TEXT_CELL];
     char noise[TEXT_CELL];
@@ -131,7 +131,7 @@ int verb_tare(ctl_t *self, int count, char **words) {
     return code;
 }
 
-/// Another package's program in this one's place: it knows its configuration, and how to draw it.
+/// Starts the program of another package in place of this one: it knows its own configuration and output.
 static int become(char **words, const char *package) {
     (void)execvp(words[0], words);
     return ctl_fail(CTL_UNAVAILABLE, "%s cannot be started (%s); install it: apt-get install ./%s_*.deb", words[0],

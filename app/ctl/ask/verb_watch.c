@@ -14,10 +14,10 @@
 #include <unistd.h>
 
 #define RATE_MAX_HZ 100
-/// How often a watch without events looks whether somebody still reads it.
+/// Interval at which a watch without events checks that its output is still read.
 #define LOOK_US 500000
 
-/// So many of the topics, the first ones, are watched when none is named.
+/// Number of topics, from the first one on, that are watched if none is named.
 #define TOPICS_USUAL ((unsigned)IWN_TOPIC_STOP + 1U)
 
 static bool is_topic(const char *word) {
@@ -42,7 +42,7 @@ static bool parse_rate(const char *text, int *out_rate_hz) {
     return true;
 }
 
-/// Reads the words into the list and the rate; false after telling what is wrong.
+/// Reads the words into the list and the rate. Returns false after it has reported what is wrong.
 static bool parse_words(int count, char **words, json_t *list, int *out_rate_hz) {
     for (int i = 0; i < count; i++) {
         if (strcmp(words[i], "--rate") == 0) {
@@ -61,7 +61,7 @@ static bool parse_words(int count, char **words, json_t *list, int *out_rate_hz)
     return true;
 }
 
-/// The request, or null after telling what is wrong with the words.
+/// Returns the request, or NULL after it has reported what is wrong with the words.
 static json_t *compose(int count, char **words) {
     json_t *list = json_array();
     int rate_hz = 10;
@@ -78,8 +78,8 @@ static json_t *compose(int count, char **words) {
 
 typedef enum { OUTPUT_OPEN = 0, OUTPUT_SIGNAL, OUTPUT_CLOSED, OUTPUT_BROKEN } output_t;
 
-/// Looks, or waits if `wanted`, whether stdout takes something. While it does not, its reader is slow: what comes meanwhile is thinned to
-/// the latest values, so that it never reads a backlog.
+/// Checks, or waits if `wanted`, that stdout accepts data. While it does not, its reader is slow: events that come in
+/// this time are reduced to the latest values, so the reader never gets a backlog.
 static output_t await_output(const client_t *client, bool wanted) {
     const struct timespec none = {0, 0};
     for (bool slow = false;; slow = true) {
@@ -99,7 +99,8 @@ static output_t await_output(const client_t *client, bool wanted) {
     }
 }
 
-/// Writes a text in pieces that a ready pipe takes without blocking, so that a signal is seen although nobody reads.
+/// Writes a text in pieces that a ready pipe accepts without blocking, so that a signal is handled although the output
+/// is not read.
 static output_t write_text(const client_t *client, const char *text, size_t size) {
     while (size > 0) {
         const output_t state = await_output(client, true);
@@ -116,7 +117,7 @@ static output_t write_text(const client_t *client, const char *text, size_t size
     return OUTPUT_OPEN;
 }
 
-/// How many events were left out before this one, as the gateway itself would tell it.
+/// Writes the number of events that were left out before this one, in the form that the gateway uses.
 static output_t write_lost(client_t *client) {
     char line[64];
     const uint64_t count = client->skipped;
@@ -125,7 +126,7 @@ static output_t write_lost(client_t *client) {
     return (count > 0U) ? write_text(client, line, (size_t)length) : OUTPUT_OPEN;
 }
 
-/// As it came, but for what moves a terminal.
+/// Writes the line as it came, but escapes characters that control a terminal.
 static output_t write_line(const client_t *client) {
     char piece[PIPE_BUF];
     size_t length;
@@ -138,7 +139,7 @@ static output_t write_line(const client_t *client) {
     return (state == OUTPUT_OPEN) ? write_text(client, "\n", 1) : state;
 }
 
-/// Prints events until a signal, the end of the reader or of the gateway.
+/// Prints events until a signal comes, or the output or the gateway closes.
 static int pump(ctl_t *self) {
     output_t output = OUTPUT_OPEN;
     while (output == OUTPUT_OPEN) {

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-/// Guides from unknown wheels to a configuration that somebody has seen to be right.
+/// Guides the operator from unknown wheels to a configuration that the operator has seen to be right.
 ///
 ///     checks -> e-stop -> gear -> setpoint type -> current role -> signs -> force -> radius -> track -> file
 ///
-/// Everything that moves goes through a gateway of its own, started for the session with a trial configuration (slow,
-/// little current), so that the core's limits, lease and e-stop hold here as they do later. Each step puts what it found
-/// into `config`, and how it was found into a note. Whatever is not found out stays as it was and is said to be assumed.
-/// What cannot go on, and an operator who wants to end, ends the program at that place (`bringup_fail`, `bringup_quit`).
-/// A value is confirmed only if all that its sentence claims was seen, on both wheels where it speaks of both.
+/// Every movement goes through a gateway that is started for the session with a trial configuration (slow, little
+/// current), so the core's limits, lease and e-stop apply here as they do later. Each step stores its result in
+/// `config`, and the way it was found in a note. A value that is not found stays as it was, and is reported as assumed.
+/// An error, and an operator who wants to quit, end the program at that place (`bringup_fail`, `bringup_quit`). A value
+/// is confirmed only if everything that its sentence claims was seen, on both wheels if it is about both.
 #ifndef BRINGUP_H
 #define BRINGUP_H
 
 #include "doctor/doctor.h"
 #include "text/ctl_text.h"
 
-/// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
+/// Wheels in the air turn slowly, but a direction can be seen; and briefly, but the operator has time to see it.
 #define BRINGUP_SPEED_MM_S  100
 #define BRINGUP_CURRENT_mA  500
 #define BRINGUP_PROBE_MS    1200U
@@ -23,151 +23,154 @@
 #define BRINGUP_NOTES       16U
 #define BRINGUP_ANSWER_SIZE 160U
 
-/// How a value was found.
+/// The way in which a value was found.
 typedef struct {
     const char *section;
     const char *key;
-    const char *item; ///< Of the ledger, if it is confirmed; null: assumed still.
+    const char *item; ///< Item of the assumption store if it is confirmed; NULL: still assumed.
     char text[BRINGUP_NOTE_SIZE];
 } bringup_note_t;
 
-/// A gateway of our own.
+/// The gateway of the session.
 typedef struct {
-    char folder[64]; ///< Empty: none was made.
+    char folder[64]; ///< Empty: no folder was made.
     char program[512];
-    int pid;   ///< 0: none runs.
-    int guard; ///< The process that removes the folder when nobody holds `leash` any more; 0: none.
+    int pid;   ///< 0: it does not run.
+    int guard; ///< Process that removes the folder when no process holds `leash` any more; 0: none.
     int leash;
 } trial_t;
 
 typedef struct {
     ctl_t *ctl;
-    gateway_config_t config; ///< What will be written.
+    gateway_config_t config; ///< Configuration that will be written.
     bringup_note_t note[BRINGUP_NOTES];
     unsigned notes;
-    const char *recording; ///< Of another controller, to learn from; null: none.
+    const char *recording; ///< Recording of another controller to learn from; NULL: none.
     const char *out_path;
     int current_mA;
-    double mm_per_tick; ///< By a distance that was pushed; 0: none was.
+    double mm_per_tick; ///< From a pushed distance; 0: not known.
     trial_t trial;
 } bringup_t;
 
-/// Why a count is not complete. A stall of this program or of the gateway is none: the wheels go on counting.
+/// Reason why a count is not complete. A stall of this program or of the gateway is not a reason: wheels continue to
+/// count.
 typedef enum {
     HAND_COMPLETE = 0,
-    HAND_OFFLINE,   ///< The gateway answered, and received nothing of a wheel for HAND_OFFLINE_US.
-    HAND_RESTARTED, ///< The gateway saw a wheel restart, or away for so long that it may have.
-    HAND_UNSEEN,    ///< No answer of the gateway for HAND_UNSEEN_US: a turn there and back would not have been seen.
+    HAND_OFFLINE,   ///< The gateway answered, but a wheel was offline for HAND_OFFLINE_US.
+    HAND_RESTARTED, ///< A wheel restarted, or was offline for so long that it may have restarted.
+    HAND_UNSEEN,    ///< No answer of the gateway for HAND_UNSEEN_US: a turn forth and back would not be seen.
 } hand_gap_t;
 
 #define HAND_OFFLINE_US 500000
 #define HAND_UNSEEN_US  2000000
-/// A longer time between two answers is a stall of ours, and says nothing of the wheels.
+/// A longer time between two answers is a stall of this program or of the gateway; it shows nothing about the wheels.
 #define HAND_STALL_US 200000
 
 /// One answer of the gateway.
 typedef struct {
     long long ticks[IW_SIDES];
     int rpm[IW_SIDES];
-    long long reboots; ///< Of both wheels.
-    bool heard;        ///< Both wheels.
+    long long reboots; ///< Sum of both wheels.
+    bool heard;        ///< Both wheels are online.
 } hand_look_t;
 
-/// What the wheels counted while hands moved them, in their own sense.
+/// Counts of the wheels while hands moved them, in the wheels' own sense of rotation.
 typedef struct {
     long long ticks[IW_SIDES];
-    long long way[IW_SIDES];     ///< Back and forth, all added.
-    double rpm_turns[IW_SIDES];  ///< The rpm they told, summed up over time,
-    long long rpm_way[IW_SIDES]; ///< and the ticks of just that time: without stalls.
-    hand_gap_t gap;              ///< The first one.
-    hand_look_t last;            ///< The last answer with both wheels,
-    int64_t heard_us;            ///< and when it came.
+    long long way[IW_SIDES];     ///< Sum of forward and backward ticks.
+    double rpm_turns[IW_SIDES];  ///< Reported rpm, integrated over time without stalls.
+    long long rpm_way[IW_SIDES]; ///< Ticks of the same time.
+    hand_gap_t gap;              ///< The first gap.
+    hand_look_t last;            ///< Last answer with both wheels online.
+    int64_t heard_us;            ///< Time of `last`.
     int64_t looked_us;
-    int64_t offline_us; ///< Since then, without stalls.
+    int64_t offline_us; ///< Time offline since `heard_us`, without stalls.
 } hand_t;
 
-/// The two wheels turn so for a moment.
+/// A short movement of both wheels.
 typedef struct {
     int speed_mm_s[IW_SIDES];
     int current_mA[IW_SIDES];
     bool has_current;
     unsigned for_ms;
-    int enough_mm_s; ///< Ends as soon as both wheels turn that fast, or one four times as fast; 0: never.
+    int enough_mm_s; ///< The burst ends when both wheels are this fast, or one wheel four times as fast; 0: never.
 } burst_t;
 
 typedef enum { BURST_DONE = 0, BURST_ABORTED, BURST_STOPPED, BURST_REFUSED, BURST_LOST } burst_end_t;
 
-/// What the wheels did, in the machine's sense.
+/// Result of a burst; speeds are in the machine's sense of direction.
 typedef struct {
     burst_end_t end;
-    int mean_mm_s[IW_SIDES]; ///< Of the second half; the peak, if that was enough.
-    int peak_mm_s[IW_SIDES]; ///< The largest, with its sign.
-    char why[256];           ///< Unless BURST_DONE.
+    int mean_mm_s[IW_SIDES]; ///< Mean of the second half; the peak if the burst ended by `enough_mm_s`.
+    int peak_mm_s[IW_SIDES]; ///< Largest speed, with its sign.
+    char why[256];           ///< Reason, unless BURST_DONE.
 } outcome_t;
 
 // --- talking (bringup_talk.c) ------------------------------------------------------------------------------------
 
-/// A paragraph, broken into lines.
+/// Prints a paragraph, broken into lines.
 __attribute__((format(printf, 1, 2))) void talk_say(const char *format, ...);
 
-/// A heading.
+/// Prints the heading of a step.
 void talk_step(unsigned number, const char *title);
 
-/// Asks and reads a line; what was typed before the question is thrown away. An empty line stands for `otherwise`. Ends
+/// Asks a question and reads a line; input from before the question is discarded. An empty line means `otherwise`. Ends
 /// bringup if the operator wants to quit (q, end of input, Ctrl-C).
 void talk_ask(bringup_t *self, const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]);
 
-/// The same for yes or no.
+/// Asks a question that is answered by yes or no, as talk_ask does.
 bool talk_yes(bringup_t *self, const char *question, bool otherwise);
 
-/// A number within the bounds, asked for until it is one; false after an empty line.
+/// Asks for a number until it is within the bounds. Returns false after an empty line.
 bool talk_number(bringup_t *self, const char *question, double low, double high, double *out_number);
 
-/// Forgets what was typed before the question.
+/// Discards input from before the question.
 void talk_forget(void);
 
-/// Keys are seen at once, without Enter, from begin to end.
+/// From begin to end, a key is received immediately, without Enter.
 void talk_keys_begin(void);
 void talk_keys_end(void);
-/// True if one was pressed (or the input ended).
+/// Returns true if a key was pressed or the input ended.
 bool talk_key_pressed(void);
 
 // --- the trial gateway (bringup_trial.c, bringup_burst.c) --------------------------------------------------------
 
-/// Starts one with `config` on the bus, made slow; the former one ends. It keeps and finds nothing of the real gateway's.
-/// Ends bringup after telling why not.
+/// Starts a trial gateway with `config` on the bus, slowed down; a running one ends. It does not use the files of the
+/// real gateway. If that fails, prints the reason and ends bringup.
 void trial_start(bringup_t *self, const gateway_config_t *config);
-/// The same with the real gateway's records and the configuration found. False after telling why not.
+/// Starts a trial gateway with the real gateway's records and the configuration found. Returns false after it has
+/// printed the reason of a failure.
 bool trial_start_with_records(bringup_t *self);
 void trial_stop(bringup_t *self);
-/// Ends it and removes its folder.
+/// Stops the trial gateway and removes its folder.
 void trial_close(bringup_t *self);
-/// A new reference to its status, or null.
+/// Returns a new reference to the status of the trial gateway, or NULL.
 json_t *trial_status(bringup_t *self);
-/// Waits until both wheels are heard and stand, and no e-stop is pressed. False after telling.
+/// Waits until both wheels are online and at standstill and no e-stop is pressed. Returns false after it has printed
+/// the reason if that does not happen.
 bool trial_wait_ready(bringup_t *self);
-/// The same, told to the operator before and after, and offered again when it went wrong. False: it was not done, and the
-/// operator wants no more of it.
+/// Runs the burst, reports it to the operator before and after, and offers to repeat it after a failure. Returns false
+/// if the burst was not done and the operator wants no repetition.
 bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
-/// The same; ends bringup if it was not done.
+/// Runs the burst as burst_show does, but ends bringup if it was not done.
 void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 
-// --- by hand (bringup_hand.c, bringup_sum.c) ------------------------------------------------------------------------------------
+// --- by hand (bringup_hand.c, bringup_sum.c) ----------------------------------------------------------------------
 
-/// Waits until both wheels stand, prompts, and adds up what they count until Enter. Ends bringup if they do not stand, or the
-/// operator wants to quit.
+/// Waits until both wheels are at standstill, prompts, and adds up their counts until Enter. Ends bringup if they do
+/// not come to standstill, or the operator wants to quit.
 void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
 
-/// The sum begins with this answer.
+/// Starts the sum with this answer.
 void hand_begin(hand_t *out_hand, const hand_look_t *first, int64_t now_us);
-/// The next answer.
+/// Adds the next answer.
 void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us);
-/// False after reporting why not all was counted.
+/// Returns false after it has printed why the count is not complete.
 bool hand_is_complete(const hand_t *hand);
-/// How much of the rotor's turns the rpm made; 0: too little of it was seen.
+/// Returns the turns that the rpm show as a share of the rotor's turns; 0 if too little of them was measured.
 double hand_rpm_share(const hand_t *hand, iw_side_t side);
 
-/// Hardly any of its way was back again.
+/// Returns true if almost nothing of the wheel's way was backwards.
 bool hand_went_one_way(const hand_t *hand, iw_side_t side);
 
 // --- the steps ---------------------------------------------------------------------------------------------------
@@ -175,10 +178,11 @@ bool hand_went_one_way(const hand_t *hand, iw_side_t side);
 void bringup_checks(bringup_t *self);
 void bringup_estop(bringup_t *self);
 
-/// What an earlier bringup saw of the e-stop's line no longer counts.
+/// Sets the stored names of the e-stop's lines to `any`: the result of an earlier bringup is no longer valid.
 void bringup_forget_wiring(bringup_t *self);
 
-/// Puts the label of its chip and its own name into the configuration. A name that this cannot hold is left out.
+/// Stores the label of the chip and the name of each e-stop line in the configuration. A name that the configuration
+/// cannot hold is left out.
 void bringup_store_wiring(bringup_t *self);
 void bringup_gear(bringup_t *self);
 void bringup_type(bringup_t *self);
@@ -189,25 +193,28 @@ void bringup_radius(bringup_t *self);
 void bringup_track(bringup_t *self);
 void bringup_write(bringup_t *self);
 
-// --- what they share ---------------------------------------------------------------------------------------------
+// --- shared by the steps -----------------------------------------------------------------------------------------
 
-/// The operator wants to end, or nobody answers any more: the session's gateway ends, its folder goes, nothing is written.
+/// Ends the program because the operator wants to quit or there is no input any more: stops the trial gateway, removes
+/// its folder and writes nothing.
 _Noreturn void bringup_quit(bringup_t *self);
-/// The same because it cannot go on; the reason was told.
+/// Ends the program in the same way because it cannot go on; the reason has been printed.
 _Noreturn void bringup_fail(bringup_t *self);
 
-/// Both wheels forwards, with current, as a try of the type.
+/// Returns a burst of both wheels forwards, with current, to try the setpoint type.
 burst_t bringup_ahead(const bringup_t *self, unsigned for_ms);
-/// A trial gateway that sends this type, with the role under which a zero surely is no torque.
+/// Starts a trial gateway that sends this type, with the current role in which a zero is certainly no torque.
 void bringup_start_with(bringup_t *self, int type);
-/// A note confirms that item of the ledger.
+/// Returns true if a note confirms this item of the assumption store.
 bool bringup_is_confirmed(const bringup_t *self, const char *item);
 
-/// Notes how a key's value was found; a later note replaces the former. `item`: the ledger's, if that confirms it.
+/// Notes how the value of a key was found; a later note replaces the earlier one. `item` is the item of the assumption
+/// store if the note confirms it, otherwise NULL.
 __attribute__((format(printf, 5, 6))) void bringup_note(bringup_t *self, const char *section, const char *key,
                                                         const char *item, const char *format, ...);
 
-/// After another radius or gear: a `rest_rpm` that would now call a rolling wheel at rest becomes the default.
+/// Sets `rest_rpm` to its default if it would classify a rolling wheel as at standstill after a change of radius or
+/// gear.
 void bringup_fit_rest(iw_config_t *core);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Before anything turns: the checks of doctor, and the e-stop.
+// Steps before a wheel turns: the checks of doctor, and the e-stop.
 #include "bringup.h"
 
 #include <poll.h>
@@ -46,7 +46,8 @@ void bringup_checks(bringup_t *self) {
     }
 }
 
-/// Waits for the e-stop's state as the gateway sees it. False: it did not come in that time, or a key was pressed.
+/// Waits until the gateway reports this state of the e-stop. Returns false if it does not within `for_us`, or a key is
+/// pressed.
 static bool await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
     const int64_t end_us = client_now_us() + for_us;
     const unsigned signals = signals_count();
@@ -75,7 +76,7 @@ static void go_without(bringup_t *self) {
     bringup_note(self, "estop", "line", NULL, "there was no e-stop");
 }
 
-/// Without this edge it does not go on.
+/// Waits for this edge, and ends bringup without it.
 static void need_edge(bringup_t *self, const char *wanted, const char *edge, const char *also) {
     if (!await_estop(self, wanted, PRESS_US)) {
         talk_say("No %s was seen on %s. Check its wire, %s[estop] active; then begin again.", edge,
@@ -91,7 +92,7 @@ void bringup_estop(bringup_t *self) {
         return;
     }
     trial_start(self, &self->config);
-    // A press is one only if it was not pressed before.
+    // A press counts only if the button was not pressed before.
     if (!await_estop(self, "released", RELEASED_US)) {
         talk_say(
             "The e-stop reads as pressed already. Release it now; if it is not pressed, its wire is cut or [estop] "

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-// A short, slow turn of the wheels, which any key ends.
+// A short, slow turn of the wheels that any key ends.
 #include "bringup.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/// A third of the trial gateway's lease.
+/// Interval between commands: a third of the trial gateway's lease.
 #define SPACING_US 60000
 #define REST_US    8000000
 #define SILENT_US  1000000
 #define ARM_TRIES  5U
-/// Snapshots at 50 Hz with the whole command in force, without which nothing was tried.
+/// Minimum number of snapshots at 50 Hz with the whole command in force. With fewer snapshots the burst has no result.
 #define IN_FORCE_MIN 4
-/// So many times as fast as would be enough of both, one alone is.
+/// The speed of one wheel alone is enough at this multiple of `enough_mm_s`.
 #define ENOUGH_OF_ONE 4
 
 typedef struct {
@@ -26,8 +26,8 @@ typedef struct {
     int64_t received_us;
     int64_t sum_mm_s[IW_SIDES];
     int samples;
-    int in_force;     ///< Snapshots in which the wheels were told what was commanded, ramps over.
-    json_int_t stops; ///< Of the gateway, before this one.
+    int in_force;     ///< Snapshots in which the applied command was the whole command, after ramps.
+    json_int_t stops; ///< Number of stops of the gateway before this burst.
     int unknown;      ///< Snapshots without the speed of both wheels.
     bool enough;
 } run_t;
@@ -63,7 +63,8 @@ static bool is_in_force(const burst_t *burst, const json_t *state) {
     return true;
 }
 
-/// The speeds of both wheels in a snapshot. False if one is not known: an unknown speed is no standstill.
+/// Reads the speeds of both wheels from a snapshot. Returns false if one is not known: an unknown speed is not a
+/// standstill.
 static bool speeds_of(const json_t *state, int out_mm_s[IW_SIDES]) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const json_t *speed = json_object_get(json_object_get(state, text_side(side)), "speed_mm_s");
@@ -114,7 +115,7 @@ static burst_end_t take_line(run_t *run, const json_t *line, int64_t now_us) {
     return json_is_true(ok) ? BURST_DONE : fail(run, BURST_STOPPED, text_word(line, "message"));
 }
 
-/// Drives until the time is over, it is enough, or something ends it.
+/// Drives until the time is over, the speed is enough, or something ends the burst.
 static burst_end_t drive(run_t *run) {
     client_t *client = &run->bringup->ctl->client;
     burst_end_t end = BURST_DONE;
@@ -134,7 +135,7 @@ static burst_end_t drive(run_t *run) {
         if (now_us >= run->next_us) {
             run->next_us = now_us + SPACING_US;
             const iwc_result_t sent = client_send(client, compose(run->burst), now_us, &id);
-            if (sent != IWC_OK && sent != IWC_FULL) { // Full: it does not read, and SILENT_US ends the burst.
+            if (sent != IWC_OK && sent != IWC_FULL) { // Full: the gateway does not read. SILENT_US ends the burst.
                 return fail(run, BURST_LOST, "the gateway is gone");
             }
         }
@@ -152,7 +153,8 @@ static burst_end_t drive(run_t *run) {
     return end;
 }
 
-/// A wheel that ran away while it was told to stand, which the gateway may see first and stop: that it turns is the finding.
+/// Returns true if a wheel ran away although its command was zero. The gateway may detect this first and stop the
+/// wheels; that the wheel turns is the result of the burst.
 static bool ran_away(run_t *run, const json_t *why) {
     const burst_t *burst = run->burst;
     const char *side_word = text_word(why, "side");
@@ -173,14 +175,15 @@ static bool ran_away(run_t *run, const json_t *why) {
     return true;
 }
 
-/// One wheel did not follow its command, and the gateway stopped both: in the air that is a finding like any other.
+/// Returns true if the gateway stopped both wheels because one did not follow its command: in the air this is a result
+/// like any other.
 static bool diverged(const run_t *run, const json_t *why) {
     return json_integer_value(json_object_get(why, "number")) > run->stops &&
            strcmp(text_word(why, "cause"), "pair_diverges") == 0;
 }
 
-/// Whether it was our own stop that ended it, and whether there was something to end: that a wheel did not turn means
-/// nothing unless it was told to.
+/// Judges the end of a burst: whether the stop of this program ended it, and whether the command was in force. A wheel
+/// that did not turn is a result only if it had a command.
 static burst_end_t judge(run_t *run, burst_end_t end) {
     json_t *why = near_ask(run->bringup->ctl, json_pack("{s:s}", "cmd", "why"));
     const bool ours = json_integer_value(json_object_get(why, "number")) == run->stops + 1 &&
@@ -198,7 +201,7 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
     return end;
 }
 
-/// Zero at once after a key or trouble, else a ramp; then until both wheels stand.
+/// Stops immediately after a key or a signal, otherwise with a ramp. Then waits until both wheels are at standstill.
 static void stop(run_t *run, burst_end_t end) {
     ctl_t *ctl = run->bringup->ctl;
     const int64_t rest_us = client_now_us() + REST_US;
@@ -217,7 +220,8 @@ static void stop(run_t *run, burst_end_t end) {
     }
 }
 
-/// The reply to arm; NULL: the wheels are not ready. A wheel whose telemetry came late counts as not at rest a moment longer.
+/// Arms, and returns the reply; NULL if the wheels are not ready. It tries again because a wheel with late telemetry
+/// counts as not at standstill for a moment longer.
 static json_t *arm(bringup_t *self) {
     json_t *armed = NULL;
     for (unsigned tries = 0; tries < ARM_TRIES; tries++) {

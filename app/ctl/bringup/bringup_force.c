@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The unit of the normal force, which the document gives as cN on the left and dN on the right, and its sign.
+// Unit of the normal force (the document gives cN on the left and dN on the right), and its sign.
 //
-// Only a known mass tells a unit. Without one the unit stays assumed.
+// Only a known mass shows the unit. Without a mass the unit stays assumed.
 #include "bringup.h"
 
 #include <math.h>
@@ -11,28 +11,28 @@
 
 #define LOOK_NS     50000000L
 #define LOOKS       40
-#define SETTLE_NS   300000000L // Until the force frames tell what was put on.
-#define G_N_PER_kg  9.8        // The document's own figure.
+#define SETTLE_NS   300000000L // Time until the force frames show a new load.
+#define G_N_PER_kg  9.8        // Value in the document.
 #define MASS_MIN_kg 0.5
 #define MASS_MAX_kg 100.0
-/// Counts per newton, and by how much a hand-held weight may be off.
+/// Counts per newton, and the factor by which a hand-held weight may be wrong.
 #define CN_PER_N 100.0
 #define DN_PER_N 10.0
 #define SLACK    2.0
-/// Less than this is noise.
+/// A smaller change is noise.
 #define COUNTS_MIN 3.0
-/// A sway of more than this share of the change is a hand.
+/// A larger sway, as a share of the change, comes from a hand.
 #define SWAY 0.5
 
-/// The raw force over two seconds.
+/// Raw force during two seconds.
 typedef struct {
     double mean;
     long long low;
     long long high;
-    bool heard; ///< All the time, hardly a look without it.
+    bool heard; ///< Almost every poll had a force.
 } force_t;
 
-/// Ends bringup after a signal.
+/// Measures the raw force. Ends bringup after a signal.
 static force_t look_at_force(bringup_t *self, iw_side_t side) {
     const unsigned signals = signals_count();
     const struct timespec pause = {0, LOOK_NS};
@@ -68,7 +68,7 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
     return force;
 }
 
-/// Nobody held the handle or the mass meanwhile: the force swayed little beside what the mass changed.
+/// Returns true if the force swayed little in comparison with the change: then no hand held the handle or the mass.
 static bool is_steady(const force_t *force, double change) {
     return (double)(force->high - force->low) <= fmax(COUNTS_MIN * 2.0, fabs(change) * SWAY);
 }
@@ -104,7 +104,7 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
                  (counts < 0.0) ? "; pressing makes it smaller" : "");
 }
 
-/// Without a mass: only whether the handle is this wheel's, and which way it counts.
+/// Reports a measurement without a mass: only whether the handle belongs to this wheel, and its direction of counting.
 static void tell_press(bringup_t *self, iw_side_t side, double counts) {
     if (fabs(counts) < COUNTS_MIN) {
         talk_say("  Nothing changed on the %s wheel. Is this its handle?", text_side(side));
@@ -122,7 +122,8 @@ static void tell_deaf(bringup_t *self, iw_side_t side) {
     bringup_note(self, text_side(side), "force_unit", NULL, "assumed: no force was heard");
 }
 
-/// A mass tells the unit only of a force that stands still and is not at its end.
+/// Returns true if the forces are steady and not at the end of their range. Otherwise they do not show the unit; prints
+/// the reason.
 static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, const force_t *loaded) {
     if (is_at_its_end(free) || is_at_its_end(loaded)) {
         talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Take less mass.",
@@ -141,7 +142,7 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
     return true;
 }
 
-/// One handle. True: it told nothing, and the operator wants to try again.
+/// Measures one handle. Returns true if there is no result and the operator wants to try again.
 static bool measure(bringup_t *self, iw_side_t side) {
     char question[112];
     char answer[BRINGUP_ANSWER_SIZE];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Gear, by hand: turns of each wheel that are counted. Nothing is sent.
+// Gear, by hand: the operator turns each wheel a counted number of times. Nothing is sent.
 #include "bringup.h"
 
 #include <math.h>
@@ -9,20 +9,20 @@
 #define TURNS        3
 #define GEAR_MAX     100.0
 #define GEAR_PERCENT 4.0
-/// By how much the rpm, summed up from looks at the status, may be off.
+/// Tolerance of the turns by rpm, which are summed up from polls of the status.
 #define RPM_SLACK 0.3
 
-/// One wheel: rotor turns per turn of the wheel, and how much of them the rpm made.
+/// One wheel: turns of the rotor per turn of the wheel, and the share of them that the rpm show.
 typedef struct {
     long long ticks;
     double gear;
     double share;
 } turned_t;
 
-/// Whose turns the rpm count, as far as both wheels showed it.
+/// Turns that the rpm count, as far as both wheels showed it.
 typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 
-/// What is wrong with it, told; or false.
+/// Returns true after it has printed why the turns have no result; otherwise false.
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
     const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
     const char *name = text_side(side);
@@ -45,7 +45,7 @@ static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turne
     return true;
 }
 
-/// One wheel, until it is done or given up: false.
+/// Measures one wheel. Returns false if the operator gives up.
 static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     char prompt[96];
     hand_t hand;
@@ -63,7 +63,7 @@ static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     return false;
 }
 
-/// A whole number if it is nearly one, else tenths: what the configuration can hold.
+/// Sets the gear: a whole number if it is nearly one, otherwise tenths. The configuration can hold no more.
 static void keep_gear(iw_config_t *core, double gear) {
     const double whole = round(gear);
     const bool is_whole = fabs(gear - whole) <= gear * GEAR_PERCENT / 100.0;
@@ -75,7 +75,7 @@ static bool is_about(double value, double wanted) {
     return fabs(value - wanted) <= wanted * RPM_SLACK;
 }
 
-/// Both wheels must say the same, and not both things at once.
+/// Returns the turns that the rpm count. Both wheels must show the same, and must not fit both.
 static rpm_of_t judge_rpm(const turned_t turned[IW_SIDES]) {
     bool rotor = true;
     bool wheel = true;
@@ -97,7 +97,7 @@ static void note_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool gea
     }
 }
 
-/// Both wheels were turned; what that tells is kept if the operator agrees.
+/// Judges the turns of both wheels. Stores the result if the operator agrees.
 static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     const double gear = (turned[IW_LEFT].gear + turned[IW_RIGHT].gear) / 2.0;
     iw_config_t core = self->config.core;
@@ -111,7 +111,7 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     keep_gear(&core, gear);
     const bool geared = core.gear_turns > core.gear_per;
     const rpm_of_t rpm = judge_rpm(turned);
-    // Without a gear the wheel's rpm and the rotor's are the same.
+    // Without a gear the rpm of wheel and rotor are the same.
     core.rpm_of_rotor = geared && ((rpm == RPM_UNSEEN) ? core.rpm_of_rotor : rpm == RPM_ROTOR);
     talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
              turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What wheels count while hands turn or push them. Nothing is sent.
+// Counts of the wheels while hands turn or push them. Nothing is sent.
 #include "bringup.h"
 
 #include <poll.h>
@@ -30,7 +30,7 @@ static hand_look_t look(bringup_t *self) {
     return seen;
 }
 
-/// The first one at which both are heard; a moment's silence is none.
+/// Polls until both wheels are online, for HAND_OFFLINE_US at most. Returns the last answer.
 static hand_look_t first_look(bringup_t *self) {
     hand_look_t seen = look(self);
     for (unsigned i = 0; i < HAND_OFFLINE_US / (LOOK_NS / 1000L) && !seen.heard; i++) {
@@ -40,7 +40,7 @@ static hand_look_t first_look(bringup_t *self) {
     return seen;
 }
 
-/// A line is there, or the end of input, and all is counted up to it; false on a signal.
+/// Waits for a line or the end of input, and until everything is counted up to it. Returns false on a signal.
 static bool wait_for_line(bringup_t *self, hand_t *hand) {
     const unsigned before = signals_count();
     const struct timespec pause = {0, LOOK_NS};

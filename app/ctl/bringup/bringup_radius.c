@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Radius, by a distance that is measured. Nothing is sent.
+// Radius, by a measured distance. Nothing is sent.
 #include "bringup.h"
 
 #include <math.h>
@@ -9,17 +9,18 @@
 #define TICKS_MIN    60
 #define DISTANCE_MIN 1.0
 #define DISTANCE_MAX 100.0
-/// Both wheels went equally far, if the machine went straight.
+/// If the radii of both wheels differ by less, the machine went straight.
 #define ALIKE_PERCENT 3.0
 
-/// Radius in mm by a distance and the ticks of a wheel.
+/// Returns the radius in mm from a distance and the ticks of a wheel; 0 without ticks.
 static double radius_of(const bringup_t *self, double distance_m, long long ticks) {
     const iw_config_t *core = &self->config.core;
     const double turns = (double)llabs(ticks) / IW_TICKS_PER_TURN * core->gear_per / core->gear_turns;
     return (turns > 0.0) ? distance_m * 1000.0 / (2.0 * M_PI * turns) : 0.0;
 }
 
-/// The odometry of a machine that was pushed forwards must have counted forwards, by the signs found before.
+/// Checks that the machine was pushed in one direction and that its odometry, with the signs found before, counted
+/// forwards. Prints what is wrong.
 static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const bool forwards = (hand->ticks[side] > 0) != self->config.core.invert[side];
@@ -51,7 +52,8 @@ static bool is_usable(const bringup_t *self, const hand_t *hand) {
     return counts_forwards(self, hand);
 }
 
-/// The operator took it. Only a straight way with a known gear confirms the radius; a straight way alone, what a tick is.
+/// Stores the radius that the operator accepted. Only a straight way with a known gear confirms the radius; a straight
+/// way alone gives the distance per tick.
 static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, double mean, bool straight) {
     const bool geared = bringup_is_confirmed(self, "gear_ratio");
     const double ticks = (double)(llabs(hand->ticks[IW_LEFT]) + llabs(hand->ticks[IW_RIGHT])) / 2.0;
@@ -63,7 +65,7 @@ static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, 
                  hand->ticks[IW_RIGHT], geared ? "" : "; the gear is assumed", straight ? "" : "; not straight");
 }
 
-/// True: it is done.
+/// Returns true if the step is done.
 static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m) {
     const iw_config_range_t range = iw_config_range(IW_CONFIG_RADIUS);
     const double left = radius_of(self, distance_m, hand->ticks[IW_LEFT]);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// What the current beside the speed means: tries with one of the two, and a last one with both, without which wheels that
-// cannot turn at all would pass for a limit.
+// Meaning of the current next to the speed: tries with only one of the two, and a last try with both. Without the last
+// try, wheels that cannot turn at all would look like a limit.
 //
 //     current alone turns both           -> setpoint
 //     neither alone, nor 0 with current,
 //         but both together turn both    -> limit
-//     anything else                      -> not seen; the operator may know
+//     any other result                   -> not seen; the operator may know
 #include "bringup.h"
 
 #include <stdio.h>
@@ -19,14 +19,14 @@
 #define RIGHT       (1U << IW_RIGHT)
 #define BOTH        (LEFT | RIGHT)
 
-/// What the tries showed.
+/// Result of the tries.
 typedef struct {
     const char *role; ///< "limit", "setpoint", or "?".
-    bool seen;        ///< All that it takes to say so, on both wheels.
+    bool seen;        ///< Everything that shows this role was seen, on both wheels.
     char how[BRINGUP_NOTE_SIZE];
 } role_t;
 
-/// A bit per side that turned.
+/// Returns a bit per side that turned.
 static unsigned turned(const outcome_t *outcome) {
     return ((abs(outcome->peak_mm_s[IW_LEFT]) >= TORQUE_MM_S) ? LEFT : 0U) |
            ((abs(outcome->peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S) ? RIGHT : 0U);
@@ -39,14 +39,14 @@ static const char *wheels(unsigned sides) {
                               : "no wheel";
 }
 
-/// What it turned.
+/// Runs the burst and returns the sides that turned.
 static unsigned try_burst(bringup_t *self, const burst_t *burst) {
     outcome_t outcome = {0};
     burst_insist(self, burst, &outcome);
     return turned(&outcome);
 }
 
-/// A current without a speed turned something.
+/// Stores the role setpoint: a current without a speed turned the wheels in `sides`.
 static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
     found->role = "setpoint";
     found->seen = sides == BOTH;
@@ -59,7 +59,8 @@ static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
     }
 }
 
-/// Under the role limit a zero is speed 0 with current. If that turns a wheel, the role is the other one.
+/// Tries a zero as the role limit sends it: speed 0 with current. If it turns a wheel, the role is setpoint. Returns
+/// the sides that turned.
 static unsigned try_zero(bringup_t *self) {
     gateway_config_t config = self->config;
     const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
@@ -69,7 +70,8 @@ static unsigned try_zero(bringup_t *self) {
     return try_burst(self, &zero);
 }
 
-/// Neither alone turned a wheel: that is a limit only if the two together still do.
+/// Tries both together, after neither alone turned a wheel: the current is a limit only if both together still turn the
+/// wheels.
 static void try_limit(bringup_t *self, role_t *found) {
     const burst_t together = bringup_ahead(self, BRINGUP_PROBE_MS / 2U);
     unsigned sides = try_zero(self);

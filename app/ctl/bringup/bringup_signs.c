@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which way each wheel turns: what the bus can show (the sign of what is measured) and what only eyes can see.
+// Direction of each wheel: the bus shows the sign of the measurement, and only the operator sees the direction.
 #include "bringup.h"
 
 #include <stdio.h>
@@ -9,7 +9,7 @@
 #define TURN_MS    1500U
 #define MOVES_MM_S 40
 
-/// The current that a command needs, by the role just found.
+/// Returns a burst with the current that a command needs in the role just found.
 static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
     burst_t burst = {.speed_mm_s = {left_mm_s, right_mm_s}, .for_ms = TURN_MS};
     burst.has_current = self->config.core.current_role == IW_ROLE_SETPOINT;
@@ -19,7 +19,8 @@ static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
     return burst;
 }
 
-/// What the bus shows: the wheel that was told to turn did, the other did not, and the measured sign is the told one.
+/// Checks what the bus shows: the commanded wheel turned, the other one did not, and the measured sign is the commanded
+/// one. Prints what is wrong.
 static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_t side) {
     const int told = outcome->mean_mm_s[side];
     const int other = outcome->mean_mm_s[(side == IW_LEFT) ? IW_RIGHT : IW_LEFT];
@@ -60,7 +61,7 @@ static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
                  (forward ? *invert : !*invert) ? "yes" : "no");
 }
 
-/// One wheel. False: it is to be shown once more.
+/// Turns one wheel and asks for its direction. Returns false if the wheel must be shown again.
 static bool look_at(bringup_t *self, iw_side_t side) {
     char answer[BRINGUP_ANSWER_SIZE];
     char question[96];
@@ -92,7 +93,7 @@ static bool look_at(bringup_t *self, iw_side_t side) {
     }
 }
 
-/// Both wheels with the signs found. True: the operator agrees.
+/// Turns both wheels with the signs found. Returns true if the operator agrees.
 static bool verify(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     outcome_t outcome;

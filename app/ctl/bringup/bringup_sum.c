@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The sum of what wheels count, by answers of the gateway that may come late or not at all.
+// Sum of the wheels' counts, from answers of the gateway that may come late or not at all.
 #include "bringup.h"
 
 #include <stdlib.h>
 
-/// So much back and forth is a hand that aims at a mark: ticks, or a share of the way.
+/// Way back of a hand that aims at a mark: a number of ticks, or one part in BACK_SHARE of the way.
 #define BACK_TICKS 6
 #define BACK_SHARE 20
 
@@ -19,7 +19,8 @@ void hand_begin(hand_t *out_hand, const hand_look_t *first, int64_t now_us) {
         .last = *first, .gap = first->heard ? HAND_COMPLETE : HAND_OFFLINE, .heard_us = now_us, .looked_us = now_us};
 }
 
-/// From one answer with both wheels to the next. The wheels count through a stall; the rpm in it are not known.
+/// Adds the step between two answers with both wheels. The wheels count during a stall, but their rpm in that time are
+/// not known.
 static void add_step(hand_t *self, const hand_look_t *now, int64_t us) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const long long step = now->ticks[side] - self->last.ticks[side];

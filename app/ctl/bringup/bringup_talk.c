@@ -11,7 +11,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-// The terminal has one state for all; it must be put back.
+// The terminal has one state for all processes; bringup must restore it.
 static struct termios normal_keys;
 static bool keys_are_raw;
 
@@ -39,7 +39,8 @@ void talk_step(unsigned number, const char *title) {
     paper_end(&paper);
 }
 
-/// Reads a line byte by byte, so that nothing of the next one is taken. False at the end of the input or on a signal.
+/// Reads a line byte by byte, so that no byte of the next line is consumed. Returns false at the end of the input or on
+/// a signal.
 static bool read_line(char *out_line, size_t size) {
     size_t used = 0;
     const unsigned before = signals_count();
@@ -75,7 +76,7 @@ static void trim(char *text) {
 }
 
 void talk_forget(void) {
-    (void)tcflush(STDIN_FILENO, TCIFLUSH); // An answer to a question that nobody had read yet is none.
+    (void)tcflush(STDIN_FILENO, TCIFLUSH); // Input from before the question is not an answer to it.
 }
 
 void talk_ask(bringup_t *self, const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Track, by full turns of the machine on the spot: it decides where a twist goes. Nothing is sent.
+// Track, by full turns of the machine on the spot; the result of a twist depends on it. Nothing is sent.
 //
 //     track = (way of the right wheel - way of the left wheel) / angle
 #include "bringup.h"
@@ -10,15 +10,15 @@
 
 #define TURNS_MAX 20
 #define TICKS_MIN 60
-/// The bounds of the configuration's key.
+/// Bounds of the configuration key.
 #define TRACK_MIN 200
 #define TRACK_MAX 1500
-/// The machine's middle may have wandered so far, as a share of what the wheels rolled.
+/// Tolerated movement of the machine's middle, as a share of the way that the wheels rolled.
 #define WANDER_PERCENT 20.0
-/// Further off what was configured, somebody may have counted wrongly.
+/// If the result differs more from the configured track, the turns may be counted wrongly.
 #define OFF_PERCENT 10.0
 
-/// What a wheel rolled forwards, in mm.
+/// Returns the way in mm that a wheel rolled forwards.
 static double rolled(const bringup_t *self, const hand_t *hand, iw_side_t side) {
     const iw_config_t *core = &self->config.core;
     const double assumed = 2.0 * M_PI * core->radius_mm / IW_TICKS_PER_TURN * core->gear_per / core->gear_turns;
@@ -60,7 +60,7 @@ static void keep_track(bringup_t *self, const hand_t *hand, int turns, double tr
                  hand->ticks[IW_RIGHT], rolled_distance ? "" : "; the radius is assumed");
 }
 
-/// Nothing confirms what was counted.
+/// Reports that the configuration does not confirm the count.
 static void tell_off(const bringup_t *self) {
     char configured[40] = "None was configured";
     if (self->config.core.track_mm != 0U) {
@@ -71,7 +71,7 @@ static void tell_off(const bringup_t *self) {
              configured);
 }
 
-/// True: it is done.
+/// Returns true if the step is done.
 static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     const double left = rolled(self, hand, IW_LEFT);
     const double right = rolled(self, hand, IW_RIGHT);
@@ -100,7 +100,7 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     return taken;
 }
 
-/// A whole number of turns; 0 if the operator leaves it out.
+/// Asks for a whole number of turns. Returns 0 if the operator leaves the step out.
 static int ask_turns(bringup_t *self) {
     double turns = 0.0;
     while (talk_number(self, "How many full turns (3 is good; Enter: leave it out)", 1.0, TURNS_MAX, &turns)) {

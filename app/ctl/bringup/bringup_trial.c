@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gateway of the session: started with a trial configuration in a folder of its own; both end with us whatever happens.
+// Gateway of the session: it runs with a trial configuration in a folder of its own. Both end with this program in
+// every case.
 #include "bringup.h"
 
 #include <errno.h>
@@ -34,12 +35,12 @@ static int remove_one(const char *path, const struct stat *status, int kind, str
     (void)status;
     (void)kind;
     (void)place;
-    (void)remove(path); // What cannot be removed now is tried again.
+    (void)remove(path); // A file that cannot be removed now is tried again.
     return 0;
 }
 
-/// With all that is in it: the gateway leaves its ledger there, and recordings of stops. Its keeper and its writer end a
-/// little later than it does, and may still be at it. 0, or an exit code.
+/// Removes the folder with its contents: the gateway leaves its assumption store and recordings of stops there. The
+/// processes that write them end a little later than the gateway, and may still write. Returns 0, or an exit code.
 static int remove_folder(const char *folder) {
     const int64_t end_us = client_now_us() + END_US;
     while (access(folder, F_OK) == 0) {
@@ -52,8 +53,9 @@ static int remove_folder(const char *folder) {
     return 0;
 }
 
-/// Waits until neither we nor the gateway hold the leash, whatever ended us, and removes the folder. In a session of its own,
-/// which neither Ctrl-C nor the end of a terminal reaches, and holding nothing else: neither the client's socket nor a pipe.
+/// Waits until neither this program nor the gateway holds the leash, whatever ended them, and removes the folder. The
+/// guard has a session of its own, which neither Ctrl-C nor the end of a terminal reaches. It holds no other
+/// descriptor: neither the client's socket nor a pipe.
 _Noreturn static void become_guard(const char *folder, int held) {
     char nothing;
     (void)setsid();
@@ -65,7 +67,7 @@ _Noreturn static void become_guard(const char *folder, int held) {
     _exit(remove_folder(folder));
 }
 
-/// False if there can be no guard.
+/// Returns false if the guard cannot be started.
 static bool start_guard(trial_t *trial) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) {
@@ -103,7 +105,8 @@ static bool make_folder(trial_t *trial) {
     return false;
 }
 
-/// The configuration to be tried, slowed down, with everything that belongs to a real gateway turned to our folder.
+/// Makes the trial configuration: slow limits, and the folder of the session for everything that belongs to a real
+/// gateway. `with_records` leaves the directory of the records.
 static void slow_down(const bringup_t *self, const gateway_config_t *config, bool with_records,
                       gateway_config_t *out_trial) {
     *out_trial = *config;
@@ -115,15 +118,15 @@ static void slow_down(const bringup_t *self, const gateway_config_t *config, boo
     out_trial->core.lease_ms = 200;
     out_trial->core.period_ms = 20;
     out_trial->core.zero_hold_ms = 1100;
-    out_trial->core.hold_max_s = 10;   // The wheels are in the air: nothing rolls away while somebody waits.
-    out_trial->core.blocked_ms = 2000; // A wheel that does not turn is a result here, and no burst lasts that long.
-    out_trial->core.pair_mm = 150;     // Nor does a pair in the air turn a machine: as wide as it can be.
+    out_trial->core.hold_max_s = 10;   // Wheels in the air: no machine rolls away during a wait.
+    out_trial->core.blocked_ms = 2000; // A wheel that does not turn is a result here. No burst lasts that long.
+    out_trial->core.pair_mm = 150;     // A pair in the air does not turn a machine: the widest limit.
     out_trial->core.pair_leak_ms = 500;
     out_trial->core.track_mm =
         (with_records || config->core.track_mm != 0U) ? config->core.track_mm : iw_config_range(IW_CONFIG_TRACK).max;
     out_trial->core.max_yaw_mrad_s = 10000;
     out_trial->core.yaw_accel_mrad_s2 = 10000;
-    out_trial->core.wheel_silent_ms = 150; // Nobody leans on wheels in the air: rather patient than cut short.
+    out_trial->core.wheel_silent_ms = 150; // Wheels in the air drive no person: waiting is better than a stop.
     out_trial->core.echo_ms = 150;
     out_trial->northbound.mode = 0600;
     out_trial->northbound.max_clients = 4;
@@ -148,7 +151,7 @@ static bool write_config(const bringup_t *self, const gateway_config_t *config, 
     return fclose(file) == 0;
 }
 
-/// Where the gateway's program is: as told, beside this program, where the build puts it, or in the path.
+/// Finds the gateway's program: as given, next to this program, in the folder of the build, or in PATH.
 static void find_program(trial_t *trial) {
     char self[400];
     const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1U);
@@ -183,15 +186,15 @@ _Noreturn static void become_gateway(const trial_t *trial) {
     }
     (void)sigemptyset(&none);
     (void)sigprocmask(SIG_SETMASK, &none, NULL);
-    (void)setpgid(0, 0); // Ctrl-C is for us: we end it in order.
+    (void)setpgid(0, 0); // Ctrl-C reaches only bringup, which ends the gateway in order.
     (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
-    (void)fcntl(trial->leash, F_SETFD, 0); // The folder is there as long as it runs.
+    (void)fcntl(trial->leash, F_SETFD, 0); // The folder exists as long as the gateway runs.
     (void)execlp(trial->program, trial->program, "-c", config, (char *)NULL);
     (void)fprintf(stderr, "%s: %s; name it with --gateway PROGRAM\n", trial->program, strerror(errno));
     _exit(CTL_UNAVAILABLE);
 }
 
-/// The last line that the gateway wrote.
+/// Prints the last line that the gateway wrote.
 static void tell_log(const trial_t *trial) {
     char path[128];
     char line[512];
@@ -292,7 +295,7 @@ json_t *trial_status(bringup_t *self) {
     return near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
 }
 
-/// Null if the wheels may be armed as far as can be seen, else what is missing.
+/// Returns NULL if the wheels can be armed as far as the status shows, otherwise the missing condition.
 static const char *missing(const json_t *status) {
     const json_t *left = json_object_get(status, "left");
     const json_t *right = json_object_get(status, "right");

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Byte 0 of a setpoint: the first of the two things that the document leaves out and that nothing can be driven without.
+// Byte 0 of a setpoint: the first of the two facts that the document leaves out and without which no wheel can be
+// driven.
 //
-// While the role of the current is unknown, wheels are driven as if the current were a setpoint: its zero is 0 mm/s with 0 mA, which is
-// no torque whichever role is right. The other way round, a zero with full current could be full torque.
+// While the role of the current is unknown, bringup drives wheels as if the current were a setpoint: its zero is 0 mm/s
+// with 0 mA, which is no torque in either role. With the other role, a zero with full current could be full torque.
 #include "bringup.h"
 #include "learn/learn.h"
 #include "recordings/ctl_recording.h"
@@ -13,7 +14,7 @@
 #include <string.h>
 
 #define MOVES_MM_S 40
-/// Measured speed in percent of what was told, between which it was followed: the radius may be another one.
+/// Measured speed in percent of the command; within these bounds the wheel followed it. The radius may be different.
 #define FOLLOWS_LOW   60
 #define FOLLOWS_HIGH  150
 #define PROBE_DEFAULT "0-7"
@@ -47,7 +48,8 @@ void bringup_start_with(bringup_t *self, int type) {
     trial_start(self, &config);
 }
 
-/// A type that means speed turns a wheel about as fast as it is told, whatever else may turn it.
+/// Returns true if both wheels followed the command. A type that means speed turns a wheel about as fast as commanded;
+/// other types may turn it as well.
 static bool is_followed(const outcome_t *outcome) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const int speed = abs(outcome->mean_mm_s[side]);
@@ -74,7 +76,7 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
     }
 }
 
-/// Tries one type. True: both wheels turned and the operator saw it.
+/// Tries one type. Returns true if both wheels turned and the operator saw it.
 static bool try_type(bringup_t *self, int type) {
     outcome_t outcome;
     const burst_t burst = bringup_ahead(self, BRINGUP_PROBE_MS);
@@ -98,7 +100,7 @@ static bool try_type(bringup_t *self, int type) {
     return seen;
 }
 
-/// "3", "0-7", "1,4,9-12" into one flag per type. False if it is none of these.
+/// Parses text such as "3", "0-7" or "1,4,9-12" into one flag per type. Returns false if it is not valid.
 static bool parse_types(const char *text, bool wanted[TYPE_MAX + 1]) {
     const char *at = text;
     memset(wanted, 0, sizeof(bool) * (TYPE_MAX + 1));
@@ -141,7 +143,8 @@ static bool try_types(bringup_t *self, const bool *wanted) {
     return false;
 }
 
-/// The types that were sent with a speed, most frequent first as far as there is room: "3" or "3,1".
+/// Lists the types that were sent with a speed, most frequent first, as many as fit and at most four: "3" or "3,1".
+/// Returns the number of their frames; if it is 0, `out_list` is unchanged.
 static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
     uint64_t left[TYPES];
     uint64_t frames = 0;
@@ -150,7 +153,9 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
         left[type] = learn->setpoint[IW_LEFT].type_moving[type] + learn->setpoint[IW_RIGHT].type_moving[type];
         frames += left[type];
     }
-    out_list[0] = '\0';
+    if (frames > 0U) {
+        out_list[0] = '\0';
+    }
     for (unsigned rank = 0; rank < 4U; rank++) {
         unsigned best = 0;
         for (unsigned type = 1; type < TYPES; type++) {
@@ -168,7 +173,7 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
     return frames;
 }
 
-/// Setpoints longer than documented are sent so: the other controller had its reasons.
+/// Uses the length of the recorded setpoints if it is longer than documented: the other controller had a reason for it.
 static void take_length(bringup_t *self, const learn_t *learn) {
     const learn_range_t *left = &learn_known(learn, IW_ID_LEFT_SETPOINT)->length;
     const learn_range_t *right = &learn_known(learn, IW_ID_RIGHT_SETPOINT)->length;
@@ -185,8 +190,8 @@ static void take_length(bringup_t *self, const learn_t *learn) {
     }
 }
 
-/// What a recording of another controller suggests, as `learn` reads it: the setpoint types in it, such as "3,1"; and takes over
-/// its length. Suggestions only: the wheels have the last word. Untouched, after telling, if there are none.
+/// Reads suggestions from a recording of another controller, as `learn` does: the setpoint types, such as "3,1", and
+/// the length. They are suggestions only: the wheels decide. Prints a message if there are none.
 static void learn_from_recording(bringup_t *self, char *out_types, size_t size) {
     study_t *study = calloc(1, sizeof(*study));
     candump_t frame;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the lines are called whose button was seen to work.
+// Names of the e-stop lines whose button was seen to work.
 #include "bringup.h"
 
 #include <stdio.h>

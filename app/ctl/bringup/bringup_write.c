@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The configuration that came of it: written whole or not at all, and over an older one only after asking.
+// The resulting configuration: written whole or not at all; an existing file is replaced only after a question.
 #include "bringup.h"
 
 #include <errno.h>
@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/// Of a text that the ledger keeps, with its terminator.
+/// Size of a text in the assumption store, terminator included.
 #define HOW_SIZE 128U
 
 void bringup_note(bringup_t *self, const char *section, const char *key, const char *item, const char *format, ...) {
@@ -67,7 +67,7 @@ typedef struct {
 } commenter_t;
 
 static const char *comment(const void *context, const char *section, const char *key) {
-    // The text is this module's own; the configuration's printer only hands the pointer through.
+    // The text belongs to this module; the printer of the configuration only passes the pointer through.
     commenter_t *self = *(commenter_t *const *)context;
     const bringup_note_t *note = find_note(self->bringup, section, key);
     if (note == NULL) {
@@ -83,7 +83,7 @@ static void print_head(const char *date, FILE *out) {
         out, "; Written by iwheelctl bringup on %s. Lines that begin with BRINGUP tell how a value was found.\n", date);
 }
 
-/// Puts the new file in its place; an old one there is kept.
+/// Moves the new file to its place; an existing file is renamed to PATH.old.
 static bool put_in_place(const char *beside, const char *path) {
     char old[512];
     if (access(path, F_OK) == 0) {
@@ -96,7 +96,7 @@ static bool put_in_place(const char *beside, const char *path) {
     return rename(beside, path) == 0;
 }
 
-/// Into a file beside it, which then takes its place.
+/// Writes a file next to `path` and moves it to `path`.
 static bool write_file(bringup_t *self, const char *path) {
     commenter_t commenter = {.bringup = self};
     commenter_t *const context = &commenter;
@@ -157,14 +157,14 @@ static void tell_findings(const bringup_t *self) {
     }
 }
 
-/// How it was found, as the ledger keeps it.
+/// Returns the text of a note as the assumption store stores it.
 static const char *how_of(const bringup_note_t *note, char out_how[HOW_SIZE]) {
     (void)snprintf(out_how, HOW_SIZE, "bringup: %.*s", (int)(HOW_SIZE - sizeof("bringup: ")), note->text);
     return out_how;
 }
 
-/// Tells the ledger what was confirmed, through a gateway that keeps it where the real one will look. False if anything
-/// was not taken.
+/// Confirms the noted items in the assumption store, through a gateway that stores them where the real gateway reads
+/// them. Returns false if any of them was not accepted.
 static bool confirm_all(bringup_t *self) {
     char value[32];
     bool taken = trial_start_with_records(self);
@@ -183,7 +183,7 @@ static bool confirm_all(bringup_t *self) {
     return taken;
 }
 
-/// Only where what we write will be the gateway's own: a file of somebody else's it could not replace.
+/// Returns true if the written files will belong to the gateway: it could not replace the files of another user.
 static bool may_keep(const bringup_t *self) {
     struct stat status;
     const char *directory = self->config.record.directory;
@@ -191,7 +191,7 @@ static bool may_keep(const bringup_t *self) {
            access(directory, W_OK | X_OK) == 0;
 }
 
-/// What remains to be done with the file.
+/// Confirms the results if that is possible here, and prints what remains to be done with the file.
 static void tell_next(bringup_t *self, const char *path) {
     char value[32];
     if (may_keep(self) && confirm_all(self)) {

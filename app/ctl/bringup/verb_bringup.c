@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#define CURRENT_MIN_mA 300 // Of max_current_mA.
+#define CURRENT_MIN_mA 300 // Bounds of max_current_mA.
 #define CURRENT_MAX_mA 2000
 
 typedef struct {
@@ -21,7 +21,7 @@ typedef struct {
     const char *learn;
 } words_t;
 
-/// An exit code.
+/// Reads the words. Returns an exit code.
 static int parse_words(int count, char **words, words_t *out_words) {
     memset(out_words, 0, sizeof(*out_words));
     const option_t options[] = {
@@ -49,7 +49,7 @@ static bool parse_current(const char *text, int *out_mA) {
     return true;
 }
 
-/// Where it begins: a file, the installed one, the defaults; then the words. An exit code.
+/// Sets the initial configuration: a file, the installed one or the defaults; then the words. Returns an exit code.
 static int configure(bringup_t *self, const words_t *words) {
     const doctor_named_t bus = {"--can", words->can};
     const int code = doctor_configure(&self->config, words->from, &bus, words->estop);
@@ -69,7 +69,7 @@ static int configure(bringup_t *self, const words_t *words) {
     return (words->current != NULL && !parse_current(words->current, &self->current_mA)) ? CTL_USAGE : CTL_OK;
 }
 
-/// What it is and what it needs. Ends bringup if the operator does not agree.
+/// Explains bringup and its conditions. Ends bringup if the operator does not agree.
 static void introduce(bringup_t *self) {
     talk_say("iwheelctl bringup: from wheels that nobody knows to a configuration that somebody has seen to be right.");
     talk_say(" ");

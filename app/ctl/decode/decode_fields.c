@@ -11,10 +11,10 @@
 #define SATURATED_NOTE  "force at the end of its range: it may be larger"
 
 typedef struct {
-    const char *column; ///< For CSV, in the bus's unit.
-    const char *label;  ///< For people.
+    const char *column; ///< Name for CSV, in the unit of the bus.
+    const char *label;  ///< Name for text.
     const char *unit;
-    unsigned digits; ///< Decimals for people.
+    unsigned digits; ///< Decimals in text.
 } field_words_t;
 
 static const field_words_t words[FIELDS] = {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A frame as named values with units, for text and for CSV. What the bytes mean is the core's codec's affair. Pure.
+/// A frame as named values with units, for text and for CSV. The core's codec defines the bytes. Pure.
 #ifndef DECODE_FIELDS_H
 #define DECODE_FIELDS_H
 
@@ -8,7 +8,7 @@
 
 #include <stdio.h>
 
-/// Every value that any of the eleven messages carries; the columns of the CSV, in this order.
+/// All values of the eleven messages; the columns of the CSV, in this order.
 typedef enum {
     FIELD_SETPOINT_TYPE = 0,
     FIELD_SETPOINT_SPEED,
@@ -31,20 +31,20 @@ typedef enum {
 } field_t;
 
 typedef struct {
-    const char *message; ///< "setpoint", "speed" ...; "unknown" for any other id; what is wrong for a bad frame.
+    const char *message; ///< "setpoint", "speed" ...; "unknown" for another id; "ignored" or "error" for a bad frame.
     const char *wheel;   ///< "left", "right", or "" for an unknown id.
-    const char *note;    ///< What is to be known about the values; "" if nothing.
+    const char *note;    ///< Remark about the values; "" if none.
     uint32_t present;    ///< Bit per field_t.
     int32_t value[FIELDS];
 } decoded_t;
 
-/// Decodes; the unit of the force is the configuration's (iw_config_default: the document's).
+/// Decodes a frame. The unit of the force is that of the configuration (iw_config_default: that of the document).
 void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decoded_t *out);
 
-/// Name of the CSV's column, unit last.
+/// Returns the name of the CSV column, unit last.
 const char *field_column(field_t field);
 
-/// "battery 24.8 V, ..." : all values for people.
+/// Prints all values as text, such as "battery 24.8 V, ...".
 void field_print_all(const decoded_t *decoded, FILE *out);
 
 #endif

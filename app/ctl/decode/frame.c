@@ -30,7 +30,7 @@ void frame_print(const char *time_text, const candump_t *frame, const decoded_t 
                  (decoded->note[0] != '\0') ? ")" : "");
 }
 
-/// Hexadecimal text as bytes.
+/// Reads hexadecimal text into bytes. Returns their number.
 static uint8_t take_data(const char *text, uint8_t data[IW_CAN_DATA_MAX]) {
     uint8_t length = 0;
     while (text != NULL && length < IW_CAN_DATA_MAX && text[0] != '\0' && text[1] != '\0') {

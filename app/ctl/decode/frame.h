@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A frame as one line for people, on stdout, and as the gateway tells it: the event `frame`, and in the reply to `why`.
+/// A frame as one line of text on stdout, and as the gateway sends it: in the event `frame`, and in the reply to `why`.
 #ifndef FRAME_H
 #define FRAME_H
 
@@ -8,16 +8,16 @@
 
 #include <jansson.h>
 
-/// "T", "R", or "" if the recording does not tell.
+/// Returns "T" (sent), "R" (received), or "" if the recording has no direction.
 const char *frame_direction(const candump_t *frame);
 
-/// The data in hexadecimal, with `gap` between the bytes.
+/// Prints the data in hexadecimal, with `gap` between the bytes.
 void frame_print_bytes(const candump_t *frame, const char *gap);
 
-/// Time (of any form, 12 columns), id, who sent it, and the values; of a frame without any, its bytes.
+/// Prints time (12 columns, any form), id, direction and values; the bytes if the frame has no values.
 void frame_print(const char *time_text, const candump_t *frame, const decoded_t *decoded);
 
-/// The frame that the gateway tells, with `time_us` 0; and when it came, on the monotonic clock.
+/// Reads a frame that the gateway sent. Its `time_us` is 0; `*out_at_us` is its time on the monotonic clock.
 candump_t frame_from_json(const json_t *told, int64_t *out_at_us);
 
 #endif

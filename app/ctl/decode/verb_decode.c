@@ -10,18 +10,18 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A time before this is not one since 1970.
+/// An earlier time is not counted from 1970.
 #define CALENDAR_US 1000000000000000
 
 typedef struct {
     const char *path;
     bool csv;
     iw_config_t config;
-    int64_t begin_us; ///< Of the first frame.
+    int64_t begin_us; ///< Time of the first frame.
     recording_t recording;
 } decode_t;
 
-/// An exit code.
+/// Reads the words. Returns an exit code.
 static int parse_words(decode_t *self, int count, char **words) {
     const option_t options[] = {
         {OPTION("--csv", NULL, &self->csv)},
@@ -68,7 +68,7 @@ static void write_csv_header(void) {
 
 static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     char name[CANDUMP_INTERFACE_SIZE];
-    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would be another column.
+    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would begin another column.
         const char c = frame->interface[i];
         name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
@@ -87,7 +87,7 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     (void)printf(",\"%s\"\n", decoded->note);
 }
 
-/// Text, or null if there is none or it is not UTF-8.
+/// Returns the text, or null if it is empty or not UTF-8.
 static json_t *text_or_null(const char *text) {
     json_t *value = (text[0] != '\0') ? json_string(text) : NULL;
     return (value != NULL) ? value : json_null();
@@ -111,8 +111,8 @@ static json_t *values_of(const decoded_t *decoded) {
     return values;
 }
 
-/// One object: when and where, id and bytes, whose message it is, and under `values` what it carries, named as in the CSV.
-/// What is not known is null. False if there was no memory for it: nothing is written.
+/// Writes one object: time and interface, id and bytes, wheel and message, and under `values` the values with the names
+/// of the CSV. An unknown value is null. Returns false if there was no memory; then nothing is written.
 static bool write_json(const candump_t *frame, const decoded_t *decoded) {
     json_t *line = json_pack(
         "{s:I, s:o, s:o, s:I, s:b, s:b, s:b, s:i, s:o, s:o, s:s, s:o, s:o}", "t_us", (json_int_t)frame->time_us,
@@ -125,7 +125,7 @@ static bool write_json(const candump_t *frame, const decoded_t *decoded) {
     return written;
 }
 
-/// An exit code.
+/// Writes one frame. Returns an exit code.
 static int write_frame(decode_t *self, const candump_t *frame, bool json) {
     decoded_t decoded;
     const iw_can_frame_t core = candump_to_core(frame);
@@ -162,7 +162,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     while (code == CTL_OK && ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
         code = write_frame(&decode, &frame, self->json);
         if (recording_is_drained(&decode.recording)) {
-            (void)fflush(stdout); // Live: nobody waits for the next line to see this one.
+            (void)fflush(stdout); // Live: each line must be visible before the next one comes.
         }
     }
     const int read = recording_close(&decode.recording);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What `doctor` and `bringup` look at before anybody touches the wheels. Nothing here sends a frame.
+/// Checks of `doctor` and `bringup` before a wheel is touched. They send no frame.
 #ifndef DOCTOR_H
 #define DOCTOR_H
 
@@ -7,51 +7,52 @@
 #include "inspect.h"
 #include "talk/ctl.h"
 
-/// How long `doctor` listens unless told otherwise.
+/// Default time for which `doctor` listens.
 #define DOCTOR_LISTEN_MS 2000U
 
 typedef struct {
     ctl_t *ctl;
-    const char *bus; ///< In question; null: none could be found.
+    const char *bus; ///< Bus to check; NULL: none was found.
     char found_bus[GATEWAY_ADDRESS_SIZE];
-    gateway_config_t config; ///< The file's, or the defaults.
+    gateway_config_t config; ///< Values of the file, or the defaults.
     near_gateway_t gateway;
     inspect_findings_t findings;
     inspect_heard_t heard;
     iwl_hal_t hal;
-    bool open; ///< `hal` is.
+    bool open; ///< `hal` is open.
     unsigned listen_ms;
 } doctor_t;
 
-/// A word of the command line and what it says; NULL: nothing.
+/// An option of the command line and its value; NULL: not given.
 typedef struct {
     const char *word;
     const char *value;
 } doctor_named_t;
 
-/// The configuration in force: the file at `path`, or else the installed one if there is one; then the words. An exit code, after
-/// telling what is wrong.
+/// Sets the configuration in force: the file at `path`, otherwise the installed one if it exists; then the options.
+/// Returns an exit code, after it has reported what is wrong.
 int doctor_configure(gateway_config_t *config, const char *path, const doctor_named_t *bus, const char *estop);
 
-/// The interfaces of the kind CAN, separated by blanks. How many.
+/// Writes the names of the CAN interfaces, separated by spaces. Returns their number.
 unsigned doctor_interfaces(char *out_names, size_t size);
 
-/// Kernel, driver, clock, rights: what does not need the bus to be open. False if the kernel cannot open it at all.
+/// Checks the parts that do not need an open bus: kernel, driver, clock, rights. Returns false if the kernel cannot
+/// open a bus.
 bool doctor_look_at_machine(doctor_t *self);
 
-/// What the gateway tells of itself, if there is one.
+/// Adds the findings from the gateway's status, if there is a gateway.
 void doctor_look_at_gateway(doctor_t *self);
 
 /// Opens the bus (and, without a gateway, the e-stop), listens and judges.
 void doctor_look_at_bus(doctor_t *self);
 
-/// Closes what is open.
+/// Closes everything that is open.
 void doctor_close(doctor_t *self);
 
-/// The e-stop's present level, from the gateway or from the line itself.
+/// Returns the present level of the e-stop, from the gateway or from the line itself.
 inspect_estop_t doctor_estop(doctor_t *self);
 
-/// Prints the findings from number `first` on for people.
+/// Prints the findings from number `first` on as text.
 void doctor_print(const doctor_t *self, unsigned first);
 
 #endif

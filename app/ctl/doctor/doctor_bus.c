@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the gateway tells, and what is heard on the bus.
+// Findings from the gateway's status and from the bus.
 #include "doctor.h"
 #include "inspect/assumption.h"
 #include "status/advice.h"
@@ -17,7 +17,7 @@ static bool forces_known(const json_t *status) {
 }
 
 static void say_contradicted(doctor_t *self, const char *name, const json_t *entry) {
-    iw_assumption_item_t item = IW_ASSUMPTION_ITEMS; // An item of a gateway newer than we are.
+    iw_assumption_item_t item = IW_ASSUMPTION_ITEMS; // Item of a gateway that is newer than this program.
     const bool known = iwn_assumption_item_of(name, &item);
     const bool tared = known && item == IW_ASSUMPTION_OFFSET_INCLUDED && forces_known(self->gateway.status);
     const bool harmless = known && item == IW_ASSUMPTION_DLC;
@@ -52,7 +52,7 @@ static void list_contradicted(doctor_t *self, json_t *assumptions) {
     }
 }
 
-/// What arm needs and nobody has configured, in the words of the gateway's own --check.
+/// Reports the settings that arm needs and that are not configured, in the words of the gateway's --check.
 static void list_unset(doctor_t *self) {
     static const struct {
         const char *item;
@@ -67,7 +67,7 @@ static void list_unset(doctor_t *self) {
     }
 }
 
-/// A setpoint that nobody acknowledges keeps arm refused, and may leave late.
+/// Reports a setpoint that no node acknowledges: arm is refused because of it, and it may be sent late.
 static void judge_sending(doctor_t *self) {
     char cure[ADVICE_SIZE];
     if (advice_is_present(self->gateway.status, "send_stalled")) {
@@ -101,7 +101,7 @@ static void look_at_status(doctor_t *self) {
     list_contradicted(self, json_object_get(status, "ledger"));
 }
 
-/// The group whose members may use the socket (or its directory).
+/// Suggests the group whose members may use the socket (or its directory).
 static void cure_denied(doctor_t *self) {
     struct stat status;
     const struct group *group = (stat(self->gateway.path, &status) == 0) ? getgrgid(status.st_gid) : NULL;
@@ -142,13 +142,14 @@ static bool has_gateway(const doctor_t *self) {
     return self->gateway.result == NEAR_FOUND;
 }
 
-/// A gateway that we may not ask still holds the e-stop's line and may send.
+/// Returns true if a gateway runs, even one that denies access or does not answer: it holds the e-stop's line and may
+/// send.
 static bool is_occupied(const doctor_t *self) {
     const near_t result = self->gateway.result;
     return result == NEAR_FOUND || result == NEAR_DENIED || result == NEAR_MUTE;
 }
 
-/// False if there is no bus to listen to.
+/// Opens bus and e-stop. Returns false if there is no bus to listen to.
 static bool open_hal(doctor_t *self) {
     const iwl_estop_config_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
                                      .active_high = self->config.estop.active_high,
@@ -165,7 +166,7 @@ static bool open_hal(doctor_t *self) {
     return opened.hal && opened.bus;
 }
 
-/// What the gateway has known longer than we listen: a controller tells error passive once, when it becomes so.
+/// Adds the bus state that the gateway knows from before: a controller reports error passive only when it begins.
 static void hear_gateway(doctor_t *self) {
     if (!has_gateway(self)) {
         return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What can be said of the machine before the bus is opened.
+// Findings about the machine before the bus is opened.
 #include "doctor.h"
 
 #include "iwheel_northbound/text.h"
@@ -17,9 +17,9 @@
 
 /// ARPHRD_CAN, as the kernel writes it.
 #define TYPE_CAN "280"
-/// No release of this program is older.
+/// No release of this program is older than this time.
 #define WALL_MIN_S 1735689600
-/// Sleeps of a millisecond that are measured, and the lateness that the gateway begins to notice.
+/// Number and length of the measured sleeps, and the lateness from which on a warning is given.
 #define NAPS         200
 #define NAP_NS       1000000L
 #define LATE_CARE_us 20000
@@ -59,7 +59,7 @@ unsigned doctor_interfaces(char *out_names, size_t size) {
     return found;
 }
 
-/// The name of the interface's driver, "" if it has no device of its own.
+/// Reads the name of the interface's driver; "" if the interface has no device.
 static void read_driver(const char *bus, char *out_name, size_t size) {
     char path[128];
     char target[256];
@@ -107,7 +107,7 @@ static bool look_at_kernel(doctor_t *self) {
     return true;
 }
 
-/// How much too late the worst of many short sleeps ended.
+/// Returns the largest lateness of many short sleeps.
 static int64_t worst_lateness_us(void) {
     int64_t worst_us = 0;
     for (unsigned i = 0; i < NAPS; i++) {
@@ -147,7 +147,7 @@ static void look_at_clock(doctor_t *self) {
     }
 }
 
-/// Whether this user may use the gateway's socket, by the group that the service has.
+/// Checks whether this user may use the gateway's socket, by the group of the service.
 static void look_at_rights(doctor_t *self) {
     static const char group_name[] = "iwheel";
     gid_t groups[256];

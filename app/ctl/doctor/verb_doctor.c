@@ -12,7 +12,7 @@
 #define INDENT        6U
 #define LISTEN_MIN_US 200000
 #define LISTEN_MAX_US 60000000
-/// For a press, or a release.
+/// Maximum time to wait for a press, or a release.
 #define WAIT_US 20000000
 #define LOOK_MS 20
 
@@ -24,7 +24,7 @@ typedef struct {
     bool no_press;
 } words_t;
 
-/// An exit code.
+/// Reads the words. Returns an exit code.
 static int parse_words(int count, char **words, words_t *out_words) {
     *out_words = (words_t){.listen_us = DOCTOR_LISTEN_MS * INT64_C(1000)};
     const option_t options[] = {
@@ -53,7 +53,7 @@ int doctor_configure(gateway_config_t *config, const char *path, const doctor_na
     return CTL_OK;
 }
 
-/// Which bus is meant: the one named, the gateway's, the configured one, the only one there is.
+/// Chooses the bus: the named one, that of the gateway, the configured one, or the only one of the machine.
 static void choose_bus(doctor_t *self, const words_t *words) {
     char names[256];
     if (words->bus != NULL) {
@@ -104,7 +104,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
         paper_text(&paper, tones[finding->verdict], INDENT, inspect_verdict_word(finding->verdict));
         print_text(&paper, TONE_PLAIN, finding->text);
         if (finding->cure[0] != '\0') {
-            // Not broken into lines: it is made to be copied.
+            // Not broken into lines: users copy it.
             paper_say(&paper, TONE_TITLE, "      -> %s", finding->cure);
             paper_end(&paper);
         }
@@ -163,7 +163,7 @@ static void look(doctor_t *self, const words_t *words) {
     }
 }
 
-/// True once the e-stop is at that level, false if the time is over or a key was pressed.
+/// Returns true when the e-stop is at that level; false if the time is over or a key was pressed.
 static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
     const int64_t end_us = client_now_us() + WAIT_US;
     while (client_now_us() < end_us) {
@@ -197,7 +197,7 @@ static void say_unseen(doctor_t *self, bool skipped, const char *what) {
     }
 }
 
-/// Guides through a press and a release, on a terminal: seen through the same input that will stop the wheels.
+/// Guides the operator through a press and a release on a terminal, seen through the input that will stop the wheels.
 static void press(doctor_t *self) {
     bool skipped = false;
     const inspect_estop_t before = doctor_estop(self);

@@ -4,7 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A whole decimal number, possibly negative, of which |number| <= limit.
+/// Reads a whole decimal number with an optional sign. Returns false if it is not valid or its absolute value is over
+/// the limit.
 static bool parse_integer(const char *text, int limit, int *out_number) {
     const bool negative = text[0] == '-';
     const char *digits = text + ((negative || text[0] == '+') ? 1 : 0);
@@ -38,7 +39,7 @@ static bool is_number(const char *word) {
     return strspn(word, "+-0123456789") > 0 && strncmp(word, "--", 2) != 0;
 }
 
-/// The option at `words[at]`; moves `*at` to its last word.
+/// Reads the option at `words[*at]` and moves `*at` to its last word.
 static bool parse_option(int count, char **words, int *at, drive_words_t *drive, char *out_why) {
     const char *word = words[*at];
     const int left = count - *at - 1;

@@ -25,7 +25,8 @@ typedef struct {
 /// Size of `out_why`.
 #define DRIVE_WHY_SIZE DURATION_WHY_SIZE
 
-/// False, with `*out_drive` untouched and what is wrong and what to write in `out_why`, if the words are no drive command.
+/// Reads the words. If they are not a valid drive command, returns false, leaves `*out_drive` unchanged, and writes the
+/// mistake and its fix to `out_why`.
 bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *out_why);
 
 #endif

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // The only verb that moves wheels.
 //
-//     arm --> drive every lease_ms / 3 --> stop --> wait until zero and at rest
-//                |  time over, signal, refusal, gateway silent or gone
+//     arm --> drive every lease_ms / 3 --> stop --> wait until zero and at standstill
+//                |  time over, signal, refusal, gateway without answer or gone
 //                '-------------------------------------------^
 //
-// It is armed once and never again: whatever ends the lease ends the program. Only a refusal because the wheels do not stand yet is
-// waited for, a second at the most.
+// The program arms once and never again: whatever ends the lease ends the program. Only if arm is refused because the
+// wheels are not at standstill yet, it waits and tries again, for one second at most.
 #include "drive_words.h"
 #include "talk/ctl.h"
 #include "text/ctl_text.h"
@@ -14,19 +14,19 @@
 #include <stdio.h>
 #include <string.h>
 
-/// A drive command without reply for this long: the gateway hangs.
+/// If no reply to a drive command comes for this time, the gateway hangs.
 #define SILENT_US 1000000
-/// The wheels must be at rest this long after the stop at the latest: the gateway's own longest hold.
+/// The wheels must be at standstill at this time after the stop: the longest hold of the gateway.
 #define REST_US 10000000
 #define POLL_US 50000
-/// Until then the gateway refuses the next arm (stale_command).
+/// Time for which the gateway refuses the next arm (stale_command).
 #define FRESH_US 520000
-/// A stop that has only just ended, or a machine that stood still for a moment: the wheels may count as turning this long.
+/// Time for which the wheels may count as turning, after a stop that has just ended or a short stall of the machine.
 #define ARM_PATIENCE_US 1000000
-/// What the gateway may grant; anything else counts as the shortest.
+/// Range of the lease that the gateway may grant; another value counts as the shortest.
 #define LEASE_MIN_MS 20
 #define LEASE_MAX_MS 500
-/// A wheel that is not heard cannot be seen to stand; it is waited for this long.
+/// A wheel without telemetry cannot be seen at standstill. The program waits this time for telemetry.
 #define UNHEARD_US 2000000
 
 typedef enum { END_NONE = 0, END_TIME, END_SIGNAL, END_REFUSED, END_SILENT, END_LOST } end_t;
@@ -34,16 +34,16 @@ typedef enum { END_NONE = 0, END_TIME, END_SIGNAL, END_REFUSED, END_SILENT, END_
 typedef struct {
     ctl_t *ctl;
     drive_words_t words;
-    json_t *first; ///< Snapshots: when driving began, and the last one.
+    json_t *first; ///< Snapshot at the beginning of the drive, and the last one.
     json_t *latest;
     int64_t lease_us;
-    int64_t begin_us; ///< The first drive command was accepted; 0: not yet.
+    int64_t begin_us; ///< Time when the first drive command was accepted; 0: not yet.
     int64_t next_us;
-    int64_t sent_us;     ///< The last drive command left.
-    int64_t answered_us; ///< The last reply came.
+    int64_t sent_us;     ///< Time when the last drive command was sent.
+    int64_t answered_us; ///< Time of the last reply.
     long long applied[2];
     bool limited;
-    unsigned live;       ///< Columns to show progress in; 0: stdout is no terminal that can, or --json was given.
+    unsigned live;       ///< Columns for the progress; 0: stdout is not a suitable terminal, or --json was given.
     char last_line[512]; ///< With --json: the last reply to a drive command.
 } drive_t;
 
@@ -94,11 +94,11 @@ static iwc_result_t send_drive(drive_t *self, int64_t now_us) {
     const int64_t period_us = self->lease_us / 3;
     self->next_us += period_us;
     if (self->next_us <= now_us) {
-        self->next_us = now_us + period_us; // Late: what was missed is not sent in a burst.
+        self->next_us = now_us + period_us; // Late: missed commands are not sent in a burst.
     }
     const iwc_result_t result = client_send(&self->ctl->client, request, now_us, &id);
     if (result == IWC_FULL) {
-        return IWC_OK; // The gateway does not read: this one is forgotten, and SILENT_US ends the drive.
+        return IWC_OK; // The gateway does not read: this command is dropped, and SILENT_US ends the drive.
     }
     self->sent_us = now_us;
     return result;
@@ -114,7 +114,8 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
         return END_NONE;
     }
     (void)snprintf(self->last_line, sizeof self->last_line, "%s", self->ctl->client.line);
-    // Replaced or lost on a serial line: it fed nothing, and the next may, as long as the lease lives. SILENT_US ends it else.
+    // Replaced or lost on a serial line: the command did not renew the lease, but the next one may while the lease
+    // lives. Otherwise SILENT_US ends the drive.
     if (!json_is_true(ok) && self->begin_us > 0 && strcmp(text_word(line, "error"), "stale_command") == 0) {
         return END_NONE;
     }
@@ -146,7 +147,7 @@ static end_t end_of(const drive_t *self, iwc_result_t result) {
     return END_NONE;
 }
 
-/// Sends the command until something ends it.
+/// Sends the command until something ends the drive.
 static end_t run(drive_t *self) {
     end_t end = END_NONE;
     self->next_us = client_now_us();
@@ -191,7 +192,7 @@ static bool both_stand(const json_t *status) {
            wheel_stands(json_object_get(status, "right"));
 }
 
-/// As ctl_ask, without printing the reply's line.
+/// Asks as ctl_ask does, without printing the line of the reply.
 static int ask_quietly(const drive_t *self, json_t *request, json_t **out_reply) {
     const bool json = self->ctl->json;
     self->ctl->json = false;
@@ -200,7 +201,8 @@ static int ask_quietly(const drive_t *self, json_t *request, json_t **out_reply)
     return code;
 }
 
-/// Waits until both wheels stand and the next drive would not be refused for this one. A further signal ends the wait.
+/// Waits until both wheels are at standstill and the next drive is not refused because of this one. Another signal ends
+/// the wait.
 static int wait_for_rest(drive_t *self) {
     const int64_t begin_us = client_now_us();
     const int64_t fresh_us = self->sent_us + ((self->lease_us > FRESH_US) ? self->lease_us : FRESH_US);
@@ -233,13 +235,13 @@ static int wait_for_rest(drive_t *self) {
     }
 }
 
-/// Whether both snapshots count from the same beginning: a wheel that rebooted in between has lost its count.
+/// Returns true if both snapshots count from the same beginning: a wheel that rebooted in between has lost its count.
 static bool counted_through(const json_t *first, const json_t *latest) {
     const json_t *before = json_object_get(first, "reboots");
     return json_is_integer(before) && json_equal(before, json_object_get(latest, "reboots")) == 1;
 }
 
-/// Metres a wheel went between both snapshots.
+/// Writes the distance in metres that a wheel moved between both snapshots.
 static void way_of(const drive_t *self, const char *side, char out[TEXT_CELL]) {
     const json_t *first = json_object_get(self->first, side);
     const json_t *latest = json_object_get(self->latest, side);
@@ -263,7 +265,7 @@ static void sum_up(const drive_t *self, int64_t stop_us) {
                  self->applied[1], self->limited ? " (limited)" : "", driven_s(self, stop_us), left, right);
 }
 
-/// A refusal in motion only tells what came of the stop; this tells what stopped the wheels.
+/// Reports the cause of the last stop: a refusal during a drive only reports a consequence of the stop.
 static void tell_why(const drive_t *self) {
     json_t *reply = NULL;
     if (ask_quietly(self, json_pack("{s:s}", "cmd", "why"), &reply) == CTL_OK) {
@@ -272,7 +274,7 @@ static void tell_why(const drive_t *self) {
     json_decref(reply);
 }
 
-/// How it ended, told once both wheels stand. The exit code.
+/// Reports how the drive ended, once both wheels are at standstill. Returns the exit code.
 static int judge(const drive_t *self, end_t end, int64_t stop_us) {
     if (!self->ctl->json) {
         sum_up(self, stop_us);
@@ -294,7 +296,7 @@ static int judge(const drive_t *self, end_t end, int64_t stop_us) {
     return (end == END_TIME) ? CTL_OK : CTL_NO;
 }
 
-/// Stops, whatever happened before.
+/// Stops the wheels, whatever happened before.
 static int finish(drive_t *self, end_t end) {
     json_t *reply = NULL;
     const int64_t stop_us = client_now_us();
@@ -316,7 +318,7 @@ static int finish(drive_t *self, end_t end) {
     return (code == CTL_OK) ? judge(self, end, stop_us) : code;
 }
 
-/// Lets time pass and drops what the gateway tells meanwhile. An exit code.
+/// Waits a short time and drops the events of the gateway. Returns an exit code.
 static int wait_a_moment(const drive_t *self) {
     const int64_t until_us = client_now_us() + POLL_US;
     iwc_result_t result = IWC_OK;
@@ -332,7 +334,7 @@ static bool passes(const json_t *reply) {
     return json_is_false(json_object_get(reply, "ok")) && strcmp(text_word(reply, "error"), "not_at_rest") == 0;
 }
 
-/// Arms, again while the wheels do not stand yet. As ctl_ask.
+/// Arms, and tries again while the wheels are not at standstill. Returns as ctl_ask does.
 static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) {
     const int64_t end_us = client_now_us() + ARM_PATIENCE_US;
     int code = ctl_exchange(self->ctl, json_incref(request), out_reply);
@@ -351,7 +353,7 @@ static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) 
     return (code == CTL_OK) ? ctl_accept(self->ctl, out_reply) : code;
 }
 
-/// Subscribes to the wheels' state and arms. An exit code.
+/// Subscribes to the state of the wheels and arms. Returns an exit code.
 static int arm(drive_t *self) {
     json_t *reply = NULL;
     size_t index = 0;

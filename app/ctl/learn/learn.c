@@ -3,23 +3,23 @@
 
 #include <string.h>
 
-/// A speed told for this long has been reached.
+/// A wheel has reached a speed that was commanded for this time.
 #define STEADY_US 1000000
 /// mm/s of one rpm with a radius of 192 mm, in um/s.
 #define UM_S_PER_RPM 20106
-/// Slower commands say too little: 1 rpm is 20 mm/s.
+/// Slower commands show too little: 1 rpm is 20 mm/s.
 #define STEADY_MM_S 100
-/// At rest, for as long as this.
+/// A wheel is at standstill if it turns no faster for this time.
 #define REST_RPM 2
 #define REST_US  500000
-/// No odometry step is larger between two status frames: beyond it is a reboot.
+/// Maximum odometry step between two status frames; a larger one is a reboot.
 #define TICKS_MAX 10000U
-/// Between speed frames, and between pose frames; longer is a gap of the recording.
+/// Maximum time between speed frames, and between pose frames; a longer time is a gap of the recording.
 #define RPM_GAP_US  100000
 #define POSE_GAP_US 200000
-/// Slower than this, 1 rpm of resolution is too much.
+/// At a lower speed, the resolution of 1 rpm is too coarse.
 #define EXACT_RPM 10
-/// Time without speed frames from one status frame to the next.
+/// Tolerated time without speed frames between two status frames.
 #define UNCOVERED_US 10000
 
 static const uint32_t ids[LEARN_IDS] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOINT, IW_ID_LEFT_SPEED,  IW_ID_RIGHT_SPEED,
@@ -89,7 +89,7 @@ uint32_t learn_period_ms(const learn_period_t *period) {
     return LEARN_PERIOD_MAX_MS;
 }
 
-/// LEARN_IDS if it is none of them.
+/// Returns the index of the id; LEARN_IDS if it is not an id of the wheels.
 static size_t index_of(uint32_t id) {
     size_t i = 0;
     while (i < LEARN_IDS && ids[i] != id) {
@@ -124,7 +124,7 @@ static void note_id(learn_id_t *id, const candump_t *frame) {
     note_period(&id->period, frame->time_us);
 }
 
-/// Which way it is told to go, and with how much current.
+/// Notes the commanded direction and its current.
 static void note_direction(learn_setpoint_t *self, const iw_codec_setpoint_t *now) {
     if (now->speed_mm_s == 0) {
         self->at_rest++;
@@ -166,7 +166,7 @@ static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const 
     self->last_us = frame->time_us;
 }
 
-/// The wheel's answer to a speed that it was told for long enough.
+/// Notes the answer of the wheel to a speed that was commanded for long enough.
 static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, int32_t rpm, int64_t for_us) {
     const int32_t commanded_mm_s = told->speed_mm_s;
     learn_answer_t *answer = (commanded_mm_s > 0) ? &self->forward : &self->backward;
@@ -215,7 +215,7 @@ static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, in
     self->rpm_us = at_us;
 }
 
-/// Ticks and rpm are compared only from one status frame to the next, where speed frames came all the time.
+/// Compares ticks and rpm only between two status frames with speed frames all the time between them.
 static void note_ticks(learn_wheel_t *self, int64_t at_us, int32_t ticks) {
     const uint32_t forward = (uint32_t)ticks - (uint32_t)self->last_ticks;
     const uint32_t step = (forward > INT32_MAX) ? 0U - forward : forward;
@@ -233,7 +233,7 @@ static void note_ticks(learn_wheel_t *self, int64_t at_us, int32_t ticks) {
     self->last_ticks_us = at_us;
 }
 
-/// At rest is a wheel whose speed frames say so, now and for a while.
+/// Notes the force. A wheel is at standstill if its speed frames show it, now and for the time REST_US.
 static void note_force(learn_wheel_t *self, int64_t at_us, int16_t raw) {
     const bool told = self->rpm_us >= 0 && at_us - self->rpm_us < RPM_GAP_US;
     widen(&self->force, raw);
@@ -251,7 +251,7 @@ static uint64_t way(const uint8_t *now, const uint8_t *before, size_t high, size
         const uint16_t a = (uint16_t)((unsigned)now[i + high] << 8U | now[i + low]);
         const uint16_t b = (uint16_t)((unsigned)before[i + high] << 8U | before[i + low]);
         const uint16_t step = (uint16_t)(a - b);
-        sum += (step > INT16_MAX) ? 65536U - step : step; // It may wrap.
+        sum += (step > INT16_MAX) ? 65536U - step : step; // The value may wrap.
     }
     return sum;
 }

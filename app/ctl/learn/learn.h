@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// What a recording of another controller tells about the wheels that their document leaves open: setpoint types, ranges, lengths,
-/// periods, what speaks for or against the documented units. In constant memory; frames come one by one.
+/// Facts about the wheels that their document leaves open, from a recording of another controller: setpoint types,
+/// ranges, lengths, periods, and observations for or against the documented units. Constant memory; frames come one by
+/// one.
 ///
-/// Nothing here decides: figures and evidence, and where there is none, that there is none. What a sentence claims was
-/// seen, all of it: whoever reads it drives a person with it (learn_findings.h).
+/// This part makes no decision. It collects figures and observations, and reports where there are none. Everything that
+/// a sentence claims was seen, because its reader drives a person with it (learn_findings.h).
 #ifndef LEARN_H
 #define LEARN_H
 
@@ -12,23 +13,23 @@
 #include "iwheel/codec.h"
 
 #define LEARN_IDS 11U
-/// Other ids told one by one.
+/// Maximum number of other ids that are reported one by one.
 #define LEARN_OTHERS_MAX 32U
-/// Periods are counted by the millisecond up to this.
+/// Periods are counted in milliseconds up to this value.
 #define LEARN_PERIOD_MAX_MS 2000U
 
-/// A range of values. Nothing: low > high.
+/// A range of values. It is empty if low > high.
 typedef struct {
     int32_t low;
     int32_t high;
 } learn_range_t;
 
-/// Spacing of the frames of one id.
+/// Time between the frames of one id.
 typedef struct {
-    int64_t last_us; ///< -1: none yet.
+    int64_t last_us; ///< Time of the last frame; -1: none yet.
     int64_t longest_us;
     uint64_t counted;
-    uint32_t histogram[LEARN_PERIOD_MAX_MS + 1U]; ///< By the millisecond, rounded; the last: all that are longer.
+    uint32_t histogram[LEARN_PERIOD_MAX_MS + 1U]; ///< Number per millisecond, rounded; the last place: all longer.
 } learn_period_t;
 
 typedef struct {
@@ -39,10 +40,10 @@ typedef struct {
     learn_period_t period;
 } learn_id_t;
 
-/// What one wheel was told.
+/// Setpoints of one wheel.
 typedef struct {
     uint64_t count;
-    uint64_t sent; ///< Marked as sent by the program that recorded it.
+    uint64_t sent; ///< Marked as sent by the program that recorded them.
     uint64_t type[256];
     uint64_t type_moving[256]; ///< With a speed that is not 0.
     uint64_t at_rest;          ///< With speed 0.
@@ -53,42 +54,41 @@ typedef struct {
     learn_range_t current_at_rest_mA;  ///< With speed 0.
     learn_range_t current_forward_mA;  ///< With a positive speed.
     learn_range_t current_backward_mA; ///< With a negative speed.
-    uint64_t padding;                  ///< Frames with a byte behind the documented five that is not 0.
+    uint64_t padding;                  ///< Frames with a byte after the documented five that is not 0.
     uint64_t over_limit;               ///< Frames with a current outside the documented range.
-    uint64_t changes_of_type;          ///< From one frame to the next.
+    uint64_t changes_of_type;          ///< Changes from one frame to the next.
     iw_codec_setpoint_t last;
     int64_t last_us;
-    int64_t steady_since_us; ///< Speed and current are these since then, without a gap in which the wheel would stop.
+    int64_t steady_since_us; ///< Same speed and current since then, without a gap that stops the wheel.
 } learn_setpoint_t;
 
-/// What the speed frames of a wheel showed while it was told one steady speed in one direction, long enough to have
-/// reached it: for how long, without gaps.
+/// Time for which a wheel had each reaction, without gaps: while one steady speed in one direction was commanded, for
+/// long enough to have reached it.
 typedef struct {
-    int64_t with_us;    ///< It turned with the sign that it was told.
-    int64_t against_us; ///< It turned the other way.
+    int64_t with_us;    ///< It turned with the commanded sign.
+    int64_t against_us; ///< It turned with the opposite sign.
     int64_t still_us;   ///< It did not turn.
 } learn_answer_t;
 
-/// What one wheel showed.
+/// Telemetry of one wheel.
 typedef struct {
     uint64_t speeds; ///< Speed frames.
     learn_answer_t forward;
     learn_answer_t backward;
-    int64_t stood_us;      ///< For how long it rested while told 0 with a current, long enough to have stopped.
-    int64_t ran_us;        ///< The same, but it turned.
-    int64_t steady_us;     ///< For how long it turned while told a steady speed.
-    int64_t steady_fit_us; ///< Of these, with the rpm of a radius of 192 mm and no gear.
-    int64_t steady_mm_s;   ///< Sum of what it was told then, frame by frame, as magnitude.
-    int64_t steady_rpm;    ///< Sum of what it showed, as magnitude.
-    int32_t rpm;           ///< The last.
-    int64_t rpm_us;        ///< When; -1: never.
-    int64_t rest_since_us; ///< -1: it turns.
+    int64_t stood_us;      ///< Time at standstill with setpoint 0 and a current, after it had time to stop.
+    int64_t ran_us;        ///< Time in which it turned in this condition.
+    int64_t steady_us;     ///< Time in which it turned with a steady setpoint.
+    int64_t steady_fit_us; ///< Part of it with the rpm of a radius of 192 mm and no gear.
+    int64_t steady_mm_s;   ///< Sum of the commanded speeds in this time, per frame, absolute.
+    int64_t steady_rpm;    ///< Sum of the measured rpm, absolute.
+    int32_t rpm;           ///< Last rpm.
+    int64_t rpm_us;        ///< Time of `rpm`; -1: never.
+    int64_t rest_since_us; ///< Time of the standstill; -1: it turns.
     uint64_t statuses;     ///< Status frames.
-    int64_t
-        turned_rpm_us; ///< Integral of |rpm| over us, from status frame to status frame, where it turned all the time.
+    int64_t turned_rpm_us; ///< Integral of |rpm| over us between status frames in which it turned all the time.
     int64_t pending_rpm_us;
-    int64_t pending_us; ///< Time that speed frames cover, since the last status frame.
-    bool pending_slow;  ///< It turned too slowly for its rpm to be exact, or the other way.
+    int64_t pending_us; ///< Time since the last status frame that speed frames cover.
+    bool pending_slow;  ///< The speed was too low for exact rpm, or changed its sign.
     uint64_t ticks;     ///< Sum of |steps| in that time.
     int32_t last_ticks;
     int64_t last_ticks_us;
@@ -101,10 +101,10 @@ typedef struct {
     learn_range_t offset_dN;
 } learn_wheel_t;
 
-/// Way of the pose from frame to frame, most significant byte first and the other way round.
+/// Way of the pose from frame to frame, with the most and with the least significant byte first.
 typedef struct {
     uint64_t count;
-    uint64_t moves; ///< Times that it was another than just before.
+    uint64_t moves; ///< Number of frames that differ from the one before.
     uint64_t way_big;
     uint64_t way_little;
     int64_t last_us;
@@ -113,16 +113,16 @@ typedef struct {
 
 typedef struct {
     uint64_t frames;
-    uint64_t strange; ///< Known number, but remote, extended, FD.
-    uint64_t errors;  ///< The controller's error reports.
+    uint64_t strange; ///< Frames with a known id that are remote, extended or FD.
+    uint64_t errors;  ///< Error reports of the controller.
     uint64_t too_short;
-    uint64_t backwards; ///< Times that go back.
+    uint64_t backwards; ///< Number of times that go back.
     int64_t first_us;
     int64_t last_us;
     learn_id_t known[LEARN_IDS];
     learn_id_t other[LEARN_OTHERS_MAX];
     uint32_t others;
-    uint64_t more_others; ///< Frames of other ids for which there was no room.
+    uint64_t more_others; ///< Frames of other ids for which there was no place.
     learn_setpoint_t setpoint[IW_SIDES];
     learn_wheel_t wheel[IW_SIDES];
     learn_pose_t pose;
@@ -131,10 +131,10 @@ typedef struct {
 void learn_init(learn_t *self);
 void learn_frame(learn_t *self, const candump_t *frame);
 
-/// The middle period in ms; 0 if fewer than three frames came.
+/// Returns the median period in ms; 0 with fewer than three frames.
 uint32_t learn_period_ms(const learn_period_t *period);
 
-/// A recording of that id; NULL if the document has no such id.
+/// Returns the record of an id; NULL if the document has no such id.
 const learn_id_t *learn_known(const learn_t *self, uint32_t id);
 
 #endif

@@ -4,9 +4,10 @@
 #include <inttypes.h>
 #include <string.h>
 
-/// A wheel that is not heard for longer is not compared, as in the gateway (`wheel_silent_ms`).
+/// A wheel without a speed frame for a longer time is not compared, as in the gateway (`wheel_silent_ms`).
 #define HEARD_US 50000
-/// Without a speed for so long a drive has ended; so has one without setpoints, since the wheels stop by themselves then.
+/// A drive has ended if no speed was commanded for this time. It has also ended without setpoints, because the wheels
+/// stop on their own then.
 #define ENDED_US ((int64_t)IW_WHEEL_WATCHDOG_US)
 
 void learn_drives_init(learn_drives_t *self, const iw_config_t *config) {
@@ -37,7 +38,7 @@ static bool has_ended(const learn_drives_t *self, int64_t now_us) {
     return !told || !is_recent(self->moved_us, now_us, ENDED_US);
 }
 
-/// Up to now, if both wheels were told and heard all the time since the last frame.
+/// Compares up to `now_us` if both wheels had setpoints and speed frames all the time since the last frame.
 static void compare(learn_drives_t *self, int64_t now_us) {
     bool known = true;
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -59,7 +60,7 @@ static void compare(learn_drives_t *self, int64_t now_us) {
     }
 }
 
-/// A setpoint means the same in the machine's frame, as measured speeds do.
+/// Notes a setpoint. `applied_mm_s` is in the machine's sense of direction, as measured speeds are.
 static void tell(learn_drives_t *self, size_t side, int32_t speed_mm_s, int64_t now_us) {
     self->pair.applied_mm_s[side] = self->config->invert[side] ? -speed_mm_s : speed_mm_s;
     self->told_us[side] = now_us;

@@ -13,7 +13,7 @@ bool learn_is_empty(const learn_range_t *range) {
 
 learn_finding_t *learn_say(learn_findings_t *self, char mark, const char *item, unsigned side, const char *format,
                            ...) {
-    // More than there is room for cannot be said: every sentence is said once, or once per side.
+    // The list cannot overflow: each sentence is added once, or once per side.
     learn_finding_t *finding = &self->at[(self->count < LEARN_FINDINGS_MAX - 1U) ? self->count++ : self->count];
     va_list list;
     *finding = (learn_finding_t){.mark = mark, .item = item, .side = side};
@@ -34,10 +34,10 @@ const learn_finding_t *learn_find(const learn_findings_t *self, const char *item
 
 bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding, const char **out_section,
                     const char **out_key) {
-    // Without a type that moves the wheels nobody knows what the rest of a setpoint meant.
+    // Without a type that moves the wheels, the meaning of the rest of a setpoint is not known.
     static const struct {
         const char *item;
-        const char *section; ///< NULL: that of its side.
+        const char *section; ///< NULL: the section of its side.
         bool needs_type;
     } keys[] = {{"setpoint_type", "wheels", true},
                 {"current_role", "wheels", true},

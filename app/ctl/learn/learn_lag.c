@@ -6,19 +6,19 @@
 #include <math.h>
 #include <string.h>
 
-/// After this long at one setpoint a wheel has reached it; its speed is taken from then on, for as long again.
+/// After this time at one setpoint a wheel has reached it. Its speed is measured from then on, for the same time.
 #define SETTLE_US 500000
-/// Smaller changes are few steps of telemetry.
+/// Smaller changes are only a few steps of telemetry.
 #define CHANGE_MIN_MM_S 300.0
-/// Longer without a speed frame is a gap.
+/// A longer time without a speed frame is a gap.
 #define GAP_US 100000
-/// Of one wheel, for a value; and how far they may lie apart.
+/// Minimum number of changes of one wheel for a value, and the maximum difference between them.
 #define COUNT_MIN 2U
 #define SPREAD_MS 30.0
-/// What the configuration takes.
+/// Range of the configuration key.
 #define LAG_MIN_MS 10
 #define LAG_MAX_MS 300
-/// Margins of the rule of the pair were computed for this much around its value (docs/user/pair.md).
+/// The margins of the rule of the pair were computed for this range around its value (docs/user/pair.md).
 #define RANGE_PERCENT 30
 
 void learn_lag_init(learn_lag_t *self) {
@@ -26,7 +26,7 @@ void learn_lag_init(learn_lag_t *self) {
     self->told_us = self->measured_us = -1;
 }
 
-/// Nothing is known of the wheel's state.
+/// Discards the state of the wheel: it is not known.
 static void forget(learn_lag_t *self) {
     self->changing = false;
     self->settled_us = 0;
@@ -44,7 +44,7 @@ static void take(learn_lag_t *self, double lag_ms) {
     self->count++;
 }
 
-/// The wheel has a steady speed again.
+/// Ends a change: the wheel has a steady speed again.
 static void end_change(learn_lag_t *self) {
     const double told = self->commanded_mm_s - self->before_told;
     const double measured = self->settled_mm / ((double)self->settled_us / 1e6) - self->before;
@@ -54,7 +54,7 @@ static void end_change(learn_lag_t *self) {
     }
 }
 
-/// Up to now, with what was told and measured until then.
+/// Adds the time up to `to_us`, with the setpoint and the speed until then.
 static void pass(learn_lag_t *self, int64_t from_us, int64_t to_us, double measured_mm_s) {
     const double span_s = (double)(to_us - from_us) / 1e6;
     const double way_mm = (self->measured_mm_s + measured_mm_s) / 2.0 * span_s;
@@ -90,7 +90,7 @@ void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
         return;
     }
     if (self->measured_us >= 0 && at_us > self->measured_us && at_us - self->measured_us <= GAP_US) {
-        pass(self, self->measured_us, at_us, self->measured_mm_s); // What comes after it belongs to the new one.
+        pass(self, self->measured_us, at_us, self->measured_mm_s); // The time after it belongs to the new setpoint.
         self->measured_us = at_us;
     }
     if (!self->changing && self->settled_us >= SETTLE_US) {
@@ -105,7 +105,7 @@ void learn_lag_tell(learn_lag_t *self, int64_t at_us, int32_t speed_mm_s) {
     self->constant_us = at_us;
 }
 
-/// Rounded.
+/// Returns the rounded mean in ms.
 static int32_t mean_ms(const learn_lag_t *self) {
     return (int32_t)lround(self->sum_ms / self->count);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the setpoints of the recording tell: type, role of the current, length. Where a wheel's behaviour belongs to the
-// claim, it was seen as well.
+// Findings about the setpoints of the recording: type, role of the current, length. Where a finding claims a behaviour
+// of the wheels, it was seen as well.
 #include "learn_findings.h"
 #include "text/ctl_text.h"
 
@@ -9,7 +9,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-/// The only type with which that wheel was moved; -1: none or several.
+/// Returns the only type that commanded a speed of the wheel; -1: none or several.
 static int moving_type(const learn_setpoint_t *setpoint) {
     int found = -1;
     for (int type = 0; type < 256; type++) {
@@ -27,12 +27,12 @@ static uint64_t moving(const learn_setpoint_t *setpoint) {
     return setpoint->forward + setpoint->backward;
 }
 
-/// What both wheels must have for a sentence about both. NULL: both have it; else the one that has not, or both.
+/// Returns NULL if both wheels have what a sentence about both needs; otherwise the wheel or wheels without it.
 static const char *lacking(bool left, bool right) {
     return (left && right) ? NULL : left ? "the right wheel" : right ? "the left wheel" : "both wheels";
 }
 
-/// What keeps the type from being told although every setpoint with a speed has it. NULL: nothing.
+/// Returns the wheels that were not seen to turn by their setpoints; NULL: both turned.
 static const char *unseen_motion(const learn_t *self) {
     return lacking(learn_turned(&self->wheel[IW_LEFT]), learn_turned(&self->wheel[IW_RIGHT]));
 }
@@ -98,7 +98,7 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
     }
 }
 
-/// All setpoints, or some, were sent by the program that recorded them.
+/// Reports whether all or some setpoints were sent by the program that recorded them.
 static void weigh_sender(uint64_t count, uint64_t sent, learn_findings_t *out) {
     if (sent == count) {
         (void)learn_say(out, '-', "sender", LEARN_BOTH,
@@ -112,7 +112,7 @@ static void weigh_sender(uint64_t count, uint64_t sent, learn_findings_t *out) {
     }
 }
 
-/// The same positive current with rest, forwards and backwards.
+/// Returns true if the positive current is the same at standstill, forwards and backwards.
 static bool is_constant(const learn_setpoint_t *setpoint) {
     return setpoint->current_mA.low == setpoint->current_mA.high && setpoint->current_mA.low > 0;
 }
@@ -123,7 +123,7 @@ static bool is_only(const learn_range_t *range, int sign) {
                                                   : range->low == 0 && range->high == 0);
 }
 
-/// No current at rest, and otherwise of the sign of the speed, as far as there is any.
+/// Returns true if there is no current with speed 0, and otherwise the sign of each current is that of the speed.
 static bool is_signed(const learn_setpoint_t *setpoint) {
     return is_only(&setpoint->current_at_rest_mA, 0) && is_only(&setpoint->current_forward_mA, 1) &&
            is_only(&setpoint->current_backward_mA, -1);
@@ -133,7 +133,8 @@ static bool both(const learn_t *self, bool (*judge)(const learn_setpoint_t *setp
     return judge(&self->setpoint[IW_LEFT]) && judge(&self->setpoint[IW_RIGHT]);
 }
 
-/// What was not told to both wheels often enough to speak of "every speed": "0", "forwards", "backwards". Empty: all was.
+/// Lists the speeds that both wheels did not get often enough for "every speed": "0", "forwards", "backwards". Empty:
+/// none is missing.
 static void list_untold(const learn_t *self, char *out_list, size_t size) {
     static const char *const words[] = {"0", "forwards", "backwards"};
     iwn_text_t list = iwn_text_begin(out_list, size);
@@ -154,7 +155,7 @@ static void doubt_role(learn_findings_t *out, const char *why, const char *cure)
     (void)learn_say(out, '?', "current_role", LEARN_BOTH, "current role: %s%s", why, cure);
 }
 
-/// With speed 0 and current both wheels stood: that is what sets a limit apart.
+/// Judges the role limit: with it, both wheels are at standstill with speed 0 and a current.
 static void weigh_limit(const learn_t *self, learn_findings_t *out) {
     const learn_wheel_t *left = &self->wheel[IW_LEFT];
     const learn_wheel_t *right = &self->wheel[IW_RIGHT];

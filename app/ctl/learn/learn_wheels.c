@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// What the wheels of the recording showed: signs, scale, ticks, units of force, byte order.
+// Findings about the wheels of the recording: signs, scale, ticks, units of force, byte order.
 #include "learn_findings.h"
 #include "text/ctl_text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 
-/// Less than this many turns says nothing of ticks.
+/// Fewer turns show nothing about ticks.
 #define TURNS_MIN  2
 #define US_PER_MIN 60000000
-/// As in the gateway: an offset of at least this, and samples of a second at rest.
+/// As in the gateway: minimum offset, and samples of one second at standstill.
 #define OFFSET_MIN_dN 20
 #define REST_MIN      20U
-/// A force that sways further than this while the wheel rests is somebody's hand: counts, or the tenth part of it.
+/// If the force of a wheel at standstill sways more, a hand touches it: in counts, plus a tenth of the mean.
 #define QUIET_COUNTS 6
-/// Times that the pose must have moved, and how far.
+/// Minimum number of movements of the pose, and minimum way.
 #define POSE_MOVES_MIN 25U
 #define POSE_WAY_MIN   1000U
 
@@ -38,7 +38,7 @@ bool learn_stayed(const learn_wheel_t *wheel) {
            nearly_all(still, still + turned_us(&wheel->forward) + turned_us(&wheel->backward));
 }
 
-/// 1: with the sign that was told; -1: against it; 0: now so, now so. Only if the direction was seen.
+/// Returns 1 for the commanded sign, -1 for the opposite sign, 0 for both. Valid only if the direction was seen.
 static int sign_of(const learn_answer_t *answer) {
     const int64_t all = turned_us(answer);
     return (answer->against_us * 20 < all) ? 1 : (answer->with_us * 20 < all) ? -1 : 0;
@@ -56,7 +56,7 @@ static const char *no_sign(const learn_t *self, unsigned side) {
                                : "it was not seen to turn for half a second by a steady speed of 100 mm/s or more";
 }
 
-/// "a positive setpoint is measured as a positive speed": a direction that was told, and the sign found for it.
+/// Writes "a positive setpoint is measured as a positive speed" for a commanded direction and its sign.
 static void say_direction(bool forward, int sign, char *out_text, size_t size) {
     const char *measured = (sign > 0) ? (forward ? "positive" : "negative") : (forward ? "NEGATIVE" : "POSITIVE");
     (void)snprintf(out_text, size, "a %s setpoint is measured as a %s speed", forward ? "positive" : "negative",
@@ -90,7 +90,7 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     (void)snprintf(told->value, sizeof told->value, "%s", (first > 0) ? "yes" : "no");
 }
 
-/// Speed told against rpm shown.
+/// Compares the commanded speed with the measured rpm.
 static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
         (void)learn_say(out, '?', "speed_scale", side,
@@ -135,7 +135,7 @@ static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_finding
                                       : "the rotor makes 60, and no gear makes fewer: were frames lost?");
 }
 
-/// What is missing for a ratio of force and offset; NULL: nothing.
+/// Returns what is missing for a ratio of force and offset; NULL: nothing.
 static const char *no_force(const learn_wheel_t *wheel) {
     const learn_range_t *rest = &wheel->rest_force;
     const learn_range_t *offset = &wheel->offset_dN;
@@ -159,7 +159,7 @@ static const char *no_force(const learn_wheel_t *wheel) {
     return (rest->high - rest->low > slack) ? "the force sways while the wheel rests: somebody touched it" : NULL;
 }
 
-/// What the ratio (1000 x raw / offset) speaks for: "cN", "dN", "removed", or NULL.
+/// Returns the unit that the ratio (1000 x raw / offset) shows: "cN", "dN", "removed", or NULL.
 static const char *unit_of(int64_t permille) {
     return (permille >= 8000 && permille <= 12000) ? "cN"
            : (permille >= 800 && permille <= 1200) ? "dN"

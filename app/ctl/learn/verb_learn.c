@@ -75,7 +75,7 @@ static void print_id(const learn_id_t *id, const char *said) {
                  id->id, id->count, length, period, said);
 }
 
-/// An extended id with the number of a standard one of the wheels.
+/// Returns true for an extended id with the number of a standard id of the wheels.
 static bool is_extended_of_ours(const learn_t *self, const learn_id_t *id) {
     return id->extended && learn_known(self, id->id) != NULL;
 }
@@ -145,7 +145,7 @@ static void suggest(const learn_findings_t *findings) {
     }
 }
 
-/// What was read, and what it tells.
+/// The data of a recording, and the findings about it.
 typedef struct {
     learn_t learn;
     learn_drives_t drives;
@@ -153,7 +153,7 @@ typedef struct {
     iw_config_t config;
 } study_t;
 
-/// Prints all of it.
+/// Prints the whole report.
 static void report(const study_t *study, const char *name) {
     const learn_t *self = &study->learn;
     const learn_findings_t *findings = &study->findings;
@@ -170,7 +170,7 @@ static void report(const study_t *study, const char *name) {
     suggest(findings);
 }
 
-// The same as the report, for programs: what was counted (evidence), what it tells, what it suggests.
+// The report for programs: counts, findings and suggestions.
 #include "text/ctl_text.h"
 
 #include <inttypes.h>
@@ -178,7 +178,7 @@ static void report(const study_t *study, const char *name) {
 #include <stdio.h>
 #include <string.h>
 
-/// [low, high], or null.
+/// Returns [low, high], or null for an empty range.
 static json_t *range(const learn_range_t *range) {
     return learn_is_empty(range) ? json_null() : json_pack("[i,i]", (int)range->low, (int)range->high);
 }
@@ -284,7 +284,7 @@ static json_t *drives_of(const learn_drives_t *self) {
     return list;
 }
 
-/// The same for programs, as one JSON object in one line: what was counted (evidence), what it tells, what it suggests. False if
+/// Prints the report for programs, as one JSON object in one line: counts, findings, suggestions. Returns false if
 /// there is no memory for it.
 static bool report_json(const study_t *study, const char *name) {
     const learn_t *self = &study->learn;

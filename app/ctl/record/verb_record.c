@@ -15,36 +15,36 @@
 #include <unistd.h>
 
 #define USUAL_BUS "can0"
-/// A millisecond to a month.
+/// Bounds of --for: a millisecond to a month.
 #define FOR_MIN_US 1000
 #define FOR_MAX_US (720 * INT64_C(3600000000))
 
-/// What was written is seen by others so soon.
+/// Interval at which the file is flushed, so that other programs can read it.
 #define FLUSH_US 1000000
 #define LOOK_US  500000
-/// How long an interface may take to be seen as up.
+/// Time for which an interface may take to be up.
 #define UP_US   1000000
 #define WAIT_MS 50
 
-/// A recording being made: where it is written, for how long, from where the frames come.
+/// A recording in progress: its file, its end and the source of its frames.
 typedef struct {
     FILE *file;
-    const char *name; ///< Of the file, as shown; "standard output".
+    const char *name; ///< Name of the file in messages; "standard output".
     char interface[CANDUMP_INTERFACE_SIZE];
-    char bus[128];         ///< As it was asked for, or as the gateway names it.
-    bool from_gateway;     ///< Else from the bus itself.
-    int64_t wall_minus_us; ///< Wall clock minus monotonic clock, of the whole recording: its times never step.
+    char bus[128];         ///< Bus as requested, or as the gateway names it.
+    bool from_gateway;     ///< Otherwise from the bus itself.
+    int64_t wall_minus_us; ///< Wall clock minus monotonic clock, constant: the recorded times have no steps.
     int64_t end_us;        ///< Monotonic; INT64_MAX: until a signal.
-    int64_t first_us;      ///< Of the first frame.
+    int64_t first_us;      ///< Time of the first frame.
     int64_t last_us;
     uint64_t frames;
-    uint64_t lost; ///< That are known to be missing.
+    uint64_t lost; ///< Frames that are known to be missing.
     int64_t flushed_us;
 } recorder_t;
 
 typedef struct {
     const char *path; ///< NULL: a name made of the time.
-    const char *bus;  ///< NULL: not told.
+    const char *bus;  ///< NULL: not given.
     int64_t for_us;   ///< 0: until a signal.
 } words_t;
 
@@ -96,7 +96,7 @@ static int64_t wall_minus_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000 - client_now_us();
 }
 
-/// Writes one frame that came at `at_us` (monotonic). False: it cannot be written, errno tells why.
+/// Writes one frame that came at `at_us` (monotonic). Returns false, with errno, if it cannot be written.
 static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
     char line[CANDUMP_LINE_SIZE];
     candump_t whole = *frame;
@@ -111,7 +111,7 @@ static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
     return fwrite(line, 1, length, self->file) == length;
 }
 
-/// Lets others see what was written, once a second. False as above.
+/// Flushes the file once a second. Returns false, with errno, if it cannot be written.
 static bool poll_recorder(recorder_t *self) {
     const int64_t now_us = client_now_us();
     if (now_us - self->flushed_us < FLUSH_US) {
@@ -121,7 +121,7 @@ static bool poll_recorder(recorder_t *self) {
     return fflush(self->file) == 0;
 }
 
-/// True if it could be written.
+/// Records an event of the gateway. Returns false if it cannot be written.
 static bool take_event(recorder_t *self, const json_t *line) {
     const char *event = json_string_value(json_object_get(line, "event"));
     int64_t at_us = 0;
@@ -136,8 +136,7 @@ static bool take_event(recorder_t *self, const json_t *line) {
     return put(self, &frame, at_us);
 }
 
-/// Records what the gateway (which is connected) sees: it tells each frame, received and sent. Until the end or a signal.
-/// An exit code.
+/// Records the frames that the connected gateway receives and sends, until the end or a signal. Returns an exit code.
 static int record_gateway(ctl_t *ctl, recorder_t *self) {
     json_t *reply = NULL;
     int code = ctl_ask(ctl, json_pack("{s:s,s:[s]}", "cmd", "watch", "topics", "frame"), &reply);
@@ -189,14 +188,14 @@ static int tell_down(const char *bus) {
                      bus, bus);
 }
 
-/// Waits for something to read, a signal, or a while.
+/// Waits for a frame, a signal, or WAIT_MS.
 static void wait_a_while(source_t *source) {
     const struct timespec while_ = {.tv_sec = 0, .tv_nsec = WAIT_MS * 1000000L};
     struct pollfd entry = {.fd = iwl_bus_fd(&source->bus), .events = POLLIN};
     (void)ppoll(&entry, 1, &while_, signals_let_in());
 }
 
-/// Everything that is there. False: it could not be written.
+/// Records all frames that are there. Returns false if they cannot be written.
 static bool drain(source_t *source, recorder_t *self) {
     iw_can_frame_t frame;
     const int64_t now_us = client_now_us();
@@ -224,8 +223,8 @@ static bool comes_up(source_t *source) {
     }
 }
 
-/// Records from the bus itself. The port's backend is opened as the gateway opens it, and only its receiving half is used.
-/// An exit code.
+/// Records from the bus itself. The port's backend is opened as the gateway opens it, but only its receiving half is
+/// used. Returns an exit code.
 static int record_bus(const char *bus, recorder_t *self) {
     static source_t source; // Too large for a stack.
     source.signals = signals_count();
@@ -252,7 +251,7 @@ static int record_bus(const char *bus, recorder_t *self) {
     return code;
 }
 
-/// From the gateway if there is one for this bus: it also knows its own frames from others'.
+/// Records from the gateway if there is one for this bus: it also distinguishes its own frames from those of others.
 static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
     near_gateway_t gateway = {0};
     near_look(ctl, words->bus, &gateway);
@@ -272,7 +271,7 @@ static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
     return record_bus(bus, self);
 }
 
-/// Nothing came: no file is left behind.
+/// Ends a recording without frames: the file is removed.
 static int finish_empty(recorder_t *self, int code) {
     if (self->file != stdout) {
         (void)fclose(self->file);

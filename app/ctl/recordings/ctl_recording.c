@@ -12,15 +12,15 @@
 #include <unistd.h>
 
 #define PREFIX "stop-"
-/// Frames of two buses in one recording may be this much out of order; a clock that was set goes back further.
+/// Frames of two buses in one recording may be out of order by this time; if a clock was set, time goes back further.
 #define BACK_US 100000
-/// Two frames of a bus in use are closer together.
+/// Two frames of a bus in use are closer than this.
 #define AHEAD_US 2000000
-/// A stamp further ahead means that the clock was set: no recording has a pause this long.
+/// A stamp that is further ahead shows that the clock was set: no recording has a pause this long.
 #define PAUSE_MAX_US INT64_C(3600000000)
-/// A gateway whose disk is slow.
+/// Time limit for one piece, for a gateway with a slow disk.
 #define PIECE_MS 20000
-/// The gateway keeps no more than 128 MiB of recordings together.
+/// The gateway stores at most 128 MiB of recordings in total.
 #define BYTES_MAX ((int64_t)160 * 1024 * 1024)
 
 static const char *last_part(const char *path) {
@@ -28,7 +28,7 @@ static const char *last_part(const char *path) {
     return (slash != NULL) ? slash + 1 : path;
 }
 
-/// A file of a recording of the gateway's, by its name.
+/// Returns true if the name is that of a file of the gateway's recordings.
 static bool is_ours(const char *path) {
     const char *name = last_part(path);
     const char *ending = strrchr(name, '.');
@@ -36,7 +36,7 @@ static bool is_ours(const char *path) {
            (strcmp(ending, ".log") == 0 || strcmp(ending, ".jsonl") == 0 || strcmp(ending, ".conf") == 0);
 }
 
-/// Looked for without a word: a file that is not there is told as such.
+/// Connects to the gateway without messages: a missing file is reported as a missing file.
 static bool connected(ctl_t *ctl) {
     if (!ctl->client.open) {
         near_gateway_t gateway = {0};
@@ -58,7 +58,7 @@ static bool write_all(int fd, const char *bytes, size_t length) {
     return true;
 }
 
-/// Piece after piece, the whole compared with its checksum.
+/// Fetches the file piece by piece; the whole is compared with its checksum.
 static bool fetch(ctl_t *ctl, const char *name, int64_t most, int fd) {
     static char bytes[IWC_PIECE_MAX];
     iwc_piece_t piece = {.size = 1};
@@ -67,7 +67,7 @@ static bool fetch(ctl_t *ctl, const char *name, int64_t most, int fd) {
         const iwc_result_t result = iwc_recording(ctl->client.gateway, name, PIECE_MS, bytes, &piece);
         if (result != IWC_OK || piece.size > BYTES_MAX || !write_all(fd, bytes, piece.length)) {
             if (result != IWC_REFUSED) {
-                client_close(&ctl->client); // A late reply would be taken for another's.
+                client_close(&ctl->client); // A late reply would be taken for the reply to another request.
             }
             return false;
         }
@@ -82,12 +82,12 @@ int source_open(ctl_t *ctl, const char *path, int64_t most) {
     if (fd >= 0 || ctl == NULL || !absent || !is_ours(path) || !connected(ctl)) {
         return fd;
     }
-    const int memory = memfd_create("recording", MFD_CLOEXEC);
-    if (memory >= 0 && fetch(ctl, last_part(path), most, memory)) {
-        return memory;
+    const int file = memfd_create("recording", MFD_CLOEXEC);
+    if (file >= 0 && fetch(ctl, last_part(path), most, file)) {
+        return file;
     }
-    if (memory >= 0) {
-        (void)close(memory);
+    if (file >= 0) {
+        (void)close(file);
     }
     errno = error;
     return -1;
@@ -155,7 +155,8 @@ static void tell_bad(recording_t *self) {
     }
 }
 
-/// Whether the frame belongs to the interface that is read. A second interface without a choice refuses the recording.
+/// Returns true if the frame belongs to the interface that is read. If there is a second interface and no choice, the
+/// recording is refused.
 static bool is_chosen(recording_t *self, const candump_t *frame) {
     if (self->every_interface) {
         return true;
@@ -176,7 +177,7 @@ static bool is_chosen(recording_t *self, const candump_t *frame) {
     return false;
 }
 
-/// The next frame of the chosen interface, as it stands there.
+/// Reads the next frame of the chosen interface, with its time unchanged.
 static bool read_frame(recording_t *self, candump_t *out_frame) {
     while (!self->refused) {
         switch (candump_reader_next(&self->reader, out_frame)) {
@@ -203,9 +204,10 @@ static bool follows(int64_t time_us, int64_t before_us) {
     return time_us >= before_us - BACK_US && time_us <= before_us + AHEAD_US;
 }
 
-/// The time of a frame that does not follow the one before it: a wrong stamp, a clock that was set, or a pause.
+/// Returns the time of a frame that does not follow the one before it: because of a wrong stamp, a clock that was set,
+/// or a pause.
 static int64_t judge_jump(recording_t *self, int64_t stamp_us) {
-    if (follows(stamp_us, self->last_us)) { // It was set back to what it was before.
+    if (follows(stamp_us, self->last_us)) { // The clock was set back to its former time.
         self->shift_us = 0;
         return stamp_us;
     }

@@ -16,7 +16,7 @@ static int64_t integer(const json_t *line, const char *name) {
     return json_integer_value(json_object_get(line, name));
 }
 
-/// The index of a word in a list that a function names; `count` if it is none of them.
+/// Returns the index of a word in the list that `name_of` gives; `count` if it is not in the list.
 static unsigned word_of(const json_t *line, const char *name, const char *(*name_of)(unsigned), unsigned count) {
     const char *word = json_string_value(json_object_get(line, name));
     for (unsigned i = 0; word != NULL && i < count; i++) {
@@ -27,7 +27,7 @@ static unsigned word_of(const json_t *line, const char *name, const char *(*name
     return count;
 }
 
-/// What a function of the protocol's words calls a number.
+/// Defines a function that returns the protocol's name of a number.
 #define NAMES(of_, function_, type_)                                                                                   \
     static const char *of_##_name(unsigned number) {                                                                   \
         return function_((type_)number);                                                                               \
@@ -36,7 +36,7 @@ NAMES(bus, iwn_bus_state_name, iw_bus_state_t)
 NAMES(state, iwn_state_name, iw_state_t)
 NAMES(cause, iwn_cause_name, iw_cause_t)
 NAMES(item, iwn_assumption_item_name, iw_assumption_item_t)
-NAMES(ledger_state, iwn_assumption_state_name, iw_assumption_state_t)
+NAMES(assumption_state, iwn_assumption_state_name, iw_assumption_state_t)
 NAMES(source, iwn_source_name, iw_source_t)
 
 static const char *refusal_name(unsigned refusal) {
@@ -52,7 +52,7 @@ static uint8_t flag(const json_t *line, const char *name) {
     return json_is_true(json_object_get(line, name)) ? 1U : 0U;
 }
 
-/// False if the word is unknown.
+/// Reads a word. Returns false if it is unknown.
 static bool take_word(const json_t *line, const char *name, const char *(*name_of)(unsigned), unsigned count,
                       uint8_t *out) {
     const unsigned value = word_of(line, name, name_of, count);
@@ -106,7 +106,7 @@ static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
     out->number = source;
     out->as.value = limited(integer(line, "figure"), INT32_MAX);
     return source <= IW_SOURCE_OPERATOR && take_word(line, "item", item_name, IW_ASSUMPTION_ITEMS, &out->a) &&
-           take_word(line, "state", ledger_state_name, states, &out->b);
+           take_word(line, "state", assumption_state_name, states, &out->b);
 }
 
 static bool take_fields(const json_t *line, blackbox_entry_t *out) {
@@ -152,7 +152,7 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
     }
 }
 
-/// An entry of a line; false if it is none.
+/// Reads the entry of a line. Returns false if it is not an entry.
 static bool take_entry(events_t *self, const json_t *line, blackbox_entry_t *out, uint64_t *out_frames) {
     const char *type = json_string_value(json_object_get(line, "type"));
     const blackbox_kind_t kind = (type != NULL) ? blackbox_kind_of(type) : BLACKBOX_KINDS;
@@ -165,7 +165,7 @@ static bool take_entry(events_t *self, const json_t *line, blackbox_entry_t *out
     return kind != BLACKBOX_KINDS && kind != BLACKBOX_FRAME && take_fields(line, out);
 }
 
-/// The next line as an object; NULL: the end, or a line that is none, which has been told.
+/// Returns the next line as an object; NULL at the end, or for a line that is not an object, which has been reported.
 static json_t *next_line(events_t *self, bool *out_end) {
     json_error_t error;
     const ssize_t length = getline(&self->line, &self->line_size, self->file);
@@ -216,7 +216,7 @@ void events_close(events_t *self) {
     *self = (events_t){.name = self->name};
 }
 
-/// Lines that are no entries: what is missing, and the end.
+/// Reads a line that is not an entry: the number of missing entries, or the end.
 static bool take_other(events_t *self, const json_t *line) {
     const char *type = json_string_value(json_object_get(line, "type"));
     if (type != NULL && strcmp(type, "lost") == 0) {

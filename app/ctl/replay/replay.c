@@ -5,18 +5,18 @@
 
 #include <string.h>
 
-// Of the wheels that are made up to begin within a recording.
+// Period of the simulated wheels for a replay that begins within a recording.
 #define PERIOD_US 4000U
-/// For the first frames, and for the arming to be proven.
+/// Time for the first frames, and until arming is proven.
 #define SLACK_US 500000U
-/// After rest_ms of rest.
+/// Delay of arm after rest_ms at standstill.
 #define ARM_LATER_US 32000U
 
 static int side_of(const iw_can_frame_t *frame) {
     return (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : (frame->id == IW_ID_RIGHT_SETPOINT) ? IW_RIGHT : -1;
 }
 
-/// The next noted answer of that kind; `otherwise` if none is left.
+/// Returns the next noted answer of that kind; `otherwise` if there is none.
 static int take_answer(replay_t *self, blackbox_kind_t kind, uint32_t number, int otherwise) {
     if (self->answered < self->answers) {
         const blackbox_entry_t *answer = &self->answer[self->answered];
@@ -35,7 +35,7 @@ static int send_one(replay_t *self, const iw_can_frame_t *frame) {
         return answer;
     }
     self->total_sent++;
-    if (self->sent_count[side] == REPLAY_SENT) { // The oldest will have no echo any more.
+    if (self->sent_count[side] == REPLAY_SENT) { // The oldest gets no echo any more.
         memmove(&self->sent[side][0], &self->sent[side][1], sizeof self->sent[side] - sizeof self->sent[side][0]);
         self->sent_count[side]--;
     }
@@ -43,7 +43,7 @@ static int send_one(replay_t *self, const iw_can_frame_t *frame) {
     return answer;
 }
 
-/// As the port that was recorded: from the first frame on, up to the one that it refused.
+/// Sends as the recorded port did: from the first frame on, up to the one that the port refused.
 static int port_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     replay_t *self = (replay_t *)context;
     for (uint32_t i = 0; i < count; i++) {
@@ -55,7 +55,7 @@ static int port_send(void *context, const iw_can_frame_t *frames, uint32_t count
     return (int)count;
 }
 
-/// An echo as it was recorded, against the setpoint that we sent.
+/// Compares a recorded echo with the setpoint that the core sent.
 static void compare_echo(replay_t *self, const iw_can_frame_t *frame) {
     const int side = side_of(frame);
     if (side < 0 || frame->kind != (uint8_t)IW_CAN_ECHO || !self->compares) {
@@ -143,7 +143,7 @@ bool replay_frame(replay_t *self, const iw_can_frame_t *frame) {
     return true;
 }
 
-/// Where the recording has no echoes, the bus acknowledges at once.
+/// Acknowledges immediately where the recording has no echoes.
 static void echo_what_was_sent(replay_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         for (uint32_t i = 0; i < self->sent_count[side] && self->frames < IW_GATEWAY_DRAIN_MAX; i++) {
@@ -197,7 +197,7 @@ static void tare(replay_t *self, const blackbox_entry_t *entry) {
     (void)iw_gateway_tare(&self->gateway, entry->at_us, sides, &refused);
 }
 
-/// What was decided then, beside what is decided now.
+/// Compares a recorded decision with the present one.
 static void compare(replay_t *self, const blackbox_entry_t *entry) {
     const iw_stop_t *stop = replay_look(self).stop;
     const bool is_state = entry->kind == (uint8_t)BLACKBOX_STATE;
@@ -205,7 +205,7 @@ static void compare(replay_t *self, const blackbox_entry_t *entry) {
                                : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
                                      (int64_t)stop->detail == entry->as.value;
     if (is_state && entry->a == entry->b && same) {
-        return; // Only noted again.
+        return; // The state is only noted again.
     }
     count(is_state ? &self->states : &self->stops, same);
     if (!same) {
@@ -243,7 +243,7 @@ static void know(replay_t *self, const blackbox_entry_t *entry) {
     const iw_assumption_entry_t known = {(iw_assumption_state_t)entry->b, (iw_source_t)entry->number,
                                          (int32_t)entry->as.value};
     iw_gateway_set_assumption(&self->gateway, (iw_assumption_item_t)entry->a,
-                              &known); // What it changes the next step tells.
+                              &known); // The next step reports the changes.
 }
 
 void replay_event(replay_t *self, const blackbox_entry_t *entry) {
@@ -289,7 +289,7 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
     }
 }
 
-/// rpm that a wheel would show which does what it was told.
+/// Returns the rpm of a wheel that follows the setpoint.
 static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_frame_t *setpoint) {
     iw_codec_wheel_t told[IW_SIDES];
     if (setpoint == NULL || iw_codec_decode(setpoint, told) != IW_CODEC_SETPOINT) {
@@ -298,7 +298,7 @@ static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_fram
     return (int16_t)(told[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_look(self).wheel[side].um_s_per_rpm);
 }
 
-/// A cycle of the made-up bus: both wheels show what they were told last.
+/// Runs a cycle of the simulated bus: both wheels show the speed of their last setpoint.
 static void turn_wheels(replay_t *self, iw_time_us_t at_us, iw_can_frame_t last[IW_SIDES]) {
     for (uint32_t i = 0; i < self->frames; i++) { // Echoes of the last step.
         last[iw_codec_side(self->frame[i].id)] = self->frame[i];
@@ -338,7 +338,7 @@ static void keep_driving(replay_t *self, const blackbox_entry_t *state, iw_time_
     (void)iw_gateway_drive(&self->gateway, at_us, state->number, &wanted, &applied);
 }
 
-/// Arms for the recorded holder, drives until the ramp is through; returns when it is.
+/// Arms for the recorded holder, and drives up to the time of `state`, so that the ramp is complete.
 static void drive_up(replay_t *self, const blackbox_entry_t *state, iw_time_us_t from_us) {
     iw_can_frame_t last[IW_SIDES] = {0};
     const iw_time_us_t rest_us = (iw_time_us_t)replay_look(self).config->rest_ms * IW_US_PER_MS;

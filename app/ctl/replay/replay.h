@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// A recording fed through the same core that runs in the gateway, and what the core decided.
+/// Feeds a recording through the core of the gateway and prints the decisions of the core.
 ///
-/// Pure but for the stream it prints to: time, frames and requests come from the recording, so the same recording gives the
-/// same bytes each time. What the core would send goes nowhere; where the recording has the echo of a setpoint it is
-/// compared with what the core sent.
+/// Pure, except for the output stream: time, frames and requests come from the recording, so the same recording gives
+/// the same bytes each time. The frames that the core sends go nowhere. Where the recording has the echo of a setpoint,
+/// it is compared with the frame that the core sent.
 #ifndef REPLAY_H
 #define REPLAY_H
 
@@ -13,9 +13,9 @@
 
 #include <stdio.h>
 
-/// Answers of the port noted in one step.
+/// Maximum number of answers of the port in one step.
 #define REPLAY_ANSWERS 8U
-/// Setpoints of one wheel on their way to their echo.
+/// Maximum number of setpoints of one wheel without an echo.
 #define REPLAY_SENT 4U
 
 typedef struct {
@@ -23,10 +23,10 @@ typedef struct {
     uint64_t different;
 } replay_score_t;
 
-/// Where it is told, and how.
+/// Output stream and form.
 typedef struct {
     FILE *file;
-    bool json; ///< One object a line instead of text.
+    bool json; ///< One object per line instead of text.
 } replay_out_t;
 
 typedef struct {
@@ -34,22 +34,22 @@ typedef struct {
     replay_out_t out;
     const char *estop_name;
     const char *bus_name;
-    iw_time_us_t zero_us; ///< Printed times count from here.
-    iw_time_us_t now_us;  ///< Of the last step.
-    iw_time_us_t next_us; ///< As it wished.
-    // What the port answers.
+    iw_time_us_t zero_us; ///< Printed times count from this time.
+    iw_time_us_t now_us;  ///< Time of the last step.
+    iw_time_us_t next_us; ///< Time of the next step that the core requested.
+    // Answers of the port.
     int estop;
     iw_bus_state_t bus;
-    iw_can_frame_t frame[IW_GATEWAY_DRAIN_MAX]; ///< To be received in the next step.
+    iw_can_frame_t frame[IW_GATEWAY_DRAIN_MAX]; ///< Received in the next step.
     uint32_t frames;
     uint32_t received;
-    blackbox_entry_t answer[REPLAY_ANSWERS]; ///< To sends and purges of the next step, in order.
+    blackbox_entry_t answer[REPLAY_ANSWERS]; ///< Answers to sends and purges of the next step, in order.
     uint32_t answers;
     uint32_t answered;
-    bool echoes; ///< While the recording has none: what is sent comes back as its echo.
-    // What was told, so that only changes are.
-    bool quiet;    ///< Nothing is told.
-    bool compares; ///< Echoes are compared with what was sent.
+    bool echoes; ///< For a time without recorded echoes: each sent frame comes back as its echo.
+    // Values that were printed, so that only changes are printed.
+    bool quiet;    ///< Nothing is printed.
+    bool compares; ///< Echoes are compared with sent frames.
     iw_state_t state;
     iw_refusal_t arm_refusal;
     bool arming;
@@ -60,8 +60,8 @@ typedef struct {
     iw_assumption_entry_t assumptions[IW_ASSUMPTION_ITEMS];
     blackbox_drive_t drive;
     uint8_t drive_refusal;
-    iw_client_t drive_client; ///< IW_CLIENT_NONE: no command was told since the last other thing.
-    // The comparison with what was recorded.
+    iw_client_t drive_client; ///< IW_CLIENT_NONE: no command was printed since the last other event.
+    // Comparison with the recording.
     iw_can_frame_t sent[IW_SIDES][REPLAY_SENT];
     uint32_t sent_count[IW_SIDES];
     uint64_t total_frames;
@@ -72,49 +72,49 @@ typedef struct {
     replay_score_t stops;
 } replay_t;
 
-/// Begins with the bus active, the e-stop released, in LISTENING. `config` must be one that the core accepts.
+/// Starts with bus active, e-stop released, state LISTENING. The core must accept `config`.
 void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, replay_out_t out);
 
-/// The same, as the recorded gateway began.
+/// Starts as the recorded gateway started.
 void replay_start(replay_t *self, const iw_config_t *config, const blackbox_entry_t *entry);
 
-/// A frame to be received in the next step. False: there is no room, step first.
+/// Adds a frame for the next step. Returns false if there is no room; then step first.
 bool replay_frame(replay_t *self, const iw_can_frame_t *frame);
 
-/// One step of the core, and everything it decided.
+/// Runs one step of the core and prints its decisions.
 void replay_step(replay_t *self, iw_time_us_t at_us);
 
-/// Anything else that is in a recording: a change of the port's answers, a request; a decision is compared with ours.
-/// BLACKBOX_FRAME, _STEP and _START are not for here.
+/// Applies another entry of a recording: a change of the port's answers, or a request; a recorded decision is compared
+/// with the present one. BLACKBOX_FRAME, _STEP and _START must not be passed.
 void replay_event(replay_t *self, const blackbox_entry_t *entry);
 
-/// What is known of the wheels after the last step.
+/// Returns the snapshot after the last step.
 iw_snapshot_t replay_look(const replay_t *self);
 
-/// Tells in a closing line or two what was fed in, and how it compares with what was recorded.
+/// Prints a summary: what was fed in, and how it compares with the recording.
 void replay_finish(const replay_t *self);
 
-/// Brings a replay to where the recorded gateway was when its recording begins: to the state, the lease and the speed that the
-/// recording tells, on wheels made up for it. What it had learned before (force offsets, assumptions) stays unknown.
-/// `state` is a BLACKBOX_STATE; `self->estop` and `self->bus` are the answers at its time. Nothing of this is told. False: the
-/// core could not be brought there.
+/// Brings a replay to the point where the recording begins: to its state, lease and speed, on simulated wheels. Values
+/// that the gateway had learned before (force offsets, assumptions) stay unknown. `state` is a BLACKBOX_STATE;
+/// `self->estop` and `self->bus` are the answers at its time. Prints nothing. Returns false if the core could not be
+/// brought to this state.
 bool replay_warm(replay_t *self, const iw_config_t *config, const blackbox_entry_t *state);
 
-// --- what it decides, in lines for people or as JSON (replay_tell.c) ---------------------------------------------
+// --- decisions, as text or as JSON (replay_tell.c) -----------------------------------------------------------------
 
-/// What the last step has changed.
+/// Prints the changes of the last step.
 void replay_tell_step(replay_t *self);
 
-/// A request and what became of it. A drive command that says the same as the one before is not told again.
+/// Prints a request and its result. A drive command that is equal to the one before is not printed again.
 void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal);
 
-/// An answer of the port that has changed; before it is taken over.
+/// Prints a changed answer of the port. Called before the answer is stored.
 void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry);
 
-/// A decision was recorded that is not ours.
+/// Prints a recorded decision that differs from the present one.
 void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry);
 
-/// A remark that belongs to no time.
+/// Prints a remark without a time.
 __attribute__((format(printf, 2, 3))) void replay_note(const replay_out_t *out, const char *format, ...);
 
 #endif

@@ -21,7 +21,7 @@ static void put_object(const replay_out_t *out, json_t *object) {
     json_decref(object);
 }
 
-/// "stop asked" is stop_asked.
+/// Writes the name of an event: "stop asked" becomes stop_asked.
 static void name_event(const char *what, char out_name[16]) {
     size_t i = 0;
     for (; what[i] != '\0' && i < 15U; i++) {

@@ -10,35 +10,34 @@
 #include <string.h>
 #include <unistd.h>
 
-/// A longer silence in a recording is cut to this.
+/// A longer gap without frames is cut to this.
 #define GAP_US     60000000U
 #define PATH_SIZE  1024U
 #define FRAMES_END ".log"
 
 typedef struct {
     const char *path;
-    ctl_t *
-        ctl; ///< To ask the gateway, unless the recording is a file here: what lies beside it belongs to it. Then NULL.
+    ctl_t *ctl; ///< To ask the gateway; NULL if the recording is a local file, whose other files are local too.
     replay_out_t out;
-    iw_config_t config; ///< Radius 0: none was told.
+    iw_config_t config; ///< Radius 0: no configuration was given.
     recording_t recording;
     events_t events;
     replay_t replay;
-    // The next of each, not used yet.
+    // Next frame and next entry, not used yet.
     candump_t frame;
     bool has_frame;
     blackbox_entry_t entry;
     uint64_t entry_frames;
     bool has_entry;
-    uint64_t fed; ///< Frames used.
+    uint64_t fed; ///< Number of used frames.
     int64_t wall_minus_us;
-    uint64_t cut_us; ///< By which later times are earlier.
+    uint64_t cut_us; ///< Later times are earlier by this.
     iw_time_us_t group_us;
     bool group; ///< Frames wait for their step.
     uint64_t backwards;
 } verb_replay_t;
 
-/// FILE.log -> FILE + ending. False if it has another ending or is too long.
+/// Replaces the ending of FILE.log. Returns false if the path has another ending or is too long.
 static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
     const size_t length = strlen(path);
     const size_t cut = sizeof FRAMES_END - 1U;
@@ -62,7 +61,7 @@ static int parse_words(verb_replay_t *self, int count, char **words) {
                : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
 }
 
-/// The configuration that was in force lies beside the gateway's own recordings.
+/// Finds the configuration that was in force: it is next to the gateway's own recordings.
 static int find_config(verb_replay_t *self) {
     char path[PATH_SIZE];
     if (self->config.radius_mm != 0U) {
@@ -76,7 +75,7 @@ static int find_config(verb_replay_t *self) {
     return config_option_take(path, fd, &self->config);
 }
 
-/// 0 also without such a file.
+/// Opens the file of requests and answers. Returns 0 also if there is none.
 static int find_events(verb_replay_t *self) {
     static char path[PATH_SIZE];
     errno = ENOENT;
@@ -113,7 +112,7 @@ static iw_time_us_t time_of(const verb_replay_t *self, const candump_t *frame) {
     return (at_us > 0) ? (iw_time_us_t)at_us : 0U;
 }
 
-/// The frame joins those of the same time; others step first.
+/// Adds the frame to those of the same time; frames of an earlier time step first.
 static void use_frame(verb_replay_t *self, iw_time_us_t at_us) {
     const iw_can_frame_t core = candump_to_core(&self->frame);
     if (self->group && at_us != self->group_us) {
@@ -133,7 +132,7 @@ static void use_entry(verb_replay_t *self) {
     const uint8_t kind = self->entry.kind;
     self->has_entry = false;
     if (kind == (uint8_t)BLACKBOX_NOT_SENT || kind == (uint8_t)BLACKBOX_PURGE) {
-        replay_event(&self->replay, &self->entry); // An answer within the step that is to come.
+        replay_event(&self->replay, &self->entry); // An answer within the next step.
         return;
     }
     flush_group(self);
@@ -149,7 +148,7 @@ static void use_entry(verb_replay_t *self) {
     }
 }
 
-/// Goes to where the state is told and begins there.
+/// Goes to the first entry with the state, and begins there.
 static void begin_within(verb_replay_t *self) {
     while (peek_entry(self)) {
         while (self->fed < self->entry_frames && peek_frame(self)) {
@@ -181,7 +180,7 @@ static void name_things(verb_replay_t *self) {
     self->replay.bus_name = (bus != NULL) ? bus : "";
 }
 
-/// As it was: steps, requests and answers where they were.
+/// Replays exactly: steps, requests and answers where they were.
 static void replay_exactly(verb_replay_t *self) {
     replay_note(&self->out, "%s, with its requests and the port's answers; times in seconds from its first entry",
                 self->path);
@@ -208,7 +207,7 @@ static void replay_exactly(verb_replay_t *self) {
     flush_group(self);
 }
 
-/// Steps as the core wishes until that time; a long silence is cut.
+/// Steps at the times that the core requests until `at_us`; a long gap is cut. Returns the time.
 static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
     replay_t *replay = &self->replay;
     if (at_us < replay->now_us) {
@@ -228,7 +227,7 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
     return at_us;
 }
 
-/// Frames are all there is: nobody asks for anything, the bus is up, the e-stop released.
+/// Replays frames only: no requests, the bus is up, the e-stop is released.
 static void replay_frames(verb_replay_t *self) {
     replay_note(&self->out,
                 "%s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",

@@ -35,7 +35,8 @@ static bool is_heard(const json_t *status, const char *side) {
     return json_is_true(json_object_get(json_object_get(status, side), "heard"));
 }
 
-/// Whoever is heard acknowledges as well: then it is no matter of power or cable, and lasts until the link is restarted.
+/// Returns true if both wheels are online: wheels that send also acknowledge, so power and cable are not the cause. The
+/// fault lasts until the link is restarted.
 static bool has_lost_an_echo(const json_t *status, const char *bus) {
     return strncmp(bus, "unix:", 5U) != 0 && is_heard(status, "left") && is_heard(status, "right");
 }
@@ -81,11 +82,11 @@ __attribute__((format(printf, 2, 3))) static void add(advice_t *self, const char
 
 bool advice_is_unset(const json_t *status, const char *item) {
     const json_t *entry = json_object_get(json_object_get(status, "ledger"), item);
-    // A gateway before 0.3 called a track that was configured without evidence too.
+    // A gateway before 0.3 reported a configured track without evidence too.
     return strcmp(text_word(entry, "evidence"), "none") == 0 && !json_is_string(json_object_get(entry, "value"));
 }
 
-/// Contradictions that refuse arm: the gateway says so by how it tells the cost.
+/// Adds contradictions that refuse arm. The gateway marks them by the beginning of the text of `disabled`.
 static void add_contradictions(const json_t *status, advice_t *self) {
     static const char refuses[] = "arm is refused; ";
     const char *name = NULL;

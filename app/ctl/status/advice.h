@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What to do next, by the state of the gateway, and about a cause.
+/// Advice about the next action, from the state of the gateway and from a cause.
 #ifndef ADVICE_H
 #define ADVICE_H
 
@@ -14,16 +14,17 @@ typedef struct {
     unsigned lines;
 } advice_t;
 
-/// Reads the reply of status. At least one line.
+/// Reads the reply of status. Writes at least one line.
 void advice_collect(const json_t *status, advice_t *out_advice);
 
-/// What to do about a cause, as the reply of status tells of bus and wheels. False, with nothing in it, if nobody knows.
+/// Writes the fix for a cause, depending on bus and wheels in the reply of status. Returns false and an empty text for
+/// an unknown cause.
 bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_SIZE]);
 
-/// True if the gateway has seen the cause within the last second, or sees it still.
+/// Returns true if the gateway has detected the cause within the last second or still detects it.
 bool advice_is_present(const json_t *status, const char *cause);
 
-/// True if that item of the ledger, which arm needs, has no value: nobody has configured it.
+/// Returns true if this item of the assumption store, which arm needs, is not configured and has no value.
 bool advice_is_unset(const json_t *status, const char *item);
 
 #endif

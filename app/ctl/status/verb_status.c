@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The answer of `status`, drawn for a human: at most 80 columns, every number with its unit, `--` for what is unknown.
+// The reply to `status` as text: at most 80 columns, each number with its unit, `--` for unknown values.
 #include "advice.h"
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
@@ -67,7 +67,7 @@ static void draw_lease(const paper_t *paper, const json_t *lease) {
     paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
 }
 
-/// Of a real button: when it was last seen to work. Nothing, if the gateway does not tell that.
+/// Returns the time when a real button was last seen to work; "" if the gateway does not report it.
 static const char *tell_tried(const json_t *estop, char *out_text, size_t size) {
     const json_t *tried = json_object_get(estop, "tried_wall_us");
     char when[TEXT_CELL] = "never";
@@ -78,7 +78,7 @@ static const char *tell_tried(const json_t *estop, char *out_text, size_t size) 
     return (tried == NULL) ? "" : out_text;
 }
 
-/// Of two contacts: the other line, and which of them is pressed.
+/// Returns the second line of the e-stop, and which contact is pressed; "" with one contact.
 static const char *tell_second(const json_t *estop, char *out_text, size_t size) {
     const char *line2 = json_string_value(get(estop, "line2"));
     const char *where = text_word(estop, "pressed_at");
@@ -104,20 +104,20 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 
-/// Instead of a number of digits: an age.
+/// Value of `digits` that means an age.
 #define AGE 99U
 
 typedef struct {
-    const char *field; ///< Null: no such value.
+    const char *field; ///< NULL: no such value.
     const char *unit;
     unsigned digits;
 } value_t;
 
-/// One line with the values of both wheels side by side.
+/// A line with the values of both wheels next to each other.
 typedef struct {
     const char *label;
     value_t values[2];
-    const char *remark; ///< A field with a word that explains the values, or null.
+    const char *remark; ///< Field with a word that explains the values, or NULL.
 } row_t;
 
 static const row_t rows[] = {
@@ -136,7 +136,7 @@ static const row_t rows[] = {
     {"reboots", {{"reboots", "seen", 0}}, NULL},
 };
 
-/// A full byte of battery voltage means at least that much.
+/// Returns true if the byte of the battery voltage is full: the voltage is at least this value.
 static bool is_lower_bound(const value_t *value, const json_t *wheel) {
     return is(value->field, "battery_dV") && json_is_true(get(get(wheel, "saturated"), "battery"));
 }
@@ -151,7 +151,8 @@ static void write_value(const value_t *value, const json_t *wheel, char number[T
     (void)snprintf(number, TEXT_CELL, "%.32s%s%s", age, is(age, "--") ? "" : " ", is(age, "--") ? "" : value->unit);
 }
 
-/// The word that explains the values; of a zero also where a stored one came from, and whether it was taken under load.
+/// Writes the word that explains the values. For a zero, also the origin of a stored one, and whether it was measured
+/// under load.
 static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
     const char *word = (row->remark != NULL) ? text_word(wheel, row->remark) : "";
     const bool zero = row->remark != NULL && is(row->remark, "offset_provenance");
@@ -214,7 +215,7 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
     paper_end(paper);
 }
 
-/// The names of the ledger's items in one state, as one line; nothing if there are none.
+/// Prints the names of the items in one state as one line; nothing if there are none.
 static void draw_assumptions(const paper_t *paper, json_t *assumptions, const char *state, tone_t tone) {
     char text[1024];
     iwn_text_t names = iwn_text_begin(text, sizeof text);
@@ -230,7 +231,7 @@ static void draw_assumptions(const paper_t *paper, json_t *assumptions, const ch
     }
 }
 
-/// Every contradiction with its evidence and its cost.
+/// Prints each contradiction with its evidence and what it disables.
 static void draw_contradictions(const paper_t *paper, json_t *assumptions) {
     char text[640];
     const char *label = "CONTRADICTED";
@@ -246,12 +247,12 @@ static void draw_contradictions(const paper_t *paper, json_t *assumptions) {
     }
 }
 
-/// Nothing, as long as what is learnt is kept.
-static void draw_memory(const paper_t *paper, const json_t *memory) {
+/// Prints nothing while the learned values are stored.
+static void draw_store(const paper_t *paper, const json_t *store) {
     char text[512];
-    const char *state = text_word(memory, "state");
+    const char *state = text_word(store, "state");
     if (is(state, "ignored") || is(state, "failed")) {
-        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
+        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(store, "file"), text_word(store, "reason"));
         paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
     }
 }
@@ -272,7 +273,7 @@ static void draw_budget(const paper_t *paper, const json_t *budget) {
     }
 }
 
-/// How close the last drive, or this one, came to a stop. A gateway from before does not know.
+/// Prints how close the present or the last drive came to a stop. An older gateway does not report it.
 static void draw_pair(const paper_t *paper, const json_t *pair) {
     char largest[TEXT_CELL];
     char limit[TEXT_CELL];
@@ -294,8 +295,8 @@ static void draw_warnings(const paper_t *paper, const json_t *warnings) {
     }
 }
 
-/// `why` is the reply of why, or null. A field that is missing or of another type counts as unknown, so an older or newer
-/// gateway does no harm.
+/// Prints the status. `why` is the reply of why, or NULL. A field that is missing or has another type counts as
+/// unknown, so an older or newer gateway causes no error.
 static void draw(const json_t *status, const json_t *why) {
     const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
     draw_state(&paper, status, why);
@@ -310,7 +311,7 @@ static void draw(const json_t *status, const json_t *why) {
     draw_contradictions(&paper, json_object_get(status, "ledger"));
     draw_assumptions(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
     draw_assumptions(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
-    draw_memory(&paper, get(status, "memory"));
+    draw_store(&paper, get(status, "memory"));
     draw_warnings(&paper, get(status, "warnings"));
 }
 

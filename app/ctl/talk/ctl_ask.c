@@ -30,7 +30,7 @@ int ctl_finish(int code) {
     return code;
 }
 
-/// Finds the path of the socket; NEAR_FOUND if there is one to try.
+/// Finds the path of the socket. Returns NEAR_FOUND if there is one to try.
 static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t size) {
     if (ctl->socket != NULL) {
         (void)snprintf(out_path, size, "%s", ctl->socket);
@@ -77,7 +77,7 @@ int ctl_refused(const json_t *reply) {
                         json_string_value(json_object_get(reply, "message")));
 }
 
-/// Why there is no connection: what the system said, or else the gateway.
+/// Reports why there is no connection: the error of the system, or otherwise that of the gateway.
 static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t result) {
     switch (iwc_errno(self->client.gateway)) {
     case 0:
@@ -126,7 +126,7 @@ int ctl_lost(iwc_result_t result) {
     }
 }
 
-/// Finds the socket: in `out_path`, unless --socket names it. An exit code.
+/// Finds the socket and writes it to `out_path`, unless --socket names it. Returns an exit code.
 static int find_one(ctl_t *self, char *out_path, size_t size) {
     switch (choose(self, NULL, out_path, size)) {
     case NEAR_FOUND:
@@ -141,7 +141,7 @@ static int find_one(ctl_t *self, char *out_path, size_t size) {
     }
 }
 
-/// Finds the socket and connects. An exit code.
+/// Finds the socket and connects. Returns an exit code.
 static int connect_to_one(ctl_t *self) {
     char found[512];
     const int code = find_one(self, found, sizeof found);
@@ -182,7 +182,7 @@ static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *sto
     return result;
 }
 
-/// A reason that is not a text does not keep a client from stopping.
+/// Stops in any case: a reason that is not valid text does not prevent a stop.
 static iwc_result_t stop_anyhow(ctl_t *self, const char *path, const ctl_stop_t *stop) {
     const iwc_result_t result = stop_at(self, path, stop);
     const bool spoilt = result == IWC_INVALID || result == IWC_REFUSED;

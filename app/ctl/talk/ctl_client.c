@@ -12,7 +12,7 @@ int64_t client_now_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-/// Rounded up: a wait that ends a moment too early would be repeated for nothing.
+/// Returns the time that is left, rounded up: a wait that ends too early would be repeated without need.
 static int left_ms(int64_t deadline_us) {
     const int64_t left_us = deadline_us - client_now_us();
     const int64_t ms = (left_us > 0) ? (left_us - 1) / 1000 + 1 : 0;
@@ -77,8 +77,8 @@ iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_li
     return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
 
-/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is taken too: it is a refusal
-/// of the whole connection or of a line.
+/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is
+/// accepted too: it refuses the whole connection or a line.
 static iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
     for (;;) {
         const iwc_result_t result = client_receive(self, deadline_us, out_reply);
@@ -103,7 +103,7 @@ iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply) {
     return (result == IWC_OK) ? client_wait(self, id, deadline_us, out_reply) : result;
 }
 
-// A signal handler has no argument for a context: these three cannot live elsewhere.
+// A signal handler has no argument for a context, so these three cannot be in a struct.
 static volatile sig_atomic_t caught;
 static bool catching;
 static sigset_t let_in;

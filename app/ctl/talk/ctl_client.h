@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// The connection to the gateway as the verbs use it: libiwheel-client, with jansson's objects and signals that are counted.
+/// Connection of the verbs to the gateway: libiwheel-client, with objects of jansson and counted signals.
 ///
-/// Nothing here blocks longer than the deadline it is given (CLOCK_MONOTONIC, microseconds). IWC_INTERRUPTED: a signal caught by
-/// `signals_catch` that `seen_signals` does not count yet.
+/// No function blocks longer than its deadline (CLOCK_MONOTONIC, microseconds). IWC_INTERRUPTED means a signal caught
+/// by `signals_catch` that `seen_signals` does not count yet.
 #ifndef CTL_CLIENT_H
 #define CTL_CLIENT_H
 
@@ -11,49 +11,48 @@
 #include <jansson.h>
 #include <signal.h>
 
-/// A gateway that is there answers within milliseconds.
+/// A working gateway answers within milliseconds.
 #define CLIENT_REPLY_US 2000000
 
 typedef struct {
     iwc_t *gateway;
-    bool
-        open; ///< `client_open` has succeeded and nobody has closed it: what the gateway ended is not opened anew by itself.
+    bool open; ///< Open, and not closed by this program. It is not reopened automatically.
     unsigned seen_signals;
-    uint64_t skipped; ///< Events left out so far; whoever tells them sets it to 0.
-    const char *line; ///< The last line received, terminated; valid until the next receive.
+    uint64_t skipped; ///< Events left out so far; set to 0 after a report.
+    const char *line; ///< Last line received, terminated; valid until the next receive.
 } client_t;
 
-/// Monotonic time.
+/// Returns the monotonic time.
 int64_t client_now_us(void);
 
-/// Nothing connected. False: out of memory.
+/// Initialises a client without a connection. Returns false if out of memory.
 bool client_init(client_t *self);
 void client_free(client_t *self);
 
-/// As `iwc_connect`; a newer protocol is no reason not to talk.
+/// Connects as `iwc_connect` does; a newer protocol is accepted.
 iwc_result_t client_open(client_t *self, const char *path, int64_t deadline_us);
 
-/// Ends the connection, if there is one.
+/// Closes the connection if there is one.
 void client_close(client_t *self);
 
-/// Sends `request`, whose reference it takes, after giving it an id, `*out_id`. IWC_FULL: it could not leave, and is forgotten.
+/// Sends `request` (takes its reference) with a new id, `*out_id`. IWC_FULL: it could not be sent and is dropped.
 iwc_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, int64_t *out_id);
 
-/// The next line, as a new reference in `*out_line` (null unless IWC_OK).
+/// Receives the next line as a new reference in `*out_line` (NULL unless IWC_OK).
 iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line);
 
-/// Sends `request`, whose reference it takes, and receives until its reply comes; what comes before is dropped.
+/// Sends `request` (takes its reference) and receives until its reply comes; earlier lines are dropped.
 iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply);
 
-// --- SIGINT, SIGTERM and SIGHUP, counted instead of deadly, and only where the program waits ---------------------
+// --- SIGINT, SIGTERM and SIGHUP: counted instead of deadly, and only where the program waits ----------------------
 
-/// From now on the three are blocked, except in a wait that uses `signals_let_in`, and counted there.
+/// Blocks the three signals from now on, except in a wait that uses `signals_let_in`, and counts them there.
 void signals_catch(void);
 
-/// How many came.
+/// Returns the number of signals so far.
 unsigned signals_count(void);
 
-/// The mask for ppoll. A null pointer, which leaves the mask as it is, without `signals_catch`.
+/// Returns the mask for ppoll. Without `signals_catch` it is a null pointer, which leaves the mask unchanged.
 const sigset_t *signals_let_in(void);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Text for people: safe on a terminal, with units, `--` for what is not known.
+/// Text output: safe on a terminal, with units, `--` for unknown values.
 #ifndef CTL_TEXT_H
 #define CTL_TEXT_H
 
@@ -10,59 +10,63 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/// Long enough for every cell.
+/// Size of the longest cell.
 #define TEXT_CELL 48U
 
-/// Writes `text` without what moves a terminal (iwheel_northbound/text.h): names and reasons come from other people's programs.
+/// Writes `text` without characters that control a terminal (iwheel_northbound/text.h): names and reasons come from
+/// other programs.
 void text_safe(const char *text, FILE *out);
 
-/// The same into a buffer; what does not fit is left out.
+/// Writes to a buffer as text_safe does; text that does not fit is left out.
 void text_clean(const char *text, char *out, size_t size);
 
-/// The same of a formatted text, as a line of its own.
+/// Write a formatted text as text_safe does, as a line of its own.
 __attribute__((format(printf, 2, 3))) void text_line(FILE *out, const char *format, ...);
 __attribute__((format(printf, 2, 0))) void text_vline(FILE *out, const char *format, va_list list);
 
-/// Writes a line of JSON, which may come from a hostile program, as it is but for such characters: these by number.
+/// Writes a line of JSON, which may come from a hostile program. Characters that control a terminal are escaped by
+/// number.
 void text_json(const char *line, FILE *out);
 
-/// The same of a value. False if there is not enough memory.
+/// Writes a value as text_json does. Returns false if there is not enough memory.
 bool text_json_value(const json_t *value, FILE *out);
 
-/// True if `out` is a terminal that wants colours (NO_COLOR and TERM=dumb say no).
+/// Returns true if `out` is a terminal that wants colours (not with NO_COLOR or TERM=dumb).
 bool text_wants_colour(FILE *out);
 
-/// How many columns of a line may be written over and over on `out`; 0 if it is no terminal, or one that cannot (TERM=dumb).
+/// Returns the number of columns of a line that can be rewritten on `out`; 0 if it is not a terminal, or cannot do it
+/// (TERM=dumb).
 unsigned text_live_columns(FILE *out);
 
-/// "%lld unit", or "--" if `value` is no integer.
+/// Writes "%lld unit", or "--" if `value` is not an integer.
 void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
 
-/// The integer divided by 10 to the power of `digits`, with that many decimals and the unit; "--" if it is none.
+/// Writes the integer divided by 10 to the power of `digits`, with that many decimals and the unit; "--" if it is not
+/// an integer.
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]);
 
-/// The same of a number that is known.
+/// Writes a known number as text_decimal does.
 void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]);
 
-/// An age in ms in the unit that suits it: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is none.
+/// Writes an age in ms in a suitable unit: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is not an age.
 void text_age(const json_t *age_ms, char out[TEXT_CELL]);
 
-/// The string of that field, or "--".
+/// Returns the string of that field, or "--".
 const char *text_word(const json_t *object, const char *field);
 
-/// "left" or "right".
+/// Returns "left" or "right".
 const char *text_side(unsigned side);
 
-/// How much of the text stands in a line of so many columns: broken between words, if there is more than one.
+/// Returns the length of the text that fits in a line of `room` columns; it is broken between words if possible.
 size_t text_cut(const char *text, size_t room);
 
-/// Date and time of day here; "--" if there are none.
+/// Writes the local date and time; "--" if there are none.
 void text_when(json_int_t wall_us, char out[TEXT_CELL]);
 
 // --- labelled lines on a terminal or in a pipe: widths, tones, safe texts ----------------------------------------
 
 #define PAPER_WIDTH 80U
-/// Labels stand before this column.
+/// Labels are written before this column.
 #define PAPER_LABEL 14U
 /// Width of one wheel's column.
 #define PAPER_CELL 33U
@@ -74,16 +78,16 @@ typedef struct {
     bool colour;
 } paper_t;
 
-/// Text in a tone, padded to `width` (0: as it is); what could command a terminal is replaced.
+/// Writes text in a tone, padded to `width` (0: not padded); characters that control a terminal are replaced.
 void paper_text(const paper_t *self, tone_t tone, unsigned width, const char *text);
 
-/// The same of a formatted text, not padded.
+/// Writes a formatted text, not padded.
 __attribute__((format(printf, 3, 4))) void paper_say(const paper_t *self, tone_t tone, const char *format, ...);
 
-/// Begins a line: the label, padded.
+/// Begins a line: writes the label, padded.
 void paper_label(const paper_t *self, const char *label);
 
-/// A whole line: label and text, broken between words into the column after the labels.
+/// Writes a whole line: label and text, broken between words into the column after the labels.
 void paper_wrap(const paper_t *self, const char *label, tone_t tone, const char *text);
 
 void paper_end(const paper_t *self);

@@ -8,14 +8,14 @@
 #define DIGITS_MAX   6U
 #define DECIMALS_MAX 3U
 
-/// From the largest; what divides a day is written in hours.
+/// From the largest unit on; a whole number of days is written in hours.
 static const struct {
     const char *name;
     int64_t us;
 } units[] = {{"h", 3600000000}, {"min", 60000000}, {"s", 1000000}, {"ms", 1000}};
 #define UNITS (sizeof units / sizeof units[0])
 
-/// Appends the digits at `*at` to `*number`. False: there are none, or more than `most`.
+/// Appends the digits at `*at` to `*number`. Returns false if there are none, or more than `most`.
 static bool take_digits(const char **at, size_t most, int64_t *number) {
     const size_t digits = strspn(*at, "0123456789");
     for (size_t i = 0; i < digits && i < most; i++) {
@@ -46,7 +46,7 @@ bool duration_parse(const char *text, int64_t *out_us) {
     return false;
 }
 
-/// In the largest unit in which it is a whole number.
+/// Writes a time in the largest unit in which it is a whole number.
 static void duration_write(int64_t us, char *out_text, size_t size) {
     size_t i = 0;
     while (i < UNITS - 1U && us % units[i].us != 0) {
@@ -55,8 +55,8 @@ static void duration_write(int64_t us, char *out_text, size_t size) {
     (void)snprintf(out_text, size, "%" PRId64 "%s", us / units[i].us, units[i].name);
 }
 
-/// A number without its unit was meant in seconds, one with `m` in minutes. False: nobody knows what was meant,
-/// or that would not do either.
+/// Guesses the meant time: a number without its unit is in seconds, with `m` in minutes. Returns false if there is no
+/// guess, or if it is not in range.
 static bool guess(const char *text, duration_range_t range, char *out_text, size_t size) {
     int64_t us = 0;
     const size_t digits = strspn(text, "0123456789.");

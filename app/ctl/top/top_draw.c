@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stands where.
+// Layout of the screen.
 #include "status/advice.h"
 #include "text/ctl_text.h"
 #include "top.h"
@@ -11,11 +11,11 @@
 
 #define BIG_ROWS   5
 #define BIG_COLUMN 6
-/// From these sizes on there are big letters, and both wheels with all their lines.
+/// From these sizes on: big letters, and both wheels with all their lines.
 #define ROWS_BIG   20
 #define ROWS_FULL  24
 #define ROWS_LEAST 4
-/// In narrower ones they would take the rows that sentences need.
+/// In a narrower terminal, big letters would take the rows that sentences need.
 #define COLUMNS_BIG 55
 
 static const json_t *get(const json_t *object, const char *field) {
@@ -29,7 +29,7 @@ static top_tone_t tone_of(const top_model_t *model, const char *state) {
     return (strcmp(state, "listening") == 0) ? TOP_GOOD : TOP_CARE;
 }
 
-/// The one word that matters most, in capitals.
+/// Writes the most important word, in capitals.
 static void state_word(const top_model_t *model, char out_word[16]) {
     const char *state = text_word(model->state, "state");
     const char *word = !model->connected                           ? "NO GATEWAY"
@@ -63,7 +63,7 @@ static void draw_head(const top_model_t *model) {
     top_put(model, 0, (column > 0) ? column : 0, released ? TOP_GOOD : TOP_BAD, "%s", right);
 }
 
-/// A name of the protocol as words.
+/// Writes a name of the protocol as words.
 static void spell(const char *name, char *out_words, size_t size) {
     text_clean(name, out_words, size);
     for (char *c = strchr(out_words, '_'); c != NULL; c = strchr(c, '_')) {
@@ -71,7 +71,7 @@ static void spell(const char *name, char *out_words, size_t size) {
     }
 }
 
-/// Who drives, or why nobody does and what to do next. How many rows it took.
+/// Draws the holder of the lease, or why there is none and what to do next. Returns the number of rows.
 static int draw_reason(const top_model_t *model, int row, int rows, const advice_t *advice) {
     char left[TEXT_CELL];
     char words[64];
@@ -93,7 +93,7 @@ static int draw_reason(const top_model_t *model, int row, int rows, const advice
     return top_put_wrapped(model, row, rows, tone, text);
 }
 
-/// Why, in words, and what the last stop was. How many rows it took.
+/// Draws the cause as a sentence, and the last stop. Returns the number of rows.
 static int draw_cause(const top_model_t *model, int row, int rows) {
     advice_t advice;
     if (!model->connected || model->state == NULL) {
@@ -133,10 +133,10 @@ void top_draw(const top_model_t *model) {
     } else {
         top_put(model, row++, 1, tone_of(model, state), " %s ", word);
     }
-    // Where the lines are short, the rows that the large letters leave are for whole sentences.
+    // Where lines are short, the rows without big letters are used for whole sentences.
     const int reasons = (LINES >= ROWS_FULL) ? (big ? 3 : 5) : (LINES >= ROWS_BIG) ? (big ? 2 : 4) : big ? 1 : 2;
     const int used = draw_cause(model, row, reasons);
-    row += big ? reasons : used; // Below large letters nothing moves when a sentence is longer.
+    row += big ? reasons : used; // Below big letters nothing moves when a sentence is longer.
     if (model->state != NULL && model->connected) {
         row += top_draw_wheels(model, row, LINES < ROWS_FULL);
         row += top_draw_rest(model, row, LINES - 2 - row);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Stands for `top` where ncurses was missing when this was built.
+// Replaces `top` in a build without ncurses.
 #include "talk/ctl.h"
 
 int verb_top(ctl_t *self, int count, char **words) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Both wheels: what they are told and what they do, as bars on one scale, and the rest in numbers. Below them bus, send gaps,
-// ledger, stop budget, warnings.
+// Both wheels: commanded and measured speed as bars on one scale, and other values as numbers. Below them bus, send
+// gaps, assumptions, stop budget, warnings.
 #include "text/ctl_text.h"
 #include "top.h"
 
@@ -39,7 +39,7 @@ int top_scale(int before_mm_s, const json_t *state) {
     return largest;
 }
 
-/// A bar from its middle to the value's place; nothing but the middle if the value is unknown.
+/// Draws a bar from its middle to the value; only the middle if the value is unknown.
 static void draw_bar(const top_model_t *model, int row, top_tone_t tone, const json_t *value) {
     const int width = (COLS - LABEL_COLUMNS - VALUE_COLUMNS - 2) | 1;
     const int half = width / 2;
@@ -70,7 +70,7 @@ static void draw_speed(const top_model_t *model, int row, const char *label, top
     top_put(model, row, (column > LABEL_COLUMNS) ? column : LABEL_COLUMNS, TOP_TITLE, "%13s", number);
 }
 
-/// An integer as fewer decimals than it has: what is read across a room needs no thousandths.
+/// Writes an integer with fewer decimals than it has: text that is read across a room needs no thousandths.
 static void coarse(const json_t *value, int divisor, unsigned digits, const char *unit, char out[TEXT_CELL]) {
     if (json_is_integer(value)) {
         text_number(json_integer_value(value) / divisor, digits, unit, out);
@@ -79,7 +79,7 @@ static void coarse(const json_t *value, int divisor, unsigned digits, const char
     }
 }
 
-/// How many rows it took: on a narrow terminal two.
+/// Draws the numbers of a wheel. Returns the number of rows: two on a narrow terminal.
 static int draw_numbers(const top_model_t *model, int row, const json_t *wheel) {
     char force[TEXT_CELL];
     char battery[TEXT_CELL];
@@ -149,7 +149,7 @@ static void draw_bus(const top_model_t *model, int row) {
     }
 }
 
-/// A share of the largest bucket as a block of eight heights, or a digit of ten where there are no blocks.
+/// Returns a share of the largest bucket as a block of eight heights, or as a character in a terminal without blocks.
 static const char *height(const top_model_t *model, long long count, long long largest) {
     static const char *const blocks[] = {" ",
                                          "\xE2\x96\x81",
@@ -165,7 +165,7 @@ static const char *height(const top_model_t *model, long long count, long long l
     return model->fine_blocks ? blocks[eighths] : signs[eighths];
 }
 
-/// "GAPS  5 10 15 >20 ms" with a height over each.
+/// Draws "GAPS  5 10 15 >20 ms" with a height over each.
 static void draw_gaps(const top_model_t *model, int row) {
     const json_t *gaps = get(model->state, "gaps");
     const json_t *counts = get(gaps, "count");
@@ -247,7 +247,7 @@ static void draw_budget(const top_model_t *model, int row) {
             time, way);
 }
 
-/// How many rows they took; more than one only on a narrow terminal.
+/// Draws the warnings. Returns the number of rows; more than one only on a narrow terminal.
 static int draw_warnings(const top_model_t *model, int row, int rows) {
     char text[TOP_TEXT_SIZE];
     const json_t *warnings = get(model->state, "warnings");
@@ -266,7 +266,7 @@ static int draw_warnings(const top_model_t *model, int row, int rows) {
 }
 
 int top_draw_rest(const top_model_t *model, int row, int rows) {
-    // What matters most comes first; what has no row is left out.
+    // The most important part comes first; a part without a row is left out.
     const struct {
         void (*draw)(const top_model_t *, int);
         int rows;

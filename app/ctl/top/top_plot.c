@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Speed and force over the last minute, drawn with characters where a terminal has room to spare.
+// Speed and force of the last minute, drawn with characters on a terminal with enough room.
 #include "top.h"
 
 #include <curses.h>
@@ -8,16 +8,16 @@
 #include <stdlib.h>
 
 #define UNKNOWN INT32_MIN
-/// The smallest scales.
+/// Smallest scales.
 #define SPEED_MIN_mm_s 100
 #define FORCE_MIN_mN   10000
 #define LABEL          8
 #define ROWS_MIN       5
 #define ROWS_MAX       20
 #define COLUMNS_MAX    300
-#define COLUMNS_TWO    120 ///< From this width on both wheels stand side by side.
+#define COLUMNS_TWO    120 ///< From this width on both wheels are next to each other.
 #define BRAILLE_DOWN   4
-#define CELL_SIZE      4 ///< Bytes of a character, and the end.
+#define CELL_SIZE      4 ///< Bytes of a character, with terminator.
 
 /// A part of the screen.
 typedef struct {
@@ -27,12 +27,12 @@ typedef struct {
     int columns;
 } place_t;
 
-/// One plot: rows of bits, two dots a cell across.
+/// One plot.
 typedef struct {
     const int32_t *values;
     int columns;
     int rows;
-    int across; ///< Dots in a cell.
+    int across; ///< Dots across a cell.
     int down;
     int32_t low;
     int32_t high;
@@ -58,7 +58,7 @@ void top_history_take(top_history_t *self, int64_t now_us, const json_t *state) 
     }
 }
 
-/// The round number that holds what is known of both wheels, so that they can be compared.
+/// Returns the round number that covers the known values of both wheels, so that they can be compared.
 static int32_t limit_of(const int32_t (*pair)[TOP_HISTORY], int32_t least, bool *out_negative) {
     int64_t largest = 0;
     *out_negative = false;
@@ -77,7 +77,7 @@ static int32_t limit_of(const int32_t (*pair)[TOP_HISTORY], int32_t least, bool 
     return (int32_t)limit;
 }
 
-/// The dot's row of a value, from above.
+/// Returns the row of dots of a value, from above.
 static int dot_row(const plot_t *plot, int32_t value) {
     const int dots = plot->rows * plot->down;
     const int64_t span = (int64_t)plot->high - plot->low;
@@ -86,14 +86,14 @@ static int dot_row(const plot_t *plot, int32_t value) {
     return (row < 0) ? 0 : (row >= dots) ? dots - 1 : row;
 }
 
-/// From which dot to which the values of one column of dots reach. False: nothing is known of it.
+/// Finds the first and last dot of the values in one column of dots. Returns false if no value is known.
 static bool reach(const plot_t *plot, int64_t slot, int x, int *out_top, int *out_bottom) {
     const int dots = plot->columns * plot->across;
     const int first = (int)((int64_t)x * TOP_HISTORY / dots);
     const int last = (int)((int64_t)(x + 1) * TOP_HISTORY / dots);
     *out_top = INT_MAX;
     *out_bottom = -1;
-    // From the value before, so that a jump is a line.
+    // Begins with the value before, so that a jump is a line.
     for (int i = (first > 0) ? first - 1 : 0; i < ((last > first) ? last : first + 1); i++) {
         const int32_t value = plot->values[(slot + 1 + i) % TOP_HISTORY];
         if (value != UNKNOWN) {
@@ -109,7 +109,7 @@ static bool reach(const plot_t *plot, int64_t slot, int x, int *out_top, int *ou
     return *out_bottom >= 0;
 }
 
-/// Eight dots of a braille cell, numbered as Unicode does.
+/// Returns a dot of a braille cell, numbered as in Unicode.
 static unsigned dot_bit(int x, int y) {
     static const unsigned char bits[2][BRAILLE_DOWN] = {{0x01, 0x02, 0x04, 0x40}, {0x08, 0x10, 0x20, 0x80}};
     return bits[x][y];
@@ -150,7 +150,7 @@ static void draw_row(const top_model_t *model, const plot_t *plot, int cell_row,
     top_put(model, row, column, TOP_GOOD, "%s", text);
 }
 
-/// What, from where to where; the last row is the axis of time.
+/// Draws one plot with its scale; the last row is the axis of time.
 static void draw_plot(const top_model_t *model, int number, const place_t *place) {
     static const char *const names[TOP_PLOTS] = {"LEFT speed", "RIGHT speed", "LEFT force", "RIGHT force"};
     const bool force = number >= 2;
@@ -185,7 +185,7 @@ void top_draw_plots(const top_model_t *model, int row, int rows) {
     const int beside = (COLS >= COLUMNS_TWO) ? 2 : 1;
     int plots = TOP_PLOTS;
     while (plots > 0 && rows / (plots / beside) < ROWS_MIN) {
-        plots -= 2; // Speed before force.
+        plots -= 2; // Speed is drawn before force.
     }
     if (plots == 0 || COLS < 40 || model->history == NULL) {
         return;

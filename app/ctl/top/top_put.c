@@ -13,7 +13,7 @@
 
 typedef struct {
     char letter;
-    uint8_t row[LETTER_ROWS]; ///< Five bits each, the leftmost is the highest.
+    uint8_t row[LETTER_ROWS]; ///< Five bits each; the leftmost is the highest.
 } letter_t;
 
 static const letter_t letters[] = {
@@ -25,7 +25,7 @@ static const letter_t letters[] = {
     {'W', {0x11, 0x11, 0x15, 0x1B, 0x11}}, {'Y', {0x11, 0x0A, 0x04, 0x04, 0x04}},
 };
 
-/// The attributes on a terminal without colours say as much as the colours do.
+/// Returns the attributes of a tone. Without colours, other attributes distinguish the tones.
 static attr_t attributes_of(const top_model_t *model, top_tone_t tone) {
     static const attr_t plain[TOP_TONES] = {
         [TOP_TITLE] = A_BOLD,           [TOP_GOOD] = A_NORMAL, [TOP_CARE] = A_BOLD,
@@ -85,7 +85,7 @@ static const letter_t *find(char letter) {
     return NULL;
 }
 
-/// Blanks in reverse are blocks on every terminal.
+/// Spaces in reverse are blocks on every terminal.
 void top_put_big(const top_model_t *model, int row, top_tone_t tone, const char *word) {
     int column = 1;
     (void)attrset((int)(attributes_of(model, (tone == TOP_BAD && !model->colour) ? TOP_CARE : tone) | A_REVERSE));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The live screen: snapshots come ten times a second, keys go out as requests. It never arms.
+// The live screen: it receives ten snapshots a second and sends keys as requests. It never arms.
 #include "talk/ctl.h"
 #include "talk/ctl_words.h"
 #include "text/ctl_text.h"
@@ -28,8 +28,8 @@ typedef struct {
     int64_t received_us;
     int64_t retry_us;
     int64_t notice_until_us;
-    int64_t pending_id;  ///< Of the last request; its answer is shown.
-    const char *pending; ///< What it was.
+    int64_t pending_id;  ///< Id of the last request; its answer is shown.
+    const char *pending; ///< Name of the last request.
 } top_t;
 
 __attribute__((format(printf, 2, 3))) static void notice(top_t *self, const char *format, ...) {
@@ -64,7 +64,7 @@ static void keep_sentence(top_t *self, const json_t *stop) {
     (void)snprintf(self->model.last_stop, sizeof self->model.last_stop, "%s%s",
                    (json_integer_value(json_object_get(stop, "number")) > 0) ? "last stop: " : "",
                    (sentence != NULL) ? sentence : "");
-    // What to do about a latch stands in the line above it, and two lines hold no more than the rest.
+    // The line above shows the fix for a latch, and two lines have no room for more than the rest.
     char *const cure = strrchr(self->model.last_stop, ';');
     if (cure != NULL && json_is_true(json_object_get(stop, "latched"))) {
         *cure = '\0';
@@ -126,10 +126,10 @@ static void take_line(top_t *self, json_t *line) {
     }
 }
 
-/// Takes what is there without waiting.
+/// Reads the lines that are there, without waiting.
 static void read_gateway(top_t *self) {
     if (self->model.connected) {
-        (void)iwc_latest(self->ctl->client.gateway); // A terminal that is slow shows what is, not what was.
+        (void)iwc_latest(self->ctl->client.gateway); // A slow terminal shows the present state, not a backlog.
     }
     while (self->model.connected) {
         json_t *line = NULL;
@@ -145,7 +145,7 @@ static void read_gateway(top_t *self) {
     }
 }
 
-/// False: quit.
+/// Handles a key. Returns false to quit.
 static bool take_key(top_t *self, int key) {
     switch (key) {
     case ' ':
@@ -167,7 +167,7 @@ static bool take_key(top_t *self, int key) {
     }
 }
 
-/// Waits for a key, the gateway, a signal or the time to draw again. False: quit.
+/// Waits for a key, the gateway, a signal or the time to draw again. Returns false to quit.
 static bool wait_and_take(top_t *self) {
     const int64_t now_us = client_now_us();
     struct pollfd entries[2] = {{.fd = STDIN_FILENO, .events = POLLIN},
@@ -211,7 +211,8 @@ static void prepare_terminal(top_model_t *model) {
     }
 }
 
-/// Whether this terminal is known and can move its cursor. Asked before, because a newterm that fails keeps memory.
+/// Returns true if this terminal is known and can move its cursor. Checked first, because a failed newterm leaks
+/// memory.
 static bool can_draw(void) {
     int error = 0;
     if (setupterm(NULL, STDOUT_FILENO, &error) != OK) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The stops that were: told by the gateway, or recorded on disk. Private to why.
+/// Past stops, from the gateway or from recordings on disk. Private to why.
 #ifndef CTL_WHY_H
 #define CTL_WHY_H
 
@@ -8,36 +8,37 @@
 
 #include <stddef.h>
 
-/// Where the gateway records if nobody tells otherwise.
+/// Default directory of the gateway's recordings.
 #define WHY_DISK_DIRECTORY "/var/lib/iwheel"
-/// Frames on either side that the gateway keeps at the most.
+/// Maximum number of frames before and after the stop that the gateway stores.
 #define WHY_FRAMES_MAX 40U
 
-// --- on disk: from the files or, where they may not be read, from the gateway (why_disk.c) -----------------------
+// --- on disk: from the files or, if they may not be read, from the gateway (why_disk.c) ----------------------------
 
 typedef struct {
-    ctl_t *ctl; ///< To ask the gateway where there are no files to be read; NULL: files only.
+    ctl_t *ctl; ///< To ask the gateway if the files cannot be read; NULL: files only.
     const char *directory;
     bool json;
 } why_disk_t;
 
-/// One line per recording in that directory, the newest last. With `json`: the recording's own line. An exit code; what is
-/// wrong has been told.
+/// Prints one line per recording in the directory, the newest last. With `json`: the recording's own line. Returns an
+/// exit code; what is wrong has been reported.
 int why_disk_list(const why_disk_t *self);
 
-/// The stop of a recording with `frames` frames on either side. `name`: its number in the directory, or the path of one of
-/// its files. An exit code.
+/// Prints the stop of a recording with `frames` frames before and after it. `name` is its number in the directory, or
+/// the path of one of its files. Returns an exit code.
 int why_disk_show(const why_disk_t *self, const char *name, size_t frames);
 
-// --- for people: the same for the gateway's answer and for a recording on disk (verb_why.c) ---------------------
+// --- text output for the gateway's answer and for a recording on disk (verb_why.c) --------------------------------
 
-/// Sentence and time of `why`, which is a reply or the line of a recording. False: there was no stop, which has been said.
+/// Prints sentence and time of `why`, which is a reply or the line of a recording. Returns false after it has printed
+/// that there was no stop.
 bool why_print_stop(const json_t *why);
 
-/// One frame, `since_us` after the stop (negative: before).
+/// Prints one frame, `since_us` after the stop (negative: before).
 void why_print_frame(const candump_t *frame, int64_t since_us);
 
-/// The line between the frames before and after.
+/// Prints the line between the frames before and after.
 void why_print_moment(void);
 
 #endif

@@ -11,12 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// Frames shown on either side if nobody says how many.
+/// Default number of frames before and after the stop.
 #define FRAMES_USUAL 12U
 
 typedef struct {
-    const char *directory; ///< NULL: not told.
-    const char *name;      ///< Of a recording; NULL: none.
+    const char *directory; ///< NULL: not given.
+    const char *name;      ///< Name of a recording; NULL: none.
     size_t frames;
     bool list;
 } words_t;
@@ -33,7 +33,7 @@ static int take_frames(const option_t *option, const char *verb, const char *tex
     return CTL_OK;
 }
 
-/// A number, or the path of a file.
+/// Returns true for a number, or the path of a file.
 static bool names_recording(const char *word) {
     return word[0] != '-' && (strspn(word, "0123456789") == strlen(word) || strpbrk(word, "./") != NULL);
 }
@@ -60,7 +60,7 @@ static void print_when(const json_t *why) {
     if (json_is_integer(wall_us)) {
         text_when(json_integer_value(wall_us), wall);
         (void)printf("at %s%s%s", wall, (age_ms != NULL) ? ", " : "", age);
-    } else { // A board has no clock of the day.
+    } else { // A board has no wall clock.
         (void)fputs((age_ms != NULL) ? age : "at --", stdout);
     }
     (void)printf("; %s\n", json_is_true(json_object_get(why, "latched")) ? "it latched" : "it did not latch");
@@ -75,7 +75,7 @@ bool why_print_stop(const json_t *why) {
     text_safe(sentence, stdout);
     (void)putchar('\n');
     if (!json_is_integer(json_object_get(why, "at_us")) && json_object_get(why, "at_us") != NULL) {
-        return false; // Nothing happened: the sentence says so.
+        return false; // There was no stop: the sentence reports it.
     }
     print_when(why);
     return true;
@@ -104,7 +104,8 @@ static void print_told(const json_t *told, int64_t stop_us) {
     why_print_frame(&frame, at_us - stop_us);
 }
 
-/// The last `most` of the frames before and the first `most` after, as the gateway tells them. Nothing if there are none.
+/// Prints the last `most` of the frames before and the first `most` after the stop, as the gateway sent them; nothing
+/// if there are none.
 static void print_all_told(const json_t *why, size_t most) {
     const json_t *before = json_object_get(why, "frames_before");
     const json_t *after = json_object_get(why, "frames_after");
@@ -133,7 +134,8 @@ static void print_recording(const json_t *reply) {
     }
 }
 
-/// The sentence is as old as the stop; whether it is a matter of power, or of a lost echo, is seen only now.
+/// Prints the present fix for send_stalled. The sentence is as old as the stop, and only the present status shows
+/// whether power or a lost echo is the cause.
 static void print_stalled(ctl_t *self) {
     char cure[ADVICE_SIZE];
     json_t *status = near_ask(self, json_pack("{s:s}", "cmd", "status"));
@@ -158,7 +160,7 @@ static int ask(ctl_t *self, size_t frames) {
     return code;
 }
 
-/// Where the gateway records: it knows best, if it is there.
+/// Returns the directory of the recordings; a running gateway is asked first.
 static const char *find_directory(ctl_t *self, const words_t *words, json_t **out_owner) {
     if (words->directory != NULL) {
         return words->directory;

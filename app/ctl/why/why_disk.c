@@ -38,7 +38,7 @@ static int is_recording(const struct dirent *entry) {
     return strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1U) == 0 && ending != NULL && strcmp(ending, EVENTS) == 0;
 }
 
-/// Names are listed as the gateway tells them, or as they stand on disk.
+/// Adds a name as the gateway sends it, or as it is on disk.
 static void add_name(json_t *names, const char *stem, const char *ending) {
     char name[NAME_SIZE];
     const int n = snprintf(name, sizeof name, "%s%s", stem, ending);
@@ -47,7 +47,7 @@ static void add_name(json_t *names, const char *stem, const char *ending) {
     }
 }
 
-/// False with errno.
+/// Adds the names on disk. Returns false, with errno, on failure.
 static bool names_on_disk(json_t *names, const char *directory) {
     struct dirent **found = NULL;
     const int count = scandir(directory, &found, is_recording, alphasort);
@@ -73,8 +73,8 @@ static bool names_told(json_t *names, ctl_t *ctl) {
     return reply != NULL;
 }
 
-/// The recordings' .jsonl files, the oldest first. The gateway knows best, if it is there: here may be another machine, with
-/// recordings of its own. NULL with errno.
+/// Returns the recordings' .jsonl files, the oldest first. The gateway is asked first if there is one: this may be
+/// another machine, with recordings of its own. Returns NULL, with errno, on failure.
 static json_t *find_names(const why_disk_t *where) {
     json_t *names = json_array();
     if ((where->ctl != NULL && names_told(names, where->ctl)) || names_on_disk(names, where->directory)) {
@@ -99,7 +99,7 @@ static void list_one(const why_disk_t *self, const char *name) {
     events_t events;
     (void)snprintf(path, sizeof path, "%s/%s", self->directory, name);
     if (!events_open(&events, path, source_stream(self->ctl, path, 1))) { // The stop is in the first piece.
-        if (errno != EPROTO) {                                            // That has been told.
+        if (errno != EPROTO) {                                            // This has been reported.
             (void)ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
         }
         return;
@@ -133,7 +133,7 @@ int why_disk_list(const why_disk_t *self) {
     return CTL_OK;
 }
 
-/// The path of the recording's .jsonl; false if there is none.
+/// Finds the path of the recording's .jsonl. Returns false if there is none.
 static bool find(const why_disk_t *self, const char *name, char out_path[PATH_SIZE]) {
     size_t i = 0;
     const json_t *each = NULL;
@@ -157,12 +157,12 @@ static bool find(const why_disk_t *self, const char *name, char out_path[PATH_SI
     return found;
 }
 
-/// Goes through the frames; keeps the last ones before the stop, prints them with those after it.
+/// Reads the frames, stores the last ones before the stop, and prints them with the frames after it.
 static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t most) {
     static recording_t recording;
     static candump_t before[WHY_FRAMES_MAX];
     candump_t frame;
-    size_t kept = 0;
+    size_t earlier = 0;
     size_t after = 0;
     const int code = recording_open(&recording, ctl, path);
     if (code != CTL_OK) {
@@ -171,11 +171,11 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
     (void)putchar('\n');
     while (after < most && recording_next(&recording, &frame)) {
         if (frame.time_us <= stop_us) {
-            before[kept % most] = frame;
-            kept++;
+            before[earlier % most] = frame;
+            earlier++;
             continue;
         }
-        for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
+        for (size_t i = (earlier > most) ? earlier - most : 0U; after == 0U && i < earlier; i++) {
             why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
         }
         if (after == 0U) {
@@ -184,7 +184,7 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
         why_print_frame(&frame, frame.time_us - stop_us);
         after++;
     }
-    for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
+    for (size_t i = (earlier > most) ? earlier - most : 0U; after == 0U && i < earlier; i++) {
         why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
     }
     return recording_close(&recording);

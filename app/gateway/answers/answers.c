@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Requests: who may ask, in which order, and what is noted of them.
+// Requests: rights of clients, order of execution, and records.
 #include "answers.h"
 
 #include "assumptions/assumptions.h"
@@ -18,7 +18,7 @@ void gw_answers_begin(gw_answers_t *self) {
     iwn_server_begin(&self->server);
 }
 
-/// What does not change while the gateway runs.
+/// Writes the facts that do not change while the gateway runs.
 static iwn_estop_t describe_estop(const gw_wheels_t *wheels) {
     const iwl_hal_t *hal = &wheels->hal;
     return (iwn_estop_t){
@@ -62,8 +62,8 @@ void iwn_target_event(iwn_server_t *server, iwn_client_t *client, char *line, si
     }
 }
 
-/// A request that permits motion and waited here, behind an earlier one of its client, is not to undo a stop that came meanwhile. Each
-/// arm gets a key of its own.
+/// A request that permits motion and waited behind an earlier one of its client must not undo a stop that arrived in
+/// the meantime. Each arm has a new key.
 bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     gw_answers_t *self = gw_answers_of(server);
     const bool arms = server->request.cmd == IWN_CMD_ARM;
@@ -91,8 +91,8 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
     const gw_answers_t *self = gw_answers_of(server);
     const iw_time_us_t armed_us = gw_wheels_look(self->wheels).armed_us;
-    *out_sent_us =
-        sock_client_sent_us(gw_answers_connection(self, client), server->now_us, armed_us); // It may have waited.
+    *out_sent_us = sock_client_sent_us(gw_answers_connection(self, client), server->now_us,
+                                       armed_us); // The request may have waited.
     return true;
 }
 
@@ -169,7 +169,8 @@ void iwn_target_tared(iwn_server_t *server, const iwn_client_t *client, iw_side_
     gw_wheels_note(self->wheels, client->id, &entry);
 }
 
-/// The operator's word. Moves nothing; what it contradicts is disabled from now on.
+/// Confirms or contradicts an assumption by the operator. It moves nothing, and a contradiction takes effect
+/// immediately.
 static void do_confirm(gw_answers_t *self, iwn_client_t *client) {
     const iwn_request_t *request = &self->server.request;
     inspect_word_t word;
@@ -195,7 +196,7 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
     case IWN_CMD_RECORDING:
         gw_recordings_ask(self, client);
         break;
-    default: // A file that an administrator writes is not to be changed by whoever may drive.
+    default: // A client that may drive must not change a file that an administrator writes.
         (void)IWN_REFUSE(&server->refusal, IWN_DENIED,
                          "this gateway's configuration is a file: change it, look at it with "
                          "iwheel-gateway --check -c FILE, and start the gateway again");
@@ -204,8 +205,8 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
     }
 }
 
-/// Whether the line may be carried out; refuses it else. Who has come only to stop may only stop, and so may a connection that is being
-/// closed.
+/// Returns true if the line may be executed; otherwise refuses it. A client that may only stop, and a closing
+/// connection, may only send stop requests.
 static bool may_be_carried_out(gw_answers_t *self, const sock_client_t *connection, iwn_client_t *client,
                                bool is_right) {
     const bool stops = is_right && iwn_cmd_stops(self->server.request.cmd);
@@ -234,7 +235,7 @@ static void carry_out(void *context, sock_client_t *connection, const char *line
     }
 }
 
-/// What comes of a leaving client is told while it is still known who it was.
+/// Reports the effects of the end while the client still has its name.
 static void leave(void *context, sock_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);
@@ -243,13 +244,13 @@ static void leave(void *context, sock_client_t *connection) {
     connection->held = false;
     served->client.arming = false;
     if (connection->phase != SOCK_OPEN) {
-        served->client.topics = 0; // It gets no more events.
+        served->client.topics = 0; // It receives no more events.
     }
     const iw_snapshot_t seen = gw_wheels_look(self->wheels);
     gw_answers_observe(self, &seen);
 }
 
-/// Who has come only to stop is not greeted: its first line is awaited.
+/// A client that may only stop receives no `hello`: its first line is awaited.
 static void welcome(void *context, sock_client_t *connection) {
     gw_answers_t *self = (gw_answers_t *)context;
     gw_served_t *served = gw_answers_served(self, connection);

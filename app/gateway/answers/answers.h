@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Connects the northbound server to the daemon: its clients, the wheels, what is known of them, the recorder and the log. It defines
-/// the functions of iwheel_server/target.h.
+/// Connects the northbound server to the daemon: clients, wheels, assumptions, recorder and log. It defines the
+/// functions of iwheel_server/target.h.
 #ifndef GATEWAY_ANSWERS_H
 #define GATEWAY_ANSWERS_H
 
@@ -14,22 +14,23 @@ struct gw_assumptions;
 struct sock_log;
 struct gw_wheels;
 
-/// So many watch each frame as it comes. More than these get them together, this often: telling costs a system call for each of them.
+/// Watchers of frames that receive each frame immediately. More watchers receive them together at this interval,
+/// because sending costs a system call per watcher.
 #define GW_FRAMES_ONE_BY_ONE  8U
 #define GW_FRAMES_TOGETHER_US 5000U
 
 #define GW_STOPPER_SIZE     48U
 #define GW_CLIENT_TEXT_SIZE 112U
 
-/// What the server knows of a connection, and what the daemon adds. It belongs to the connection in the same slot.
+/// Data of the server about a connection, with that of the daemon. It belongs to the connection in the same slot.
 typedef struct {
     iwn_client_t client;
-    iwn_id_t arm_id;                  ///< Of the arm that waits for its answer.
-    iwn_id_t read_id;                 ///< Of the question about recordings that waits for its answer.
-    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Of its lease, drawn at each arm that is granted; empty: there was none.
+    iwn_id_t arm_id;                  ///< Id of the arm request that waits for its reply.
+    iwn_id_t read_id;                 ///< Id of the request for recordings that waits for its reply.
+    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Key of its lease, drawn for each accepted arm; empty if there was none.
 } gw_served_t;
 
-/// Who asked for a stop, or an e-stop, last.
+/// Client that last requested a stop, or an e-stop.
 typedef struct {
     int pid;
     uid_t uid;
@@ -54,48 +55,50 @@ typedef struct gw_answers {
     struct gw_box *box;
     struct sock_log *log;
     sock_clients_t *clients;
-    const char *socket; ///< By which one may drive, and its group, for messages.
+    const char *socket; ///< Socket for driving and its group, for messages.
     const char *group;
     gw_stopper_t stopped_by;
     gw_stopper_t estopped_by;
-    iwl_link_purge_t purge;           ///< As told to the log.
-    iw_time_us_t frames_us;           ///< Frames that are told together wait until then.
-    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Drawn for the arm that is being carried out.
-    char text[GW_CLIENT_TEXT_SIZE];   ///< Of iwn_target_name.
+    iwl_link_purge_t purge;           ///< Last value in the log.
+    iw_time_us_t frames_us;           ///< Time at which the collected frames are sent.
+    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Key drawn for the arm request that is being executed.
+    char text[GW_CLIENT_TEXT_SIZE];   ///< Buffer of iwn_target_name.
     gw_refuse_texts_t texts;
-    iwn_work_t work; ///< For reading requests.
+    iwn_work_t work; ///< Work area for reading requests.
     gw_served_t served[SOCK_CLIENTS_MAX];
 } gw_answers_t;
 
-/// Before anything else; wheels, knowledge, box, log, clients, socket, group and the first group of the server are set.
+/// Initializes the server. The caller sets wheels, assumptions, box, log, clients, socket, group and the first group of
+/// the server before.
 void gw_answers_begin(gw_answers_t *self);
 
-/// What `clients` is to be served by: welcomes with `hello`, carries out each line whole or not at all, and answers it (the reply to
-/// `arm` may come later). `self` must outlive it.
+/// Returns the functions that serve `clients`: they send `hello`, execute each line as a whole or not at all, and
+/// answer it (the reply to `arm` may come later). `self` must exist as long as they are used.
 sock_handler_t gw_answers_handler(gw_answers_t *self);
 
-/// Answers the arms that have been decided by the last step.
+/// Answers the arm requests that the last step has decided.
 void gw_answers_arming(gw_answers_t *self, const iw_snapshot_t *seen);
 
-/// Looks at the core and tells what is new, to the log and to watchers. After every step (`seen` is what has come of it).
+/// Reports changes of the core to the log and to watchers. Call it after every step with its snapshot.
 void gw_answers_observe(gw_answers_t *self, const iw_snapshot_t *seen);
 
 /// Sends the periodic events that are due.
 void gw_answers_periodic(gw_answers_t *self);
 
-/// When there is one; IW_NEVER if nobody watches.
+/// Returns the time of the next periodic event; IW_NEVER without watchers.
 iw_time_us_t gw_answers_next_us(gw_answers_t *self);
 
-/// How many watch frames.
+/// Returns the number of watchers of frames.
 uint32_t gw_answers_watching_frames(gw_answers_t *self);
 
-/// Sends the frames that the tape has tapped to the watchers of the topic `frame`, or leaves them there for a while.
+/// Sends the frames from the tape to the watchers of the topic `frame`, or leaves them there until their time.
 void gw_answers_frames(gw_answers_t *self);
 
-/// When it has something to do though no frame comes; IW_NEVER if none is left there.
+/// Returns the time at which frames must be sent without a new frame; IW_NEVER if none wait.
 iw_time_us_t gw_answers_frames_us(const gw_answers_t *self);
 
-/// Passes on what has been read of recordings, if anything has. False: the process that reads has ended; who waited for it is told.
+/// Passes on the replies of the process that reads recordings. Returns false if that process has ended; its clients are
+/// informed.
 bool gw_recordings_take(gw_answers_t *self);
 
 // For the files of this folder.
@@ -112,27 +115,28 @@ static inline gw_served_t *gw_answers_served(gw_answers_t *self, const sock_clie
     return &self->served[connection - self->clients->client];
 }
 
-/// Sets the times and the e-stop of the server to what they are now.
+/// Sets the times and the e-stop of the server to the present ones.
 void gw_answers_refresh(gw_answers_t *self);
 
-/// What the daemon looks at beside the server: faults of health, the queue of the bus, what is known of the wheels.
+/// Checks the daemon's own causes of events: faults of health, the queue of the bus, changes of assumptions.
 void gw_answers_look_further(gw_answers_t *self, const iw_snapshot_t *seen);
 
-/// "joystick" (client 3, pid 4711); one that is gone has no name.
+/// Writes "joystick" (client 3, pid 4711); a client that is gone has no name.
 void gw_answers_describe(gw_answers_t *self, iw_client_t id, char out_text[GW_CLIENT_TEXT_SIZE]);
 
-/// A new key for a lease, of the kernel's random numbers. False: it has none yet, as in the first seconds of some machines.
+/// Draws a new lease key from the kernel's random numbers. Returns false while the kernel has none, as in the first
+/// seconds of some machines.
 bool gw_grant_draw_key(char out_key[IWN_LEASE_KEY_MAX + 1U]);
 
-/// Takes the same time wherever they differ.
+/// Compares two keys in constant time.
 bool gw_grant_is_same_key(const char a[IWN_LEASE_KEY_MAX + 1U], const char b[IWN_LEASE_KEY_MAX + 1U]);
 
-/// Recordings for clients: passed on to the process that reads them (disk/box_files.h), answered when it answers.
+/// Recordings for clients: a separate process reads them (disk/box_files.h), and its answer becomes the reply.
 ///
-/// Nothing waits for it, not even later requests of the same client: a stop behind a slow disk is carried out at once. So a client has
-/// one question at a time, and a cycle takes one answer.
+/// No other request waits for it, not even later ones of the same client: a stop after a question to a slow disk is
+/// executed immediately. A client therefore has one question at a time, and a cycle receives one answer.
 ///
-/// Carries out `recordings` or `recording`: refuses it, or leaves its reply to gw_recordings_take.
+/// Executes `recordings` or `recording`: refuses it, or leaves the reply to gw_recordings_take.
 void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What has changed: to the log, to the recorder, and what only the daemon looks at.
+// Reports changes to the log and to the recorder, and checks the daemon's own causes of events.
 #include "answers.h"
 
 #include "assumptions/assumptions.h"
@@ -30,13 +30,13 @@ static void log_estop(const gw_answers_t *self, const char *state) {
              (trouble[0] == '\0') ? "" : ": ", trouble);
 }
 
-/// Once when it begins: who may empty the queue is asked to, as far as that is set up.
+/// Logs it once when it begins, and requests a restart of the link if that is set up.
 static void tell_left_behind(const gw_answers_t *self) {
     const iwl_bus_link_t *link = iwl_hal_link(&self->wheels->hal);
     char sentence[GW_WARNING_SIZE];
     gw_bus_left_sentence(link, self->server.bus, sentence, sizeof sentence);
     sock_log(self->log, SOCK_LOG_WARNING, "%s", sentence);
-    if (link->presence != IWL_LINK_LOCAL) { // Where nobody could be asked, the sentence says what to do.
+    if (link->presence != IWL_LINK_LOCAL) { // If the restart could not be requested, the sentence says what to do.
         (void)gw_bus_left_ask(SOCK_RUNTIME_DIRECTORY, self->server.bus);
     }
 }
@@ -112,7 +112,7 @@ static bool is_any_unwell(const gw_health_t *health, gw_ailment_t ailment) {
     return health->present[IW_LEFT][ailment] || health->present[IW_RIGHT][ailment];
 }
 
-/// A fault while any wheel has it; the log and the warnings name the wheel.
+/// A fault is active while a wheel has it. Log and warnings name the wheel.
 static void tell_ailment(gw_answers_t *self, const iw_snapshot_t *seen, const gw_health_t *before, gw_ailment_t ailment,
                          const char *name) {
     const gw_health_t *health = &self->wheels->health;
@@ -129,7 +129,7 @@ static void tell_ailment(gw_answers_t *self, const iw_snapshot_t *seen, const gw
     }
 }
 
-/// Without a threshold a frame costs nothing here.
+/// Without a threshold this costs nothing per frame.
 static void observe_health(gw_answers_t *self, const iw_snapshot_t *seen) {
     gw_health_t *health = &self->wheels->health;
     if (health->limits.battery_low_dV == 0U && health->limits.temperature_high_degC == 0U) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Refusals: what only this machine knows.
+// Refusals: the parts that only this daemon knows.
 #include "answers.h"
 
 #include "assumptions/assumptions.h"
@@ -28,7 +28,7 @@ const char *iwn_target_name(iwn_server_t *server, iw_client_t id) {
     return self->text;
 }
 
-/// NULL if nobody asked for it yet.
+/// Returns NULL if no client has requested it.
 static const char *name_stopper(const gw_stopper_t *by, iw_time_us_t at_us, char out_text[GW_STOPPER_SIZE]) {
     (void)snprintf(out_text, GW_STOPPER_SIZE, "user %u (process %d)", (unsigned)by->uid, by->pid);
     return (at_us > 0U) ? out_text : NULL;

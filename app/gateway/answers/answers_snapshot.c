@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Status: what surrounds the core.
+// Status: the parts outside the core.
 #include "answers.h"
 
 #include "assumptions/assumptions.h"
@@ -78,7 +78,7 @@ void iwn_target_status(iwn_server_t *server, iwn_client_t *client) {
     iwn_server_send_reply(server, client, &json);
 }
 
-/// Written once, for all clients it is for.
+/// Written once for all clients that receive it.
 void iwn_target_state(iwn_server_t *server, const iw_snapshot_t *seen, bool due_only) {
     size_t length = 0;
     for (iwn_client_t *client = iwn_target_next(server, NULL); client != NULL;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The key of a lease.
+// Key of a lease.
 #include "answers.h"
 
 #include <sys/random.h>
 
-/// Of a lease's key: 128 bits.
+/// Length of a key: 128 bits.
 #define KEY_BYTES (IWN_LEASE_KEY_MAX / 2U)
 
 bool gw_grant_draw_key(char out_key[IWN_LEASE_KEY_MAX + 1U]) {

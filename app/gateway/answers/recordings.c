@@ -33,7 +33,8 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
     }
 }
 
-/// Its question is answered. A client that has ended is looked at again: it was kept for this only.
+/// Marks the question of a client as answered. A client that has ended is served again, because its slot was retained
+/// only for this.
 static void settle(sock_client_t *connection) {
     connection->owed = false;
     if (connection->phase == SOCK_ENDED) {
@@ -44,7 +45,7 @@ static void settle(sock_client_t *connection) {
 static void pass_on(gw_answers_t *self, const gw_box_answer_t *answer) {
     sock_client_t *connection = sock_clients_find(self->clients, answer->client);
     if (connection == NULL || !connection->owed) {
-        return; // It did not wait for it.
+        return; // The client did not wait for it.
     }
     gw_served_t *served = gw_answers_served(self, connection);
     settle(connection);

@@ -22,7 +22,7 @@ void gw_assumptions_open(gw_assumptions_t *self, const char *directory) {
     }
 }
 
-/// Notes an entry that is not as it was. Another figure for the same finding is no news.
+/// Records an entry that has changed. Another figure for the same observation is not a change.
 static void observe_item(gw_assumptions_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry) {
     gw_stored_item_t *known = &self->known.item[item];
     const bool news = entry->state != known->entry.state || entry->source != known->entry.source;
@@ -42,8 +42,7 @@ static void observe_item(gw_assumptions_t *self, iw_assumption_item_t item, cons
     gw_assumptions_report_item(self, item);
 }
 
-/// The offset in force is one of this run: notes where it comes from and how good it is. One that the wheel's force cannot
-/// reach is not kept.
+/// Records source and quality of an offset of this run. An offset that the wheel's force cannot reach is not stored.
 static void note_offset(gw_assumptions_t *self, iw_side_t side, const iw_force_t *force) {
     iw_force_quality_t quality = {0};
     if (force->provenance == IW_OFFSET_OPERATOR) {
@@ -80,7 +79,7 @@ static void observe_offset(gw_assumptions_t *self, iw_side_t side, const iw_forc
     *told = now;
 }
 
-/// Logged each time that the button becomes one that nobody has seen to work, as at the start.
+/// Logs each time that the button becomes untested, and at the start.
 static void observe_button(gw_assumptions_t *self) {
     gw_wheels_t *wheels = self->wheels;
     const iwl_estop_ops_t *kind = wheels->hal.estop_ops;
@@ -116,7 +115,7 @@ void gw_assumptions_observe(gw_assumptions_t *self, const iw_snapshot_t *seen) {
     observe_button(self);
 }
 
-/// What an earlier run found is put beside what this one has found already, which is fresher.
+/// Adds an entry of an earlier run, unless this run has a newer one.
 static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const gw_stored_item_t *stored) {
     const iw_assumption_entry_t *present = &gw_wheels_look(self->wheels).assumed[item];
     char value[IWN_VALUE_SIZE];
@@ -162,21 +161,21 @@ static void merge(gw_assumptions_t *self, const gw_stored_t *stored) {
     }
     merge_offset(self, IW_LEFT, &stored->offset[IW_LEFT]);
     merge_offset(self, IW_RIGHT, &stored->offset[IW_RIGHT]);
-    if (self->known.tried.wall_us == 0) { // What was seen since the start is newer.
+    if (self->known.tried.wall_us == 0) { // A test since the start is newer.
         self->known.tried = stored->tried;
         self->button.looked = false;
     }
 }
 
-/// The first news: the file, or why there is none.
+/// Handles the first news: the file, or the reason why there is none.
 static void take_file(gw_assumptions_t *self, gw_file_store_news_t news, const char *text, size_t length) {
     static gw_stored_t stored; // Too large for a stack.
     if (news == GW_FILE_STORE_ABSENT) {
         self->state = GW_ASSUMPTIONS_NEW;
     } else if (news == GW_FILE_STORE_READ && gw_assumptions_file_read(text, length, self->bus, &stored, self->reason)) {
         self->state = GW_ASSUMPTIONS_STORED;
-        self->stored_length = (length <= sizeof self->kept) ? length : 0U;
-        memcpy(self->kept, text, self->stored_length);
+        self->stored_length = (length <= sizeof self->stored_text) ? length : 0U;
+        memcpy(self->stored_text, text, self->stored_length);
         merge(self, &stored);
     } else {
         self->state = GW_ASSUMPTIONS_IGNORED;
@@ -192,7 +191,7 @@ static void take_result(gw_assumptions_t *self, gw_file_store_news_t news, int e
     const bool failed = news != GW_FILE_STORE_WRITTEN;
     const bool told = failed && self->state == GW_ASSUMPTIONS_FAILED && self->error == error;
     const bool mended = !failed && self->state == GW_ASSUMPTIONS_FAILED;
-    const bool set_aside = self->reason[0] != '\0'; // That must not be forgotten with the first write.
+    const bool set_aside = self->reason[0] != '\0'; // The first write must not clear this reason.
     self->state = failed ? GW_ASSUMPTIONS_FAILED : set_aside ? GW_ASSUMPTIONS_IGNORED : GW_ASSUMPTIONS_STORED;
     self->error = error;
     if (failed) {
@@ -226,9 +225,9 @@ static void receive_store(gw_assumptions_t *self) {
 static void hand_over(gw_assumptions_t *self) {
     static char text[GW_ASSUMPTIONS_FILE_SIZE]; // Too large for a stack.
     const size_t length = gw_assumptions_file_write(&self->known, self->bus, text, sizeof text);
-    const bool same = length == self->stored_length && memcmp(text, self->kept, length) == 0;
+    const bool same = length == self->stored_length && memcmp(text, self->stored_text, length) == 0;
     if (same || gw_file_store_write(&self->store, text, length)) {
-        memcpy(self->kept, text, length);
+        memcpy(self->stored_text, text, length);
         self->stored_length = length;
         self->changed = false;
     }
@@ -244,7 +243,7 @@ void gw_assumptions_poll(gw_assumptions_t *self) {
     }
 }
 
-/// Why nothing was confirmed.
+/// Sets the reason why nothing was confirmed.
 static void refuse(iw_assumption_item_t item, inspect_found_t verdict, iwn_refusal_t *out_refusal) {
     const char *name = iwn_assumption_item_name(item);
     if (verdict == INSPECT_FOUND_UNSET) {
@@ -269,7 +268,7 @@ bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, c
     const iw_assumption_entry_t entry = {(verdict == INSPECT_FOUND_SAME) ? IW_CONFIRMED : IW_CONTRADICTED,
                                          IW_SOURCE_OPERATOR, 0};
     gw_wheels_set_assumption(self->wheels, item, &entry);
-    if (!stands || word->how[0] != '\0') { // Saying so once more takes nothing from how it was found.
+    if (!stands || word->how[0] != '\0') { // A repeated confirmation retains the description of the first one.
         known->word = *word;
         known->since_wall_us = iwl_clock_wall_us();
     }
@@ -289,7 +288,7 @@ void gw_assumptions_describe_contradiction(const gw_assumptions_t *self, iw_assu
 
 void gw_assumptions_close(gw_assumptions_t *self) {
     if (self->answered && self->changed) {
-        self->store.waits = false; // What it owes us no longer matters.
+        self->store.waits = false; // Its outstanding news no longer matter.
         hand_over(self);
     }
     gw_file_store_close(&self->store);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// What the gateway learns about its wheels: noted as it comes, told to the log and to watchers, kept over restarts.
+/// Stores and reports the assumptions about the wheels: a change is recorded, logged, sent to watchers, and stored over
+/// restarts.
 ///
-///     start: keeper reads --> merged into the core: what was found for other configured values is forgotten, and told
-///     run:   every change of the ledger and of the force offsets --> note, log line, event --> keeper writes
+///     start: store process reads --> merged into the core; entries for other values are dropped and reported
+///     run:   change of an assumption or a force offset --> record, log line, event --> store process writes
 ///
-/// Nothing here waits. As long as the keeper has not answered (1 s at the most), changes are not told yet.
+/// No function waits. Changes are not reported before the store process has answered, at most for 1 s.
 #ifndef GATEWAY_ASSUMPTIONS_H
 #define GATEWAY_ASSUMPTIONS_H
 
@@ -20,111 +21,111 @@ struct iwn_server;
 struct sock_log;
 struct gw_wheels;
 
-/// Nothing is told before the keeper has answered, but not for longer than this.
+/// Longest wait for the store process before changes are reported.
 #define GW_ASSUMPTIONS_PATIENCE_US 1000000U
-/// Two writes are at least this far apart ...
+/// Shortest interval between writes ...
 #define GW_ASSUMPTIONS_WRITE_US 1000000U
-/// ... and after one that failed, this far.
+/// ... and after a failed write.
 #define GW_ASSUMPTIONS_RETRY_US 10000000U
-/// A longer ledger is written anew for each status: none that is told in plain words.
+/// Size of the cached text. A longer one is written again for each status; plain texts fit.
 #define GW_ASSUMPTIONS_TEXT_SIZE 16384U
 
 typedef enum {
     GW_ASSUMPTIONS_LOADING = 0,
-    GW_ASSUMPTIONS_NEW,    ///< There was no file.
-    GW_ASSUMPTIONS_STORED, ///< The file was read, or written.
-    GW_ASSUMPTIONS_IGNORED, ///< The file found at the start was not to be trusted and is set aside; what is learnt since is kept.
-    GW_ASSUMPTIONS_FAILED, ///< Nothing is kept: the reason tells why.
+    GW_ASSUMPTIONS_NEW,     ///< There was no file.
+    GW_ASSUMPTIONS_STORED,  ///< The file was read, or written.
+    GW_ASSUMPTIONS_IGNORED, ///< The file found at the start was not valid and is set aside; new ones are stored.
+    GW_ASSUMPTIONS_FAILED,  ///< Nothing is stored, for the stored reason.
 } gw_assumptions_state_t;
 
-/// An offset in force, as last told.
+/// Last reported offset.
 typedef struct {
     iw_time_us_t offset_us;
     int32_t offset_mN;
     iw_offset_provenance_t provenance;
-    iw_offset_provenance_t from; ///< Of a stored one: where it came from first.
+    iw_offset_provenance_t from; ///< For a stored offset: its first source.
 } gw_reported_offset_t;
 
-/// The object `ledger` of a status, as written last, with copies of all that it was written from: while those are as they
-/// were, so are its bytes.
+/// Object `ledger` of a status as last written, with copies of its inputs. While the inputs are the same, the bytes are
+/// reused.
 typedef struct {
     iw_config_t config;
     uint32_t track_mm;
     iw_assumption_entry_t assumed[IW_ASSUMPTION_ITEMS];
     gw_stored_item_t known[IW_ASSUMPTION_ITEMS];
-    size_t length; ///< 0: nothing is kept.
+    size_t length; ///< Length of the text; 0 if nothing is cached.
     char text[GW_ASSUMPTIONS_TEXT_SIZE];
 } gw_assumptions_written_t;
 
 typedef struct gw_assumptions {
-    struct gw_wheels *wheels;  ///< Of which it is known.
-    struct sock_log *log;      ///< Told what is learnt.
-    struct iwn_server *server; ///< By which clients are told.
+    struct gw_wheels *wheels;  ///< Wheels whose assumptions are stored.
+    struct sock_log *log;      ///< Log for changes.
+    struct iwn_server *server; ///< Server that informs clients.
     inspect_configured_t configured;
     const char *bus;
     gw_stored_t known;
     gw_assumptions_written_t written;
-    gw_button_t button; ///< Its first two members are set already.
+    gw_button_t button; ///< The owner sets its first two members.
     gw_reported_offset_t told[IW_SIDES];
-    iw_force_quality_t tare[IW_SIDES]; ///< Of the window of the last tare.
+    iw_force_quality_t tare[IW_SIDES]; ///< Statistics of the window of the last tare.
     gw_file_store_t store;
     gw_assumptions_state_t state;
     iw_time_us_t start_us;
-    iw_time_us_t write_us; ///< Nothing is written before.
+    iw_time_us_t write_us; ///< Earliest time of the next write.
     size_t stored_length;
-    int error;                               ///< Of GW_ASSUMPTIONS_FAILED.
-    bool answered;                           ///< The keeper has, or our patience has ended: changes are told.
-    bool observed;                           ///< Changes of the ledger have been noted, up to this one:
-    uint32_t observed_changes;               ///< As `iw_snapshot_t::assumed_changes`.
-    bool changed;                            ///< Since the last write.
-    char reason[GW_ASSUMPTIONS_REASON_SIZE]; ///< Why the file found at the start is ignored; empty: it is not.
+    int error;                 ///< Errno of GW_ASSUMPTIONS_FAILED.
+    bool answered;             ///< The store process has answered, or the wait has ended: changes are reported.
+    bool observed;             ///< Changes up to `observed_changes` have been recorded.
+    uint32_t observed_changes; ///< Value of `iw_snapshot_t::assumed_changes`.
+    bool changed;              ///< There was a change since the last write.
+    char reason[GW_ASSUMPTIONS_REASON_SIZE]; ///< Reason to ignore the file found at the start; empty if it is used.
     char path[SOCK_PATH_SIZE + 128U];
-    char kept[GW_ASSUMPTIONS_FILE_SIZE]; ///< The text handed over last.
+    char stored_text[GW_ASSUMPTIONS_FILE_SIZE]; ///< Last text that was passed to the store process.
 } gw_assumptions_t;
 
-/// Starts the keeper of what is known of the wheels at `bus`, in `directory`; the members before are set already and must
-/// outlive it. Call it before anything is opened.
+/// Starts the store process for the wheels on `bus`, in `directory`. The members before are set and must exist as long
+/// as `self`. Call it before other descriptors are opened.
 void gw_assumptions_open(gw_assumptions_t *self, const char *directory);
 
-/// Notes and tells what has changed.
+/// Records and reports changes.
 void gw_assumptions_observe(gw_assumptions_t *self, const iw_snapshot_t *seen);
 
-/// Hears the keeper and hands over what has changed. Once per cycle.
+/// Receives from the store process and passes changes to it. Call it once per cycle.
 void gw_assumptions_poll(gw_assumptions_t *self);
 
-/// The operator's word, noted and told; `word->found` as in inspect_assumption_compare. False: it was not taken, and `out_refusal` tells
-/// why.
+/// Enters a decision of the operator and reports it. `word->found` as in inspect_assumption_compare. Returns false and
+/// sets `out_refusal` if it is not accepted.
 bool gw_assumptions_confirm(gw_assumptions_t *self, iw_assumption_item_t item, const inspect_word_t *word,
                             iwn_refusal_t *out_refusal);
 
-/// "track is contradicted: ...; twist is refused", of an item that is.
+/// Describes a contradicted item: "track is contradicted: ...; twist is refused".
 void gw_assumptions_describe_contradiction(const gw_assumptions_t *self, iw_assumption_item_t item, char *out_text,
                                            size_t size);
 
-/// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason. The ledger's bytes are kept and
-/// written again until something of it changes.
+/// Writes the objects `ledger` and `memory` of a snapshot: every item; file, state and reason. The bytes of the ledger
+/// are reused until one of its inputs changes.
 void gw_assumptions_write(gw_assumptions_t *self, const iw_snapshot_t *seen, iwn_out_t *json);
 
-/// One item of the ledger, its state and what it rests on, into an object that is open.
+/// Writes one item with its state and source into an open object.
 void gw_assumptions_write_item(const gw_assumptions_t *self, iw_assumption_item_t item, iwn_out_t *json);
 
-/// Hands over the rest. The keeper ends when it is on the disk.
+/// Passes the rest to the store process, which ends when it is on the disk.
 void gw_assumptions_close(gw_assumptions_t *self);
 
-/// In words, lines of the log and events; for assumptions.c: an item has changed.
+/// Texts, log lines and events for assumptions.c. This one reports a changed item.
 void gw_assumptions_report_item(gw_assumptions_t *self, iw_assumption_item_t item);
 
-/// The offset in force has changed.
+/// Reports a changed offset.
 void gw_assumptions_report_offset(gw_assumptions_t *self, iw_side_t side, const gw_reported_offset_t *now,
                                   const gw_reported_offset_t *before);
 
-/// The button was tried, or what was tried is another wiring.
+/// Reports a test of the button, or a change of its wiring.
 void gw_assumptions_report_button(gw_assumptions_t *self, gw_button_news_t news);
 
-/// Where it is kept, or why not.
+/// Reports the file, or the reason why there is none.
 void gw_assumptions_report_state(gw_assumptions_t *self);
 
-/// The whole ledger, at start.
+/// Reports all items at the start.
 void gw_assumptions_report_changes(gw_assumptions_t *self);
 
 #endif

@@ -35,7 +35,7 @@ static void write_item(const gw_stored_item_t *known, const char *name, iwn_out_
     iwn_out_text(json, "found", known->word.found);
     iwn_out_int(json, "since_wall_us", known->since_wall_us);
     if (known->word.how[0] != '\0') {
-        iwn_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
+        iwn_out_text(json, "how", known->word.how); // Omitted otherwise, so that earlier versions can read it.
     }
     iwn_out_close(json, '}');
 }
@@ -87,7 +87,7 @@ size_t gw_assumptions_file_write(const gw_stored_t *known, const char *bus, char
     return length + SUM_LENGTH;
 }
 
-/// A field's number, if it is one within the limits.
+/// Reads a number within the limits.
 static bool read_number(iwn_json_t object, const char *field, int64_t low, int64_t high, int64_t *out_number) {
     iwn_json_t value;
     if (!iwn_json_find(object, field, &value) || iwn_json_kind(value) != IWN_JSON_INTEGER) {
@@ -118,7 +118,7 @@ static size_t count_fields(iwn_json_t object) {
     return count;
 }
 
-/// What the operator found, and how: ledgers of before do not tell that.
+/// Reads the operator's value and its description, which earlier versions did not write.
 static bool read_word(iwn_json_t object, inspect_word_t *out_word) {
     iwn_json_t how;
     const bool has_how = iwn_json_find(object, "how", &how);
@@ -181,10 +181,10 @@ static bool read_offset(const char *name, iwn_json_t object, gw_stored_t *known)
     return gw_bounds_offset(found);
 }
 
-/// Each member of the object with that name, by its reader.
+/// Reads each member of the object with that name.
 static bool read_all(iwn_json_t root, const char *field, gw_stored_t *known,
                      bool (*read_one)(const char *, iwn_json_t, gw_stored_t *)) {
-    char name[32]; // A longer one is none of ours.
+    char name[32]; // A longer name is not one of ours.
     iwn_json_t object;
     iwn_json_t found;
     iwn_json_t value;
@@ -201,17 +201,17 @@ static bool read_all(iwn_json_t root, const char *field, gw_stored_t *known,
     return true;
 }
 
-/// The button, if the line speaks of it.
+/// Reads the button, if the line has one.
 static bool read_button(iwn_json_t root, gw_tried_t *out_tried) {
     iwn_json_t object;
     return !iwn_json_find(root, "button", &object) || gw_tried_read(object, out_tried);
 }
 
-/// NULL, or what is wrong with the line.
+/// Reads the line. Returns NULL, or what is wrong.
 static const char *read_line(const char *text, size_t length, const char *bus, gw_stored_t *known) {
     iwn_work_t work;
     char why[GW_ASSUMPTIONS_REASON_SIZE];
-    iwn_text_t unused = iwn_text_begin(why, sizeof why); // The words below are for people; JSON's would not help them.
+    iwn_text_t unused = iwn_text_begin(why, sizeof why); // The text of the parser would not help; the reasons below do.
     iwn_json_t root;
     int64_t version;
     if (!iwn_json_check(text, length, &work, &root, &unused) || !is_text(root, "format", FORMAT)) {

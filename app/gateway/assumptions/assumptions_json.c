@@ -7,11 +7,11 @@
 
 #include <string.h>
 
-/// All that the ledger is written from. What writes it sees nothing else, so that nothing can be missing in `is_as_written`.
+/// All inputs of the written text. The writer receives nothing else, so that `is_as_written` compares all of them.
 typedef struct {
     const inspect_configured_t *configured;
-    const iw_assumption_entry_t *assumed; ///< By item.
-    const gw_stored_item_t *known;        ///< By item.
+    const iw_assumption_entry_t *assumed; ///< Indexed by item.
+    const gw_stored_item_t *known;        ///< Indexed by item.
 } source_t;
 
 static void write_item(const source_t *source, iw_assumption_item_t item, iwn_out_t *json) {
@@ -38,7 +38,8 @@ void gw_assumptions_write_item(const gw_assumptions_t *self, iw_assumption_item_
     write_item(&source, item, json);
 }
 
-/// Bytes, padding and all: a difference that means nothing costs one writing anew, and none that means something is missed.
+/// Compares bytes including padding: an irrelevant difference costs one more write, and no relevant difference is
+/// missed.
 static bool is_alike(const void *one, const void *other, size_t size) {
     return memcmp(one, other, size) == 0;
 }
@@ -50,7 +51,7 @@ static bool is_as_written(const gw_assumptions_written_t *written, const source_
            is_alike(written->known, source->known, sizeof written->known);
 }
 
-/// Keeps the bytes of the object that ends the line so far, if there is room for them.
+/// Stores the bytes of the object at the end of the line, if there is room.
 static void keep(gw_assumptions_written_t *written, const source_t *source, const iwn_out_t *json, size_t begin) {
     const size_t length = json->overflow ? 0U : json->length - begin;
     written->length = 0;
@@ -80,7 +81,7 @@ static void write_assumptions(gw_assumptions_written_t *written, const source_t 
     keep(written, source, json, begin);
 }
 
-static void write_memory(const gw_assumptions_t *self, iwn_out_t *json) {
+static void write_store(const gw_assumptions_t *self, iwn_out_t *json) {
     static const char *const names[] = {
         [GW_ASSUMPTIONS_LOADING] = "loading", [GW_ASSUMPTIONS_NEW] = "new",       [GW_ASSUMPTIONS_STORED] = "kept",
         [GW_ASSUMPTIONS_IGNORED] = "ignored", [GW_ASSUMPTIONS_FAILED] = "failed",
@@ -98,5 +99,5 @@ static void write_memory(const gw_assumptions_t *self, iwn_out_t *json) {
 void gw_assumptions_write(gw_assumptions_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
     const source_t source = {&self->configured, seen->assumed, self->known.item};
     write_assumptions(&self->written, &source, json);
-    write_memory(self, json);
+    write_store(self, json);
 }

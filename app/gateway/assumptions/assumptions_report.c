@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// An offset that moves further than this in one step is worth a warning: somebody pressed, then or now.
+/// A larger change of an offset in one step causes a warning: there was a load, before or now.
 #define MOVED_mN ((int32_t)IW_FORCE_QUIET_mN)
 
 static const char *side_name(iw_side_t side) {
@@ -36,7 +36,7 @@ void gw_assumptions_report_item(gw_assumptions_t *self, iw_assumption_item_t ite
     iwn_server_send_event(self->server, IWN_TOPIC_STATE, &json);
 }
 
-/// "12.300 N, stored (wheel)", or "none".
+/// Writes "12.300 N, stored (wheel)", or "none".
 static void describe(const gw_reported_offset_t *offset, char *out_text, size_t size) {
     const char *word = iwn_offset_word(offset->provenance, offset->offset_us);
     const bool stored = strcmp(word, iwn_provenance_name(IW_OFFSET_STORED)) == 0;
@@ -94,7 +94,7 @@ void gw_assumptions_report_state(gw_assumptions_t *self) {
     }
 }
 
-/// Names of the items in one state, as one text.
+/// Lists the names of the items in one state.
 static void list_items(const iw_assumption_entry_t *assumed, iw_assumption_state_t state, char *out_text, size_t size) {
     out_text[0] = '\0';
     for (unsigned item = 0; item < IW_ASSUMPTION_ITEMS; item++) {

@@ -7,16 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// The end of the year 9999, after which no clock that is right will write anything.
+/// End of the year 9999: no valid clock writes a later time.
 #define WALL_US_MAX INT64_C(253402300799000000)
-/// One that can be: what is found is compared with it only for its form.
+/// A possible track: values are compared with it only to check their form.
 #define ANY_TRACK_MM 600U
 
 static bool within(int64_t value, int64_t low, int64_t high) {
     return value >= low && value <= high;
 }
 
-/// Of 1000 x raw / offset in dN, where the unit predicts `ratio`.
+/// Compares 1000 x raw / offset in dN with the `ratio` of a unit.
 static bool near_ratio(int32_t figure, int32_t ratio) {
     const int32_t share = ratio * 10 * IW_FORCE_OBSERVED_PERCENT;
     return within(figure, ratio * 1000 - share, ratio * 1000 + share);
@@ -27,7 +27,7 @@ static bool fits_unit(const gw_stored_item_t *known, bool confirmed) {
     return near_ratio(known->entry.figure, (is_cn == confirmed) ? 10 : 1);
 }
 
-/// Speed of the largest wheel at one rpm, in mm/s, and one more for what is cut off.
+/// Returns the speed of the largest wheel at one rpm, in mm/s, rounded up.
 static int32_t largest_rpm(void) {
     return (int32_t)iw_config_range(IW_CONFIG_RADIUS).max * 105 / 1000 + 1;
 }
@@ -37,7 +37,7 @@ static bool fits_sign(int32_t figure, bool confirmed) {
     return along > IW_SIGN_MM_S && along <= -INT16_MIN * largest_rpm();
 }
 
-/// Within 15 % of the speed it was told, and 1 rpm.
+/// Returns true within 15 % of the commanded speed, and 1 rpm.
 static bool fits_type(int32_t figure) {
     const int32_t share = 150 + largest_rpm() * 1000 / IW_OBSERVATION_TYPE_MM_S;
     return within(figure, 1000 - share, 1000 + share);
@@ -59,7 +59,7 @@ static bool fits_gear(int32_t figure, bool confirmed) {
     return within(figure, 1000 - share, 1000 + share) == confirmed;
 }
 
-/// Measured: is it what this measurement gives?
+/// Returns true if this measurement can have this result.
 static bool fits_bus(iw_assumption_item_t item, const gw_stored_item_t *known) {
     const bool confirmed = known->entry.state == IW_CONFIRMED;
     const int32_t figure = known->entry.figure;
@@ -81,11 +81,11 @@ static bool fits_bus(iw_assumption_item_t item, const gw_stored_item_t *known) {
     case IW_ASSUMPTION_DLC:
         return confirmed ? figure == IW_DLC_STATUS : within(figure, 0, IW_CAN_DATA_MAX);
     default:
-        return false; // Only the operator can know.
+        return false; // Only the operator can see it.
     }
 }
 
-/// A value that can be configured, or that an operator may find.
+/// Returns true for a value that can be configured, or that an operator may find.
 static bool can_be(iw_assumption_item_t item, const char *value) {
     char bare[IWN_VALUE_SIZE];
     iw_config_t config;

@@ -6,14 +6,14 @@
 #include <stdio.h>
 #include <string.h>
 
-/// What the kernel calls the lines of all contacts. False if one cannot be read.
+/// Reads the identities of all lines. Returns false if one cannot be read.
 static bool see(const iwl_hal_t *hal, iwl_estop_seen_t seen[IWL_ESTOP_CONTACTS]) {
     memset(seen, 0, IWL_ESTOP_CONTACTS * sizeof seen[0]);
     return hal->estop_ops->present && !hal->estop_ops->simulated && iwl_hal_estop_seen(hal, 0, &seen[0]) &&
            (!hal->two_contacts || iwl_hal_estop_seen(hal, 1, &seen[1]));
 }
 
-/// A second contact that is not there has no polarity; what was stored before there were two has no name of it.
+/// A second contact that does not exist has no polarity. Data from before second contacts existed have no name for it.
 static bool is_same_contact(const gw_button_t *self, const iwl_estop_seen_t *seen, const gw_tried_t *tried,
                             unsigned i) {
     const char *line = (tried->contact[i].line[0] != '\0') ? tried->contact[i].line : "none";
@@ -35,7 +35,7 @@ static void note(const gw_button_t *self, const iwl_estop_seen_t seen[IWL_ESTOP_
 
 typedef enum { UNREADABLE, NONE_PRESSED, SOME_PRESSED, ALL_PRESSED } answer_t;
 
-/// What all contacts say together.
+/// Combines the readings of all contacts.
 static answer_t said_by_all(const iwl_hal_t *hal) {
     const int first = hal->contact_last[0];
     const int second = hal->two_contacts ? hal->contact_last[1] : first;
@@ -48,7 +48,7 @@ static answer_t said_by_all(const iwl_hal_t *hal) {
     return (first > 0) ? ALL_PRESSED : NONE_PRESSED;
 }
 
-/// True if the answer ends a press.
+/// Returns true if the reading ends a press.
 static bool follow(gw_button_t *self, answer_t answer, iw_time_us_t now_us) {
     if (answer == UNREADABLE) {
         self->state = GW_BUTTON_UNKNOWN;
@@ -73,7 +73,7 @@ static bool follow(gw_button_t *self, answer_t answer, iw_time_us_t now_us) {
     return shown;
 }
 
-/// The answers of the last look, and no time but that of the contacts' own judge, decide what a look shows.
+/// The result depends on the last readings, and on no time except that of the contacts' own check.
 static bool is_news(gw_button_t *self, const iwl_hal_t *hal) {
     const bool disagrees = hal->estop_last == IW_ESTOP_DISAGREES;
     const bool news =
@@ -94,7 +94,7 @@ gw_button_news_t gw_button_look(gw_button_t *self, const iwl_hal_t *hal, iw_time
         note(self, seen, tried);
         return GW_BUTTON_TRIED;
     }
-    // A contact that is stuck reads released at the next start: only what was kept can tell of it then.
+    // A stuck contact reads released at the next start; only the stored data can reveal it then.
     if (self->disagreed && tried->wall_us != 0) {
         memset(tried, 0, sizeof *tried);
         return GW_BUTTON_BROKEN;
@@ -140,7 +140,7 @@ static bool read_contact(iwn_json_t object, unsigned i, gw_tried_t *out_tried) {
                      sizeof out_tried->contact[i].seen.line);
 }
 
-/// What was stored before there were two contacts knows nothing of the second.
+/// Data from before second contacts existed have no second contact.
 bool gw_tried_read(iwn_json_t object, gw_tried_t *out_tried) {
     iwn_json_t value;
     memset(out_tried, 0, sizeof *out_tried);

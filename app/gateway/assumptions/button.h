@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
-/// Was the e-stop's button ever seen to work? Only a press and its release show that: a line that is shorted reads released for ever.
+/// Records whether the e-stop button was tested. Only a press and its release show that it works, because a shorted
+/// line always reads released.
 ///
-///     UNKNOWN --released--> RELEASED --pressed--> PRESSED --no longer, after GW_BUTTON_PRESS_US or more--> SHOWN --released--> RELEASED: it was tried
-///     (unreadable: UNKNOWN; a line that is pressed at the start shows nothing; nor does a shorter pulse, which may be noise: RELEASED)
+///     UNKNOWN --released--> RELEASED --pressed--> PRESSED --GW_BUTTON_PRESS_US--> SHOWN --released--> RELEASED: tested
+///     (unreadable: UNKNOWN; shorter press, which may be noise: RELEASED; pressed at the start: no test)
 ///
-/// Of two contacts both must be seen pressed at once for so long, and then both released; one that opens sooner ends the press. What was tried is a line of a chip, by the kernel's names, with its polarity: with another wiring it counts no more; nor once its contacts have disagreed, until both were tried again.
+/// Two contacts must both be pressed together for that time and then both be released. A contact that opens earlier
+/// ends the press. A test applies to a line of a chip, by the names in the kernel, with its polarity. With another
+/// wiring it is void, and also after the contacts have disagreed, until both are tested again.
 #ifndef GATEWAY_BUTTON_H
 #define GATEWAY_BUTTON_H
 
@@ -12,52 +15,52 @@
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/json_out.h"
 
-/// A press by hand lasts at least this long.
+/// Shortest press by hand.
 #define GW_BUTTON_PRESS_US 50000U
-/// Of a line's name in the configuration.
+/// Size of a line's name in the configuration.
 #define GW_BUTTON_LINE_SIZE 113U
 
-/// The wiring on which a button was seen to work, and when. All of it is zero if it never was.
+/// Wiring on which the button was tested, and the time. All zero if it never was.
 typedef struct {
-    int64_t wall_us; ///< Of the release; 0: never.
+    int64_t wall_us; ///< Time of the release; 0 if never.
     struct {
         bool active_high;
-        char line[GW_BUTTON_LINE_SIZE]; ///< As configured; of the second: "none" if there is none, or empty.
-        iwl_estop_seen_t seen;          ///< As the kernel calls it.
+        char line[GW_BUTTON_LINE_SIZE]; ///< As configured; "none" or empty if there is no second contact.
+        iwl_estop_seen_t seen;          ///< Identity in the kernel.
     } contact[IWL_ESTOP_CONTACTS];
 } gw_tried_t;
 
 typedef enum { GW_BUTTON_UNKNOWN = 0, GW_BUTTON_RELEASED, GW_BUTTON_PRESSED, GW_BUTTON_SHOWN } gw_button_state_t;
 
-/// The button that is watched. It begins all zero but for its contacts and their debounce time.
+/// Observed button. The owner sets the contacts and their debounce time; the rest begins with zeros.
 typedef struct {
     struct {
         const char *line; ///< As configured.
-        bool active_high; ///< The same.
+        bool active_high; ///< As configured.
     } contact[IWL_ESTOP_CONTACTS];
-    uint32_t debounce_us; ///< So much later than it is a release is told; a press is not.
-    bool looked;          ///< At these answers:
+    uint32_t debounce_us; ///< Delay of a reported release. A press has no delay.
+    bool looked;          ///< State at the last reading:
     int last[IWL_ESTOP_CONTACTS];
-    bool disagreed; ///< The contacts did then, for too long.
+    bool disagreed; ///< The contacts had disagreed for too long.
     gw_button_state_t state;
     iw_time_us_t pressed_us;
 } gw_button_t;
 
-/// What a look has shown.
+/// Result of a reading.
 typedef enum {
     GW_BUTTON_NO_NEWS = 0,
-    GW_BUTTON_TRIED,  ///< It was pressed and released: `tried` has the wiring and the time.
-    GW_BUTTON_VOID,   ///< `tried` was for another wiring, and is forgotten.
-    GW_BUTTON_BROKEN, ///< Its contacts disagree: `tried` is forgotten.
+    GW_BUTTON_TRIED,  ///< The button was pressed and released: `tried` has wiring and time.
+    GW_BUTTON_VOID,   ///< `tried` was for another wiring and is cleared.
+    GW_BUTTON_BROKEN, ///< The contacts disagree: `tried` is cleared.
 } gw_button_news_t;
 
-/// What the last look at the e-stop has shown. A simulated button, or none, is no news; nor is a look like the one before it:
-/// a line is never called otherwise without having been unreadable in between.
+/// Evaluates the last reading of the e-stop. A simulated button, or none, gives no result, and neither does a reading
+/// like the one before: the identity of a line changes only after it was unreadable.
 gw_button_news_t gw_button_look(gw_button_t *self, const iwl_hal_t *hal, iw_time_us_t now_us, gw_tried_t *tried);
 
-/// Members of an object that is open.
+/// Writes the members into an open object.
 void gw_tried_write(const gw_tried_t *tried, iwn_out_t *json);
-/// False if that is none.
+/// Reads the members. Returns false if they are not valid.
 bool gw_tried_read(iwn_json_t object, gw_tried_t *out_tried);
 
 #endif

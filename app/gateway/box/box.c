@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <sys/mman.h>
 
-/// The motors come before the diary.
+/// The loop has precedence over the writer.
 #define NICE 10
 
 static void write_recordings(int fd, const void *context) {
@@ -99,7 +99,7 @@ gw_child_news_t gw_box_receive(gw_box_t *self) {
     return news;
 }
 
-/// False if it cannot be ordered; without a box there is nothing to order.
+/// Returns false if the recording cannot be ordered. Without a box nothing is ordered.
 static bool order_recording(gw_box_t *box, const iwn_stop_note_t *note, const char *cause, iw_time_us_t now_us) {
     const char *side = iwn_sides_name(note->stop.sides);
     if (box->config.blackbox_s == 0U) {

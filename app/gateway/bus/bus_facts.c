@@ -122,7 +122,7 @@ bool gw_bus_left_ask(const char *directory, const char *interface) {
     if (snprintf(path, sizeof path, "%s/%s.restart", directory, interface) >= (int)sizeof path) {
         return false;
     }
-    (void)unlink(path); // Made anew, so that nothing is written through a link.
+    (void)unlink(path); // Created again, so that nothing is written through a link.
     const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     if (fd < 0) {
         return false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the kernel reports of the bus, put to the core and into the warnings.
+/// Passes facts about the bus from the kernel to the core, and to the warnings.
 #ifndef GATEWAY_BUS_FACTS_H
 #define GATEWAY_BUS_FACTS_H
 
@@ -8,32 +8,32 @@
 struct gw_wheels;
 
 typedef struct gw_bus_facts {
-    uint32_t changes; ///< Of the link, when last passed on.
-    bool known;       ///< It has been passed on once.
-    bool left_behind; ///< What was warned of.
-    uint32_t health;  ///< Changes of the wheels' health when last warned of.
-    bool untried;     ///< The same: nobody has seen the button of the e-stop work.
+    uint32_t changes; ///< `changes` of the link when it was last passed on.
+    bool known;       ///< The link has been passed on once.
+    bool left_behind; ///< A warning about `left_behind` is active.
+    uint32_t health;  ///< Changes of the wheels' health at the last warning.
+    bool untried;     ///< A warning about an untested e-stop button is active.
 } gw_bus_facts_t;
 
-/// Passes on what has changed since the last call: to the core and to the warnings. Call it before a step. `left_behind` as last
-/// seen: a setpoint is left in the controller.
+/// Passes changes since the last call to the core and to the warnings. Call it before a step. `left_behind`: a setpoint
+/// remains in the controller, by the last snapshot.
 void gw_bus_facts_follow(gw_bus_facts_t *self, struct gw_wheels *wheels, bool left_behind);
 
-/// The word for `status`: what is known of the bit timing.
+/// Returns the word for `status` about the bit timing.
 const char *gw_bus_facts_timing(const inspect_config_t *config, const iwl_bus_link_t *link);
 
-/// A setpoint that was left in the controller when sending ended, and that this process may not take back: what to say
-/// of it, and whom to ask.
+/// Handling of a setpoint that remains in the controller after sending has ended, and that this process has no rights
+/// to purge.
 ///
-/// Whoever may restart the link is asked by a file that is written anew: `DIRECTORY/INTERFACE.restart`. The unit
-/// iwheel-can-restart@INTERFACE.path waits for that; it is off unless somebody has enabled it. The gateway notices the
-/// restart as it notices any other: the bus goes down and up, and with that everything that was queued is gone.
+/// The gateway requests a restart of the link by writing the file `DIRECTORY/INTERFACE.restart`. The unit
+/// iwheel-can-restart@INTERFACE.path waits for it; it is disabled by default. The gateway detects the restart like any
+/// other: the bus goes down and up, and all queued frames are gone.
 ///
-/// What it means, and what to do.
+/// Writes what it means, and what to do.
 void gw_bus_left_sentence(const iwl_bus_link_t *link, const char *bus, char *out_sentence, size_t size);
 
-/// False if nobody can be asked: there is no such directory, or we may not write there. Does not wait for a disk: the
-/// directory is meant to be in memory.
+/// Requests the restart. Returns false if it cannot: the directory does not exist or is not writable. It does not wait
+/// for a disk, because the directory should be in memory.
 bool gw_bus_left_ask(const char *directory, const char *interface);
 
 #endif

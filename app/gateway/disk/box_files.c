@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// Holds room on the disk, so that a full one does not cost the recording of an accident.
+/// Reserves room on the disk, so that a full disk does not cost the recording of an accident.
 #define RESERVE    "reserve"
 #define DIGITS_MIN 6U
 #define DIGITS_MAX 10U
@@ -19,12 +19,12 @@
 
 const char *const gw_box_endings[GW_BOX_ENDINGS] = {".log", ".jsonl", ".conf"};
 
-/// A file of a recording. Once sorted by number, the first one of each recording stands for the whole recording.
+/// A file of a recording. After sorting by number, the first file of each recording represents the recording.
 typedef struct {
     uint64_t bytes;
     uint32_t number;
-    bool removed;                  ///< Chosen to be removed.
-    char cause[GW_BOX_CAUSE_SIZE]; ///< From the name of the event file; empty: it has none.
+    bool removed;                  ///< Selected for removal.
+    char cause[GW_BOX_CAUSE_SIZE]; ///< Cause from the name of the event file; empty if there is none.
 } found_t;
 
 typedef struct {
@@ -32,8 +32,8 @@ typedef struct {
     size_t files;
     bool partial;      ///< The directory has more files than that.
     size_t recordings; ///< After sorting: the first entries of `file`.
-    size_t left;       ///< Of the recordings, those that are not chosen to be removed.
-    uint64_t bytes;    ///< Size of those that are left.
+    size_t left;       ///< Number of recordings that are not selected for removal.
+    uint64_t bytes;    ///< Size of these recordings.
 } survey_t;
 
 int gw_box_files_open(const char *directory) {
@@ -67,14 +67,14 @@ size_t gw_box_files_stem(const char *name) {
     return good ? (size_t)(cause - name) + letters : 0U;
 }
 
-/// The number in a file's name; 0 if it is none of ours.
+/// Returns the number in a file name; 0 if the name has another form.
 static uint32_t number_of(const char *name) {
     const unsigned long number =
         (gw_box_files_stem(name) > 0U) ? strtoul(name + sizeof GW_BOX_PREFIX - 1U, NULL, 10) : 0U;
     return (number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
-/// Calls for each file; a directory that cannot be read has none.
+/// Calls `take` for each file. A directory that cannot be read has none.
 static void visit(int directory, void (*take)(int directory, const char *name, void *context), void *context) {
     const int fd = openat(directory, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *list = (fd >= 0) ? fdopendir(fd) : NULL;
@@ -142,7 +142,7 @@ static int lower_first(const void *a, const void *b) {
     return (first > second) - (first < second);
 }
 
-/// Makes one entry of all files of a recording; `last` is that of the recording before, NULL: there is none.
+/// Makes one entry of all files of a recording. `last` is the entry of the recording before, or NULL.
 static void merge(survey_t *survey, found_t *last, const found_t *file) {
     survey->bytes += file->bytes;
     if (last == NULL || last->number != file->number) {
@@ -155,8 +155,8 @@ static void merge(survey_t *survey, found_t *last, const found_t *file) {
     }
 }
 
-/// Reads the directory once. Afterwards `file` has one entry for each recording, the oldest first. What it returns is valid
-/// until the next call.
+/// Reads the directory once. Then `file` has one entry per recording, the oldest first. The result is valid until the
+/// next call.
 static survey_t *survey_directory(int directory) {
     static survey_t found; // Too large for a stack.
     survey_t *const survey = &found;
@@ -173,8 +173,8 @@ static survey_t *survey_directory(int directory) {
     return survey;
 }
 
-/// Whether the recording is of a stop in motion, by the first lines of its event file. One that cannot be read may be:
-/// it is not among those that are removed first.
+/// Returns true if the recording is of a stop in motion, by the first lines of its event file. A file that cannot be
+/// read counts as in motion, so that it is not removed first.
 static bool was_in_motion(int directory, const found_t *recording) {
     char name[GW_BOX_STEM_SIZE + 8U];
     static char text[2U * GW_BOX_LINE_SIZE]; // Too large for a stack.
@@ -188,7 +188,7 @@ static bool was_in_motion(int directory, const found_t *recording) {
     return !gw_box_line_is_harmless(text);
 }
 
-/// Chooses recordings to be removed, the oldest first, until what is left fits into `room`.
+/// Selects recordings for removal, the oldest first, until the rest fits `room`.
 static void choose(survey_t *survey, int directory, const gw_box_room_t *room, bool harmless_only) {
     for (size_t i = 0; i < survey->recordings && (survey->left > room->recordings || survey->bytes > room->bytes);
          i++) {
@@ -212,7 +212,7 @@ static void take_chosen(int directory, const char *name, void *context) {
     }
 }
 
-/// One pass over the directory; returns the number of files removed.
+/// Makes one pass over the directory and returns the number of removed files.
 static size_t thin_out(survey_t *survey, int directory, const gw_box_room_t *room) {
     choose(survey, directory, room, true);
     if (room->in_motion) {
@@ -244,7 +244,7 @@ bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
 void gw_box_files_reserve(int directory, uint64_t bytes) {
     const int fd = openat(directory, RESERVE, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
     if (fd < 0) {
-        return; // It is there already, or cannot be.
+        return; // The file exists, or cannot be created.
     }
     if (fallocate(fd, 0, 0, (off_t)bytes) != 0) {
         (void)unlinkat(directory, RESERVE, 0);
@@ -261,7 +261,7 @@ FILE *gw_box_files_create(int directory, const char *stem, const char *ending) {
     (void)snprintf(name, sizeof name, "%s%s", stem, ending);
     const int fd = openat(directory, name, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (fd >= 0) {
-        (void)fchmod(fd, 0644); // Whoever may enter the directory may read it, whatever the service's umask.
+        (void)fchmod(fd, 0644); // Users who may enter the directory may read it, independent of the umask.
     }
     return (fd >= 0) ? fdopen(fd, "w") : NULL;
 }

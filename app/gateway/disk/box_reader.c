@@ -25,7 +25,7 @@ typedef struct {
     char stem[GW_BOX_STEM_SIZE];
     bool there[GW_BOX_ENDINGS];
     int64_t bytes[GW_BOX_ENDINGS];
-    int64_t wall_us; ///< 0: unknown.
+    int64_t wall_us; ///< 0 if unknown.
 } listed_t;
 
 typedef struct {
@@ -43,7 +43,7 @@ __attribute__((format(printf, 3, 4))) static void refuse(gw_box_answer_t *out, i
     out->length = (length > 0) ? (uint32_t)length : 0U;
 }
 
-/// The fields of a reply, without the brackets around them.
+/// Ends the fields of a reply, without the brackets around them.
 static void finish(iwn_out_t *json, gw_box_answer_t *out) {
     iwn_out_close(json, '}');
     const size_t length = iwn_out_finish(json);
@@ -56,7 +56,8 @@ static void finish(iwn_out_t *json, gw_box_answer_t *out) {
     memmove(out->text, out->text + 1, out->length);
 }
 
-/// The recording of that name in the list, added if there is room or it is newer than the oldest. NULL: there is none.
+/// Returns the recording with that name in the list. Adds it if there is room or it is newer than the oldest. Returns
+/// NULL if it is not in the list.
 static listed_t *place(list_t *list, const char *name, size_t stem) {
     const unsigned long number = strtoul(name + sizeof GW_BOX_PREFIX - 1U, NULL, 10);
     listed_t *oldest = &list->entry[0];
@@ -91,7 +92,7 @@ static void list_file(int directory, const char *name, list_t *list) {
     }
     entry->there[ending] = true;
     entry->bytes[ending] = (int64_t)status.st_size;
-    if (strcmp(gw_box_endings[ending], ".conf") == 0) { // The first to be written, and at once whole.
+    if (strcmp(gw_box_endings[ending], ".conf") == 0) { // The first file to be written, and always complete.
         entry->wall_us = (int64_t)status.st_mtim.tv_sec * 1000000 + status.st_mtim.tv_nsec / 1000;
     }
 }
@@ -133,7 +134,7 @@ static void answer_list(int directory, gw_box_answer_t *out) {
     finish(&json, out);
 }
 
-/// Reads up to `size` bytes; fewer at the end of the file only. -1 with errno.
+/// Reads up to `size` bytes; fewer at the end of the file only. Returns -1 and errno on an error.
 static ssize_t read_at(int fd, int64_t offset, uint8_t *out, size_t size) {
     size_t got = 0;
     while (got < size) {
@@ -149,7 +150,7 @@ static ssize_t read_at(int fd, int64_t offset, uint8_t *out, size_t size) {
     return (ssize_t)got;
 }
 
-/// Of its first `size` bytes; false if they cannot be read.
+/// Computes the checksum of the first `size` bytes. Returns false if they cannot be read.
 static bool whole_crc(int fd, int64_t size, uint32_t *out_crc) {
     static uint8_t bytes[GW_BOX_PIECE];
     int64_t at = 0;
@@ -210,11 +211,11 @@ static void write_piece(int fd, const gw_box_question_t *question, int64_t size,
     finish(&json, out);
 }
 
-/// The name has the right form: never a path.
+/// The name has the right form, so it is not a path.
 static int open_file(int directory, const char *name, int64_t *out_size) {
     struct stat status;
     const sock_owners_t owners = sock_owners_of(SOCK_RUNTIME_DIRECTORY);
-    // Not waiting either: somebody might have put a pipe there.
+    // Non-blocking, because the file could be a pipe.
     const int fd = openat(directory, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (fd < 0) {
         return -1;

@@ -14,13 +14,13 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// How often the entries after the stop are fetched.
+/// Interval of reading entries after the stop.
 #define FOLLOW_MS 50
-/// Numbers that somebody else may have taken meanwhile.
+/// Number of attempts if another process takes a number.
 #define TRIES 8U
-/// A wheel that turns faster was in motion: the default of rest_rpm.
+/// A faster wheel was in motion: the default of rest_rpm.
 #define REST_RPM 2
-/// What a ring's entry takes on the disk, a line of candump's, and the most that is held in reserve.
+/// Size of a ring entry on the disk (a line of candump), and the largest reserve.
 #define RESERVE_PER_ENTRY 48U
 #define RESERVE_MAX       ((uint64_t)4U * 1024U * 1024U)
 
@@ -30,25 +30,25 @@ typedef struct {
     const gw_box_config_t *config;
     blackbox_entry_t *copy; ///< Room for as many entries as the ring has.
     const gw_box_order_t *order;
-    const char *bus; ///< As the file of frames names it.
+    const char *bus; ///< Name in the file of frames.
     FILE *frames_file;
     FILE *events_file;
     uint64_t next; ///< Number of the next entry to write.
     uint64_t frames;
-    int error;      ///< The errno of the first write of this attempt that failed.
-    bool in_motion; ///< A wheel turned when the stop came, or was commanded to.
+    int error;      ///< Errno of the first failed write of this attempt.
+    bool in_motion; ///< A wheel turned at the stop, or was commanded to.
     gw_box_result_t result;
-    char line[GW_BOX_LINE_SIZE]; ///< Where each line is made.
+    char line[GW_BOX_LINE_SIZE]; ///< Buffer of a line.
 } writer_t;
 
-/// Keeps the errno of a call that failed: stdio itself only keeps that there was one.
+/// Stores the errno of a failed call, because stdio stores only that there was one.
 static void keep_error(writer_t *self, bool failed) {
     if (failed && self->error == 0) {
         self->error = (errno != 0) ? errno : EIO;
     }
 }
 
-/// Writes what has been made in `line`.
+/// Writes the contents of `line`.
 static void put_line(writer_t *self, FILE *file, size_t length) {
     keep_error(self, fwrite(self->line, 1, length, file) != length);
 }
@@ -65,7 +65,7 @@ static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
     self->frames++;
 }
 
-/// Writes the entries up to number `to`, those before `since_us` left out.
+/// Writes the entries up to number `to`, except those before `since_us`.
 static void write_entries(writer_t *self, uint64_t to, iw_time_us_t since_us) {
     size_t count = 0;
     const uint64_t first = blackbox_ring_copy(self->ring, self->next, to, self->copy, &count);
@@ -80,7 +80,7 @@ static void write_entries(writer_t *self, uint64_t to, iw_time_us_t since_us) {
     self->next = first + count;
 }
 
-/// When the first entry of the recording happened.
+/// Returns the time of the first entry of the recording.
 static iw_time_us_t begin_of(writer_t *self, iw_time_us_t since_us) {
     size_t count = 0;
     (void)blackbox_ring_copy(self->ring, 0, self->order->mark, self->copy, &count);
@@ -92,7 +92,7 @@ static iw_time_us_t begin_of(writer_t *self, iw_time_us_t since_us) {
     return self->order->note.stop.at_us;
 }
 
-/// True if the gateway has something to say, or is gone.
+/// Returns true if the gateway has sent something, or has ended.
 static bool is_called(const writer_t *self, int timeout_ms) {
     struct pollfd entry = {.fd = self->fd, .events = POLLIN};
     return poll(&entry, 1, timeout_ms) != 0;
@@ -103,7 +103,7 @@ static void flush(writer_t *self) {
     keep_error(self, fflush(self->events_file) != 0);
 }
 
-/// What happens after the stop, until it is over or the next order waits.
+/// Writes the entries after the stop, until it is over or the next order waits.
 static void follow(writer_t *self) {
     const iw_time_us_t until_us = self->order->note.stop.at_us + GW_BOX_AFTER_US;
     while (iwl_clock_now_us() < until_us && !is_called(self, FOLLOW_MS)) {
@@ -142,15 +142,16 @@ static void fill_files(writer_t *self) {
     write_entries(self, self->order->mark, since_us);
     flush(self);
     if (self->error != 0) {
-        return; // As early as possible: what follows takes two seconds.
+        return; // As early as possible, because the rest takes two seconds.
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
-    flush(self); // The last line says that the rest is whole: it comes after all of it.
+    flush(self); // The last line confirms the rest, so it is written after all of it.
     put_line(self, self->events_file, gw_box_line_end(self->frames, self->line));
 }
 
-/// One attempt: all files of the recording, or none. 0, or the errno of what failed first.
+/// Makes one attempt to write all files of the recording. Returns 0 or the errno of the first failure; then there are
+/// none.
 static int write_files(writer_t *self, int directory, uint32_t number) {
     char stem[GW_BOX_STEM_SIZE];
     (void)snprintf(stem, sizeof stem, "stop-%06u-%s", (unsigned)number, self->order->cause);
@@ -158,7 +159,7 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     self->error = 0;
     write_config(self, directory, stem);
     if (self->error == EEXIST) {
-        return EEXIST; // Another process has it: the previous gateway may still be writing its last.
+        return EEXIST; // Another process has it: the previous gateway may still write its last recording.
     }
     self->frames_file = (self->error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
     self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
@@ -176,20 +177,20 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     return self->error;
 }
 
-/// Finds room on a full disk for recording `number`. A stop at standstill costs neither the reserve nor the recording of
-/// a stop in motion.
+/// Makes room on a full disk for recording `number`. A stop at standstill costs neither the reserve nor the recording
+/// of a stop in motion.
 static bool make_room(const writer_t *self, int directory, uint32_t number) {
     return (self->in_motion && gw_box_files_release(directory)) ||
            gw_box_files_drop_oldest(directory, number, self->in_motion);
 }
 
-/// As many bytes as a recording of a full ring has, within limits.
+/// Reserves the size of a recording of a full ring, within limits.
 static void reserve(const writer_t *self, int directory) {
     const uint64_t bytes = (uint64_t)blackbox_ring_most(self->ring) * RESERVE_PER_ENTRY;
     gw_box_files_reserve(directory, (bytes < RESERVE_MAX) ? bytes : RESERVE_MAX);
 }
 
-/// A full disk costs older recordings.
+/// Writes a recording. A full disk costs older recordings.
 static int write_recording(writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     if (directory < 0) {
@@ -212,10 +213,10 @@ static int write_recording(writer_t *self) {
     return error;
 }
 
-/// What the bus showed last before the stop.
+/// Last state of the bus before the stop.
 typedef struct {
-    iw_pair_t setpoints;   ///< In the wheels' own sense.
-    int16_t rpm[IW_SIDES]; ///< Measured; 0: no telemetry.
+    iw_pair_t setpoints;   ///< In the wheels' own direction.
+    int16_t rpm[IW_SIDES]; ///< Measured speed; 0 without telemetry.
 } last_seen_t;
 
 static last_seen_t find_last(writer_t *self, uint64_t written) {
@@ -259,7 +260,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
     (void)send(self->fd, &self->result, sizeof self->result, MSG_NOSIGNAL);
 }
 
-/// Said at once, not when the first stop is lost.
+/// Reports it immediately, not when the first stop is lost.
 static void try_directory(writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
@@ -275,14 +276,15 @@ static void try_directory(writer_t *self) {
     }
 }
 
-/// The gateway is gone without a word. A record of it, if the wheels were under its command.
+/// Handles a gateway that has ended without a message: writes a recording if it commanded the wheels.
 static void note_death(writer_t *self) {
     gw_box_order_t order = {.cause = "gateway_died", .from = "armed", .mark = blackbox_ring_written(self->ring)};
     if (!atomic_load(&self->ring->sending)) {
         return;
     }
-    (void)signal(SIGTERM,
-                 SIG_DFL); // A service manager that waits for us before it starts the next gateway must not wait.
+    (void)signal(
+        SIGTERM,
+        SIG_DFL); // A service manager that waits for this process before it starts the next gateway must not wait.
     iw_pair_t *applied = &order.note.stop.applied;
     order.note.wall_us = iwl_clock_wall_us();
     order.note.stop.at_us = iwl_clock_now_us();

@@ -12,16 +12,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// The first byte of a message to the keeper; of one from it, it is the news.
+/// First byte of a message to the store process. In a message from it, the first byte is the news.
 #define SAY_WRITE 'w'
 #define SAY_ASIDE 'a'
 
-/// The keeper's own side.
+/// State of the store process.
 typedef struct {
     const char *directory;
     const char *name;
-    char fresh[GW_FILE_STORE_NAME_SIZE + 8U];   ///< The file while it is being written.
-    char damaged[GW_FILE_STORE_NAME_SIZE + 8U]; ///< Where a file is set aside.
+    char fresh[GW_FILE_STORE_NAME_SIZE + 8U];   ///< Name of the file while it is written.
+    char damaged[GW_FILE_STORE_NAME_SIZE + 8U]; ///< Name of a file that is set aside.
     int fd;
     char message[GW_FILE_STORE_MESSAGE_MAX];
 } work_t;
@@ -76,8 +76,8 @@ static void tell_file(work_t *work) {
     }
 }
 
-/// Beside the file, to the disk, then over it; never into a file that is there already. The directory is locked meanwhile: the keeper of a gateway that died may
-/// still be at it.
+/// Writes a new file, flushes it to the disk, and renames it; never writes into an existing file. The directory is
+/// locked in the meantime, because the store process of a gateway that died may still write.
 static int write_over(const work_t *work, int directory, size_t length) {
     const char *text = &work->message[1];
     (void)unlinkat(directory, work->fresh, 0);
@@ -163,7 +163,7 @@ bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length)
         return false;
     }
     const bool taken = say(self, SAY_WRITE, text, length);
-    self->waits = taken || errno != EAGAIN; // If it is gone, that is the news.
+    self->waits = taken || errno != EAGAIN; // If the process has ended, that is the news.
     return taken;
 }
 

@@ -1,51 +1,52 @@
 // SPDX-License-Identifier: MIT
-/// A process of its own that reads and writes one small file, so that no disk, however slow or full, holds up the
+/// Store process: a separate process that reads and writes one small file, so that no slow or full disk delays the
 /// loop.
 ///
-///     gateway --text--> keeper: written beside the file, flushed to the disk, renamed over it
-///     gateway <--news-- keeper: what was found at the start; what became of each write
+///     gateway --text--> store process: writes it to a new file, flushes it to the disk, renames it
+///     gateway <--news-- store process: contents of the file at the start; result of each write
 ///
-/// Nothing in the gateway waits: a text goes whole or not at all, news are looked for when the loop comes by.
+/// The gateway never waits: it passes a text as a whole or not at all, and polls for news in the loop.
 #ifndef GATEWAY_FILE_STORE_H
 #define GATEWAY_FILE_STORE_H
 
 #include "process/child.h"
 
-/// The longest text that is kept or read.
+/// Longest text that is stored or read.
 #define GW_FILE_STORE_TEXT_MAX 16384U
-/// And the byte before it.
+/// Size of a text and the byte before it.
 #define GW_FILE_STORE_MESSAGE_MAX (1U + GW_FILE_STORE_TEXT_MAX)
 #define GW_FILE_STORE_NAME_SIZE   288U
 
 typedef enum {
     GW_FILE_STORE_NO_NEWS = 0,
-    GW_FILE_STORE_READ,    ///< The file's text. First news only, like the next two; or it is FAILED: no directory.
-    GW_FILE_STORE_ABSENT,  ///< There is no file.
-    GW_FILE_STORE_BAD,     ///< Not to be read, or no ordinary file, or too long.
+    GW_FILE_STORE_READ,    ///< Text of the file. First news only, like the next two; or FAILED: no directory.
+    GW_FILE_STORE_ABSENT,  ///< The file does not exist.
+    GW_FILE_STORE_BAD,     ///< The file cannot be read, is not a regular file, or is too long.
     GW_FILE_STORE_WRITTEN, ///< The last text is on the disk.
-    GW_FILE_STORE_FAILED,  ///< It is not; the file is as it was.
-    GW_FILE_STORE_GONE,    ///< The keeper itself has ended. Last news.
+    GW_FILE_STORE_FAILED,  ///< The last text is not on the disk; the file is unchanged.
+    GW_FILE_STORE_GONE,    ///< The store process has ended. Last news.
 } gw_file_store_news_t;
 
 typedef struct {
     gw_child_t child;
     const char *directory;
     char name[GW_FILE_STORE_NAME_SIZE];
-    bool waits;                              ///< News are owed.
-    char message[GW_FILE_STORE_MESSAGE_MAX]; ///< Said or heard last.
+    bool waits;                              ///< News are expected.
+    char message[GW_FILE_STORE_MESSAGE_MAX]; ///< Last sent or received message.
 } gw_file_store_t;
 
-/// Starts the keeper of DIRECTORY/NAME and lets it read. 0, or an errno. `directory` must outlive it.
+/// Starts the store process of DIRECTORY/NAME, which reads the file. Returns 0 or an errno. `directory` must exist as
+/// long as `self`.
 int gw_file_store_open(gw_file_store_t *self, const char *directory, const char *name);
 
-/// Hands over a text to be kept. False if the keeper cannot take it now: it is busy, or gone.
+/// Passes a text to store. Returns false if the process cannot accept it now: it is busy, or has ended.
 bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length);
 
-/// Asks that the present file be renamed to NAME.damaged before the next text is written.
+/// Requests that the present file be renamed to NAME.damaged before the next text is written.
 void gw_file_store_set_aside(gw_file_store_t *self);
 
-/// The next news, if there are any. `*out_text` and `*out_length` are written with GW_FILE_STORE_READ: it stays until
-/// the next call. `*out_error` is an errno, or a reason of owners.h, with GW_FILE_STORE_BAD and GW_FILE_STORE_FAILED.
+/// Returns the next news, if there are any. With GW_FILE_STORE_READ, `*out_text` and `*out_length` are valid until the
+/// next call. With GW_FILE_STORE_BAD and GW_FILE_STORE_FAILED, `*out_error` is an errno or a reason of owners.h.
 gw_file_store_news_t gw_file_store_receive(gw_file_store_t *self, const char **out_text, size_t *out_length,
                                            int *out_error);
 

@@ -11,7 +11,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-/// Of a process id, with its newline: any number of 32 bits has fewer.
+/// Size of a process id with its newline; no 32-bit number is longer.
 #define DIGITS 15U
 #define KEY    "@iwheel-gateway/"
 
@@ -22,7 +22,7 @@ const char *gw_bus_lock_local_path(const char *bus) {
     return (strncmp(bus, local_prefix, length) == 0) ? bus + length : NULL;
 }
 
-/// A path of any length and spelling as 16 digits.
+/// Reduces a path of any length and spelling to 16 digits.
 static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
     char folder[SOCK_ADDRESS_SIZE];
     static char real[PATH_MAX]; // Too large for a stack.
@@ -39,7 +39,7 @@ static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
     (void)snprintf(out_key, GW_BUS_KEY_SIZE, KEY "unix-%016" PRIx64, hash);
 }
 
-/// Interfaces of one name may be in several network namespaces, which share the directory.
+/// Interfaces of the same name may be in several network namespaces, which share the directory.
 static unsigned long long network_namespace(void) {
     struct stat status;
     return (stat("/proc/self/ns/net", &status) == 0) ? (unsigned long long)status.st_ino : 0U;
@@ -48,7 +48,8 @@ static unsigned long long network_namespace(void) {
 static int open_file(const char *path) {
     const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
     int fd = open(path, flags);
-    if (fd < 0 && errno == ENOENT) { // Asked for at once, a stranger's file in a folder like /tmp would be an error.
+    if (fd < 0 &&
+        errno == ENOENT) { // With O_CREAT in the first call, a foreign file in a folder like /tmp would be an error.
         fd = open(path, flags | O_CREAT | O_EXCL, 0600);
         if (fd < 0 && errno == EEXIST) {
             fd = open(path, flags);
@@ -62,7 +63,7 @@ static void note_stranger(gw_bus_lock_t *self, const struct stat *status) {
     (void)snprintf(self->stranger[0].name, sizeof self->stranger[0].name, "%.*s", (int)GW_BUS_NAME_SIZE, self->path);
 }
 
-/// True if nobody but who may run a gateway can have opened it.
+/// Returns true if only users who may run a gateway can have opened it.
 static bool is_ours(gw_bus_lock_t *self, int fd) {
     struct stat status;
     if (fstat(fd, &status) != 0) {
@@ -75,7 +76,7 @@ static bool is_ours(gw_bus_lock_t *self, int fd) {
     return ours;
 }
 
-/// Who holds it has written its number into it.
+/// Reads the process id that the holder has written into the file.
 static void read_holder(gw_bus_lock_t *self, int fd) {
     char digits[DIGITS + 1] = "";
     (void)!pread(fd, digits, DIGITS, 0);
@@ -83,7 +84,7 @@ static void read_holder(gw_bus_lock_t *self, int fd) {
     (void)snprintf(self->holder.name, sizeof self->holder.name, "%.*s", (int)GW_BUS_NAME_SIZE, self->path);
 }
 
-/// The service must be able to open what root has made.
+/// The service must be able to open a file that root has created.
 static void sign(const gw_bus_lock_t *self, int fd) {
     char digits[DIGITS + 1];
     const int length = snprintf(digits, sizeof digits, "%ld\n", (long)getpid());
@@ -94,7 +95,7 @@ static void sign(const gw_bus_lock_t *self, int fd) {
     (void)!pwrite(fd, digits, (size_t)length, 0);
 }
 
-/// EWOULDBLOCK, or 0: then we have it, or may not have it.
+/// Returns EWOULDBLOCK, or 0 if this gateway has the lock or must not have it.
 static int lock_file(gw_bus_lock_t *self) {
     struct stat status;
     const int fd = open_file(self->path);
@@ -121,7 +122,7 @@ static int lock_file(gw_bus_lock_t *self) {
     return 0;
 }
 
-/// The directory is made if only that is missing: root by hand, on a machine without the service.
+/// Creates the directory if only that is missing: for root, on a machine without the service.
 static void name_interface(gw_bus_lock_t *self, const char *bus, const char *directory) {
     (void)mkdir(directory, 0755);
     (void)snprintf(self->path, sizeof self->path, "%.96s/%.16s-%llu.gateway-lock", directory, bus, network_namespace());
@@ -165,7 +166,7 @@ bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us) {
 void gw_bus_lock_release(gw_bus_lock_t *self) {
     gw_bus_names_release(&self->names);
     if (self->fd >= 0) {
-        (void)close(self->fd); // The file stays: removing it would let two gateways lock two files of one name.
+        (void)close(self->fd); // The file stays: after its removal two gateways could lock two files with one name.
         self->fd = -1;
     }
 }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// One gateway per bus, whoever starts it and wherever its socket lies, and no stranger in its way.
+/// Ensures one gateway per bus, for every user and every socket, and that foreign processes cannot prevent it.
 ///
-/// Two locks, and a gateway holds what it can of both; both go with the process:
+/// There are two locks. A gateway takes both as far as it has the rights, and both end with the process:
 ///
-/// - a file that only root and the service can open (an interface's in the runtime directory, named after the network
-///   namespace too; a local bus's beside its path): no stranger can hold it
-/// - a name that everybody in the network namespace can look up (bus_names.h): for gateways that may not open the file
+/// - a file that only root and the service can open (for an interface in the runtime directory, with the network
+///   namespace in its name; for a local bus beside its path): no foreign process can hold it
+/// - a name that all processes in the network namespace can read (bus_names.h): for gateways that cannot open the file
 ///
-/// Whoever holds one of them and may not run a gateway (owners.h) is noted, and does not keep us from starting. One owner,
-/// one thread.
+/// A process that has one of them and may not run a gateway (owners.h) is reported, but does not prevent the start. One
+/// owner, one thread.
 #ifndef GATEWAY_BUS_LOCK_H
 #define GATEWAY_BUS_LOCK_H
 
@@ -17,28 +17,28 @@
 #include "iwheel/types.h"
 
 #define GW_BUS_LOCK_PATH_SIZE (SOCK_ADDRESS_SIZE + 48U)
-/// Who may have come is looked at this often.
+/// Interval of checks for another gateway.
 #define GW_BUS_LOCK_LOOK_US 1000000U
 
 typedef struct {
     gw_bus_names_t names;
-    gw_holder_t holder;      ///< Who has it instead of us.
-    gw_holder_t stranger[2]; ///< Who has the file, and a name, and may not; empty names: nobody.
+    gw_holder_t holder;      ///< Process that has the lock instead.
+    gw_holder_t stranger[2]; ///< Foreign processes that have the file or a name; empty names if there are none.
     char path[GW_BUS_LOCK_PATH_SIZE];
-    int fd;    ///< Of the file; -1: we may not have it.
-    int error; ///< Why not.
+    int fd;    ///< Descriptor of the file; -1 if it must not be opened.
+    int error; ///< Errno of the reason.
     iw_time_us_t look_us;
 } gw_bus_lock_t;
 
-/// Takes the lock of the bus as it is named in the configuration. 0, or an errno; EWOULDBLOCK: somebody else has it.
+/// Takes the lock of the bus with this configured name. Returns 0 or an errno; EWOULDBLOCK: another process has it.
 int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory);
 
-/// Once per cycle. True if we must give the bus to `self->holder`.
+/// Checks the lock once per cycle. Returns true if this gateway must give the bus to `self->holder`.
 bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us);
 
 void gw_bus_lock_release(gw_bus_lock_t *self);
 
-/// The path of a local bus; NULL if the name is that of an interface.
+/// Returns the path of a local bus; NULL for the name of an interface.
 const char *gw_bus_lock_local_path(const char *bus);
 
 #endif

@@ -19,9 +19,9 @@
 #define ASKERS_MAX 64
 #define NOBODY     ((uid_t)-1)
 #define AGAIN_NS   10000000L
-/// Strangers can make the kernel's list long.
+/// Foreign processes can make the kernel's list long.
 #define LIST_US 50000U
-/// Of an attribute in it.
+/// Size of the head of an attribute.
 #define HEAD ((size_t)4U)
 static_assert(HEAD == sizeof(struct nlattr), "values follow the head at once");
 static_assert(sizeof(struct nlmsghdr) % HEAD == 0 && sizeof(struct unix_diag_msg) % HEAD == 0, "nothing is between");
@@ -36,13 +36,14 @@ static void name_of(const gw_bus_names_t *self, uid_t uid, unsigned place, char 
 
 static socklen_t address_of(const char *name, struct sockaddr_un *out_address) {
     *out_address = (struct sockaddr_un){.sun_family = AF_UNIX};
-    memcpy(out_address->sun_path + 1, name + 1, strlen(name + 1)); // A zero byte stands for the `@`.
+    memcpy(out_address->sun_path + 1, name + 1, strlen(name + 1)); // A zero byte replaces the `@`.
     return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(name));
 }
 
 // What the kernel lists ----------------------------------------------------------------------------------------------
 
-/// The owner of a socket of that name, from one message of the list; NOBODY if it is another's.
+/// Returns the owner of a socket with that name from one message of the list; NOBODY if the message is about another
+/// socket.
 static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
     const char *at = (const char *)message + sizeof(struct nlmsghdr) + sizeof(struct unix_diag_msg);
     const char *end = (const char *)message + message->nlmsg_len;
@@ -66,7 +67,7 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
     return ours ? uid : NOBODY;
 }
 
-/// Reads the list until the name comes, or its end.
+/// Reads the list up to the name, or to its end.
 static uid_t search_list(int fd, const char *name) {
     static _Alignas(struct nlmsghdr) char buffer[16384]; // Too large for a stack.
     const iw_time_us_t until_us = iwl_clock_now_us() + LIST_US;
@@ -88,7 +89,7 @@ static uid_t search_list(int fd, const char *name) {
     return NOBODY;
 }
 
-/// Of a socket that does not listen, or lets nobody in.
+/// Returns the owner of a socket that does not listen, or accepts no connection.
 static uid_t owner_listed(const char *name) {
     const struct {
         struct nlmsghdr head;
@@ -112,7 +113,8 @@ static uid_t owner_listed(const char *name) {
 
 // Asking -------------------------------------------------------------------------------------------------------------
 
-/// Who listens under the name, by the kernel's word; as it was when it began to listen. False: nobody does.
+/// Connects to the name and reads the holder's identity from the kernel, at the time when it began to listen. Returns
+/// false if there is none.
 static bool ask(const char *name, gw_holder_t *out_holder) {
     struct sockaddr_un address;
     struct ucred peer = {.uid = NOBODY};
@@ -123,7 +125,8 @@ static bool ask(const char *name, gw_holder_t *out_holder) {
         return false;
     }
     const bool answers = connect(fd, (const struct sockaddr *)&address, length) == 0;
-    const bool somebody = answers || errno != ECONNREFUSED; // Listens, but lets nobody in; or is no stream.
+    const bool somebody =
+        answers || errno != ECONNREFUSED; // The socket listens but accepts no connection, or is not a stream.
     if (answers && getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
         peer = (struct ucred){.uid = NOBODY};
     }
@@ -151,7 +154,7 @@ static int bind_name(const char *name, int *out_fd) {
     return 0;
 }
 
-/// The first place that is free. Who holds those before it is looked at afterwards.
+/// Takes the first free place. The holders of the places before it are checked later.
 static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
     char name[GW_BUS_NAME_SIZE];
     int error = EADDRINUSE;
@@ -163,13 +166,13 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             return error;
         }
         gw_holder_t holder;
-        if (!ask(name, &holder)) { // Taken without listening.
+        if (!ask(name, &holder)) { // The name is taken by a socket that does not listen.
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }
         const bool stranger = holder.uid == NOBODY || !sock_owners_have(&self->owners, holder.uid);
         if (stranger && (out_stranger->name[0] == '\0' || (out_stranger->pid == 0 && holder.pid > 0))) {
-            *out_stranger = holder; // One is told: the first of whom most is known.
+            *out_stranger = holder; // One is reported: the first one with the most information.
         }
     }
     return 0;
@@ -177,7 +180,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
 
 typedef enum { SEEN_NOBODY = 0, SEEN_UNKNOWN, SEEN_LATER, SEEN_EARLIER } seen_t;
 
-/// One order for all gateways, so that two never wait for each other.
+/// Order of all gateways, so that two never wait for each other.
 static bool comes_first(const gw_bus_names_t *self, uid_t uid, unsigned place) {
     return place < self->place || (place == self->place && uid < self->owners.own);
 }
@@ -200,7 +203,7 @@ static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_
     return comes_first(self, holder.uid, place) ? SEEN_EARLIER : SEEN_LATER;
 }
 
-/// The most that is seen at the places of everybody who may run a gateway.
+/// Checks the places of all users who may run a gateway, and returns the most important result.
 static seen_t look(const gw_bus_names_t *self, gw_holder_t *out_holder) {
     const uid_t users[] = {0, self->owners.service, self->owners.own};
     seen_t seen = look_at(self, self->owners.own, 0U, out_holder);

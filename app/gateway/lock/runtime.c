@@ -21,7 +21,7 @@ static void name_places(gw_runtime_t *self, const char *bus, const char *socket,
     }
 }
 
-/// "process 4711 of user 65534", as far as it is known.
+/// Writes "process 4711 of user 65534", as far as it is known.
 static const char *describe(const gw_holder_t *holder, char out_text[64]) {
     char user[24] = "";
     if (holder->uid != (uid_t)-1) {
@@ -49,7 +49,7 @@ static int explain(const gw_bus_lock_t *lock, const char *bus, int error, FILE *
     return EX_UNAVAILABLE;
 }
 
-/// What keeps nobody from starting, but somebody should see to.
+/// Warns of a problem that does not prevent the start.
 static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
     static const char prefix[] = "iwheel-gateway: warning:";
     const sock_owners_t *owners = &lock->names.owners;
@@ -72,7 +72,7 @@ static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
     }
 }
 
-/// A stranger's file says nothing.
+/// Returns true if there is a marker. A foreign file does not count.
 static bool is_marked(const sock_owners_t *owners, const char *path) {
     struct stat status;
     return path[0] != '\0' && lstat(path, &status) == 0 && sock_owners_have(owners, status.st_uid);
@@ -102,11 +102,11 @@ bool gw_runtime_crashed(const gw_runtime_t *self) {
 
 static bool set_marker(gw_runtime_t *self) {
     if (self->directory != NULL) {
-        (void)mkdir(self->directory, 0755); // Whether it is there now is seen next.
+        (void)mkdir(self->directory, 0755); // The next call shows whether it exists now.
     }
     for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; i++) {
         self->marker_path = self->place[i];
-        (void)unlink(self->place[i]); // A stranger could take his own away again.
+        (void)unlink(self->place[i]); // Its owner could remove a foreign file again.
         const int fd = open(self->place[i], O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
         if (fd >= 0) {
             return close(fd) == 0;
@@ -115,7 +115,7 @@ static bool set_marker(gw_runtime_t *self) {
     return false;
 }
 
-/// Wherever it is: the one before us may have had other rights.
+/// Removes the marker at all places, because the gateway before this one may have had other rights.
 static bool remove_markers(gw_runtime_t *self) {
     for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; i++) {
         if (unlink(self->place[i]) != 0 && errno != ENOENT && errno != ENOTDIR) {
@@ -134,6 +134,6 @@ bool gw_runtime_mark(gw_runtime_t *self, bool sending) {
     if (done) {
         self->marked = sending;
     }
-    self->unsure = !done; // What has failed may have been done in part.
+    self->unsure = !done; // A failed removal may have been done in part.
     return done;
 }

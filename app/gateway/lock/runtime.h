@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// What the gateway leaves behind while it runs: the lock of its bus, and the marker that tells a later start of a
-/// crash.
+/// Files of a running gateway: the lock of its bus, and the marker that reports a crash to the next start.
 ///
-/// The marker is named after the bus, and every gateway on that bus must find it, wherever its socket lies. For an
-/// interface it is in a directory all gateways share or, for those who may not write there, beside their own socket:
-/// it is looked for in both. For `unix:PATH` it is beside PATH. A file that a stranger has put there (owners.h) is none.
+/// The name of the marker contains the bus. Every gateway on that bus must find it, independent of its socket. For an
+/// interface it is in a directory that all gateways share, or beside the socket of a gateway that cannot write there;
+/// the gateway searches both. For `unix:PATH` it is beside PATH. A file of a foreign user (owners.h) does not count.
 #ifndef GATEWAY_RUNTIME_H
 #define GATEWAY_RUNTIME_H
 
@@ -17,26 +16,27 @@
 
 typedef struct {
     gw_bus_lock_t lock;
-    char place[GW_RUNTIME_PLACES][GW_RUNTIME_PATH_SIZE]; ///< Where the marker may be, the best first; empty: no place.
-    const char *directory;                               ///< Of the first place, if it may be made; else NULL.
-    const char *marker_path;                             ///< Where it is, or where the last change failed.
-    bool marked;                                         ///< It is there, as far as we know.
-    bool unsure;                                         ///< The last change failed.
+    char place[GW_RUNTIME_PLACES]
+              [GW_RUNTIME_PATH_SIZE]; ///< Possible places of the marker, the best one first; empty if there is none.
+    const char *directory;            ///< Directory of the first place, if it may be created; otherwise NULL.
+    const char *marker_path;          ///< Path of the marker, or of the last failed change.
+    bool marked;                      ///< The marker exists, as far as known.
+    bool unsure;                      ///< The last change failed.
 } gw_runtime_t;
 
-/// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is SOCK_RUNTIME_DIRECTORY but in tests, and must outlive
-/// `self`. 0, or a sysexits code after the cause and the cure have been printed on `err`; a stranger who holds what locks the
-/// bus is printed there too.
+/// Takes the lock of `bus` and searches for the marker, also beside `socket`. `directory` is SOCK_RUNTIME_DIRECTORY
+/// except in tests, and must exist as long as `self`. Returns 0, or a sysexits code after it has printed cause and fix
+/// to `err`. It also prints a foreign process that has the lock.
 int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err);
 
-/// Releases the lock. The marker stays as it is.
+/// Releases the lock. The marker is unchanged.
 void gw_runtime_close(gw_runtime_t *self);
 
-/// True if the process before us died while it was sending.
+/// Returns true if the process before this one died while it sent setpoints.
 bool gw_runtime_crashed(const gw_runtime_t *self);
 
-/// Sets or removes the marker, once per change. False if that failed; the next call tries again. Does not wait for a disk: its
-/// directory is meant to be in memory.
+/// Sets or removes the marker, once per change. Returns false if that failed; the next call tries again. It does not
+/// wait for a disk, because its directory should be in memory.
 bool gw_runtime_mark(gw_runtime_t *self, bool sending);
 
 #endif

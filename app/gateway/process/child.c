@@ -13,9 +13,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/// Where a child finds its end of the socket.
+/// Descriptor of the child's end of the socket.
 #define ITS_FD (STDERR_FILENO + 1)
-/// A child that dies at once is not started again and again.
+/// Interval before another start, so that a child that dies immediately is not started again and again.
 #define RESTART_US 10000000U
 
 static void become(const gw_child_work_t *work, int fd) {
@@ -27,8 +27,9 @@ static void become(const gw_child_work_t *work, int fd) {
         }
         (void)close(null);
     }
-    (void)close_range(ITS_FD + 1, UINT_MAX, 0); // Else our clients and our lock would seem to live on in it.
-    (void)signal(SIGINT, SIG_IGN);              // It ends when the gateway does.
+    (void)close_range(ITS_FD + 1, UINT_MAX,
+                      0);          // Otherwise the clients and the lock of the gateway would stay open in it.
+    (void)signal(SIGINT, SIG_IGN); // It ends when the gateway does.
     (void)signal(SIGTERM, SIG_IGN);
     (void)signal(SIGHUP, SIG_IGN);
     (void)signal(SIGPIPE, SIG_IGN);

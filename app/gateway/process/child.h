@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-/// A process of ours that does what may wait for a disk, so that the loop never does: recordings are written by one, read by
-/// another, what is learnt is kept by a third. This is how each of them is started, spoken with and lost.
+/// Child process for work that may wait for a disk, so that the loop never does. One child writes recordings, one reads
+/// them, and one stores assumptions. This file starts a child, exchanges messages with it, and handles its end.
 ///
-///     NONE --start--> RUNNING --it ends: heard of--> NONE --asked for again, 10 s after its start--> RUNNING
+///     NONE --start--> RUNNING --end detected--> NONE --needed again, 10 s after its start--> RUNNING
 ///
 ///     gateway <--messages, whole or not at all, through a socket that never blocks--> child
 ///
-/// Three and not one: a recording takes two seconds and megabytes, reading one as long as somebody reads, what is learnt
-/// must be on the disk within a second, and whichever of them is killed takes nothing from the others.
+/// There are three processes because a recording takes two seconds and megabytes, reading takes as long as a client
+/// reads, and assumptions must be on the disk within a second. If one is killed, the others are not affected.
 ///
-/// A child holds nothing of the gateway's but its end of the socket: no stream, no folder, no descriptor. It ignores the
-/// signals that end the gateway, and ends when the gateway is gone, after what it was given last.
+/// A child inherits nothing of the gateway but its end of the socket: no stream, no folder, no descriptor. It ignores
+/// the signals that end the gateway. It ends after the gateway has ended and the last message is processed.
 #ifndef GATEWAY_CHILD_H
 #define GATEWAY_CHILD_H
 
@@ -18,17 +18,17 @@
 
 #include <sys/types.h>
 
-/// What it is and does; the same for all its lives.
+/// Description of a child, the same for each of its processes.
 typedef struct {
-    const char *name;                         ///< As ps tells it, 15 characters at the most.
-    int nice;                                 ///< 0..19: the motors come before it.
-    void (*run)(int fd, const void *context); ///< Until the socket `fd` tells that the gateway is gone.
-    const void *context;                      ///< Must outlive the child.
+    const char *name;                         ///< Name in the output of ps, 15 characters at most.
+    int nice;                                 ///< 0..19: the loop has precedence.
+    void (*run)(int fd, const void *context); ///< Runs until the socket `fd` reports that the gateway has ended.
+    const void *context;                      ///< It must exist as long as the child.
 } gw_child_work_t;
 
 typedef struct {
     gw_child_work_t work;
-    int fd; ///< To it; -1: there is none.
+    int fd; ///< Socket to the child; -1 if there is none.
     pid_t pid;
     iw_time_us_t started_us;
 } gw_child_t;
@@ -36,22 +36,23 @@ typedef struct {
 typedef enum {
     GW_CHILD_SILENT = 0,
     GW_CHILD_SAID,
-    GW_CHILD_ENDED, ///< What was asked before stays without an answer. Told once.
+    GW_CHILD_ENDED, ///< The child has ended; earlier messages have no reply. Reported once.
 } gw_child_news_t;
 
-/// 0, or an errno; there is none then. Call it while nothing is sent.
+/// Starts the child. Returns 0 or an errno; then there is none. Call it while nothing is sent.
 int gw_child_start(gw_child_t *self, const gw_child_work_t *work);
 
-/// Starts it again if it has ended, unless it was started only just now. False: there is none.
+/// Starts the child again if it has ended, unless its last start was recent. Returns false if there is none.
 bool gw_child_revive(gw_child_t *self);
 
-/// False, with errno, if it cannot take the message: it is gone, or too far behind (EAGAIN).
+/// Sends a message. Returns false and sets errno if it cannot: the child has ended, or has too many messages (EAGAIN).
 bool gw_child_say(const gw_child_t *self, const void *message, size_t length);
 
-/// Takes its next message; `*out_length` is written with GW_CHILD_SAID. Never waits. A message longer than `size` is cut off.
+/// Receives the next message. GW_CHILD_SAID: `*out_length` is its length. Never waits. A message longer than `size` is
+/// truncated.
 gw_child_news_t gw_child_receive(gw_child_t *self, void *out_message, size_t size, size_t *out_length);
 
-/// Lets it finish and end by itself. Also for one that has said what nobody understands.
+/// Lets the child finish and end. Also for a child with an invalid message.
 void gw_child_close(gw_child_t *self);
 
 #endif

@@ -15,7 +15,7 @@ static uint64_t number_of(const char *variable) {
 
 void gw_notify_open(gw_notify_t *self) {
     *self = (gw_notify_t){.address = {.sun_family = AF_UNIX}, .every_us = IW_NEVER, .fd = -1};
-    self->fed_us = iwl_clock_now_us(); // The first words are READY=1.
+    self->fed_us = iwl_clock_now_us(); // The first message is READY=1.
     const char *path = getenv("NOTIFY_SOCKET");
     const size_t length = (path == NULL) ? 0U : strlen(path);
     if (length < 2U || length >= sizeof self->address.sun_path || (path[0] != '/' && path[0] != '@')) {
@@ -23,7 +23,7 @@ void gw_notify_open(gw_notify_t *self) {
     }
     memcpy(self->address.sun_path, path, length);
     if (path[0] == '@') {
-        self->address.sun_path[0] = '\0'; // Abstract.
+        self->address.sun_path[0] = '\0'; // Abstract address.
     }
     self->address_length = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
     self->fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);

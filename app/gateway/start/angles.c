@@ -7,20 +7,20 @@
 #define MILLI_TENTHS_PER_RADIAN 572958U
 #define GONE_PERCENT            25U
 #define LATE_MS                 100U
-/// Cut off: seven eighths of the 20 mm/s that one rpm means.
+/// Resolution of telemetry: seven eighths of the 20 mm/s of one rpm.
 #define TELEMETRY_MM_S 18U
 
-/// A speed or a way by setpoints, at the configured radius.
+/// Converts a speed or a distance by setpoints to the configured radius.
 static uint64_t real(const gateway_config_t *config, uint64_t by_setpoints) {
     return by_setpoints * config->core.radius_mm / IW_SETPOINT_RADIUS_MM;
 }
 
-/// One wheel goes so much further than the other: really, not by its setpoints.
+/// Returns the angle for a difference of the distances of both wheels, in real millimetres.
 static unsigned tenths(const gateway_config_t *config, uint64_t apart_mm) {
     return (unsigned)(apart_mm * MILLI_TENTHS_PER_RADIAN / 1000U / config->core.track_mm);
 }
 
-/// The way of a wheel that is sent zero: at the assumed deceleration while it is far from zero, then by its lag.
+/// Returns the distance of a wheel that receives zero: first with the assumed deceleration, then by its lag.
 static uint64_t brake_mm(const gateway_config_t *config, uint64_t speed_mm_s) {
     const uint64_t lag_ms = config->core.wheel_lag_ms;
     const uint64_t soft_mm_s = (uint64_t)GW_ANGLES_BRAKE_MM_S2 * lag_ms / 1000U;

@@ -12,10 +12,10 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-/// How long the bus is listened to: ten periods of the slowest frame that always comes.
+/// Time of receiving from the bus: ten periods of the slowest permanent message.
 #define LISTEN_US 500000U
 
-/// The keys that arm needs and that are not set, joined; empty if all are.
+/// Lists the keys that arm needs and that are not set; empty if all are set.
 static void name_unset(const iw_config_t *core, char *out_names, size_t size) {
     const struct {
         const char *key;
@@ -32,8 +32,8 @@ static void name_unset(const iw_config_t *core, char *out_names, size_t size) {
     }
 }
 
-/// What cannot be read at all has been refused before. Without one of these keys the gateway starts, listens, and refuses
-/// arm.
+/// A configuration that cannot be read was refused before. Without one of these keys the gateway starts and receives,
+/// but refuses arm.
 static void judge_config(const gateway_config_t *config, inspect_findings_t *findings) {
     char unset[64];
     name_unset(&config->core, unset, sizeof unset);
@@ -56,16 +56,18 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
                 (unsigned)budget.killed_mm);
 }
 
-// The directories, as the start would find them. Nothing is made. ---------------------------------------------------------
+// Checks of the directories that the start would use. Nothing is created.
+// -------------------------------------------------
 
-/// Whether the start would make the directory; `*out_error`: why it could not, else 0.
+/// Returns true if the start would create the directory. `*out_error` is the errno of the reason why it could not;
+/// otherwise 0.
 static bool is_to_be_made(const char *path, int *out_error) {
     char bare[GATEWAY_PATH_SIZE];
     char above[GATEWAY_PATH_SIZE];
     struct stat status;
     (void)snprintf(bare, sizeof bare, "%s", path);
     for (size_t length = strlen(bare); length > 1U && bare[length - 1U] == '/'; length--) {
-        bare[length - 1U] = '\0'; // mkdir does not mind it either.
+        bare[length - 1U] = '\0'; // mkdir accepts it too.
     }
     *out_error = (lstat(bare, &status) == 0) ? 0 : errno;
     if (*out_error != ENOENT) {
@@ -80,7 +82,7 @@ static int write_error(int directory) {
     return (faccessat(directory, ".", W_OK | X_OK, AT_EACCESS) == 0) ? 0 : errno;
 }
 
-/// `key`: what names the directory in the configuration.
+/// `key`: configuration key of the directory.
 static void cure_directory(const char *path, const char *key, int error, inspect_findings_t *findings) {
     const unsigned uid = (unsigned)geteuid();
     switch (error) {
@@ -100,7 +102,7 @@ static void cure_directory(const char *path, const char *key, int error, inspect
     }
 }
 
-/// What the start prints, which ends in a cure.
+/// Adds a message that the start prints, which ends with a fix.
 static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_t *findings) {
     static const char *const prefixes[] = {"iwheel-gateway: ", "warning: "};
     char *what = text;
@@ -117,25 +119,25 @@ static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_
     inspect_cure(findings, "%s", (cure != NULL) ? cure + 2 : "choose another with --socket");
 }
 
-/// `text`: what the start would print.
+/// `text`: message that the start would print.
 static int judge_place(const sock_listener_config_t *wanted, char *text, size_t size, int *out_error) {
     static sock_listener_t listener;
-    FILE *const memory = fmemopen(text, size, "w");
-    if (memory == NULL) {
+    FILE *const stream = fmemopen(text, size, "w");
+    if (stream == NULL) {
         return 0;
     }
-    int result = sock_listener_prepare(&listener, wanted, memory);
+    int result = sock_listener_prepare(&listener, wanted, stream);
     if (result == 0) {
         *out_error = write_error(listener.folder.fd);
-        rewind(memory); // A warning about the directory stays if there is nothing worse.
-        result = sock_listener_judge(&listener, memory);
+        rewind(stream); // A warning about the directory remains if there is nothing worse.
+        result = sock_listener_judge(&listener, stream);
     }
-    (void)fclose(memory);
+    (void)fclose(stream);
     sock_folder_close(&listener.folder);
     return result;
 }
 
-/// Without the socket of those who may drive there is no start; without that of those who watch there is.
+/// Without the socket for driving there is no start; without the socket for watchers there is.
 static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_t *findings) {
     const inspect_verdict_t trouble = (wanted->right == SOCK_DRIVE) ? INSPECT_FAIL : INSPECT_WARN;
     char path[GATEWAY_PATH_SIZE];
@@ -158,8 +160,8 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
     }
 }
 
-/// The start does not depend on it: what cannot be stored is only reported. Recordings and the assumption store are
-/// written only where nobody else can put anything.
+/// The start does not depend on it: the gateway only reports what cannot be stored. Recordings and assumptions are
+/// written only where no other user can write.
 static void judge_record(const char *path, inspect_findings_t *findings) {
     int error = 0;
     if (is_to_be_made(path, &error) && error == 0) {
@@ -185,7 +187,7 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
 
 // Who may use what ----------------------------------------------------------------------------------------------------
 
-/// `may`: what the group is allowed by that key of [northbound].
+/// Checks a group. `may`: rights of the group by this key of [northbound].
 static void judge_group(const char *key, const char *group, const char *may, inspect_findings_t *findings) {
     if (strcmp(group, "none") == 0 || getgrnam(group) != NULL) {
         inspect_say(findings, key, INSPECT_OK, "group %s may %s", group, may);
@@ -223,7 +225,7 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
     judge_record(config->record.directory, findings);
 }
 
-/// The bus and the e-stop, as far as they can be opened.
+/// Checks the bus and the e-stop, as far as they can be opened.
 static void judge_machine(const gateway_config_t *config, inspect_findings_t *findings) {
     static iwl_hal_t hal;
     inspect_heard_t heard;

@@ -43,7 +43,7 @@ static int misuse(FILE *err, const char *what) {
     return EX_USAGE;
 }
 
-/// False if it is none of ours.
+/// Returns false for an unknown option.
 static bool take_option(int option, gw_options_t *options) {
     switch (option) {
     case 'c':

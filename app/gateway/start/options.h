@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The command line.
+/// Command line of the gateway.
 #ifndef GATEWAY_OPTIONS_H
 #define GATEWAY_OPTIONS_H
 
@@ -8,7 +8,7 @@
 
 typedef enum { GW_RUN = 0, GW_CHECK, GW_PRINT_CONFIG, GW_VERSION, GW_HELP } gw_action_t;
 
-/// Texts point into the arguments; NULL: not given.
+/// Options. Texts point into the arguments; NULL if not given.
 typedef struct {
     gw_action_t action;
     const char *config_path;
@@ -20,11 +20,11 @@ typedef struct {
     bool listen_only;
 } gw_options_t;
 
-/// 0, or EX_USAGE after cause and cure have been printed on `err`.
+/// Parses the command line. Returns 0, or EX_USAGE after it has printed cause and fix to `err`.
 int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FILE *err);
 
-/// The configuration in force: file (the default one only if it exists), then command line. 0, or a sysexits code
-/// after cause and cure have been printed on `err`.
+/// Reads the configuration: the file (the default file only if it exists), then the command line. Returns 0, or a
+/// sysexits code after it has printed cause and fix to `err`.
 int gw_options_configure(const gw_options_t *options, gateway_config_t *out_config, FILE *err);
 
 #endif

@@ -10,7 +10,7 @@
 
 #define TENTHS(value) (value) / 10U, (value) % 10U
 
-/// What one wheel alone may do to the machine: every figure with what it assumes. All of them rest on the track.
+/// Logs the largest angles by a fault of one wheel, each with its assumption. All of them depend on the track.
 static void report_angles(const gateway_config_t *config, sock_log_t *log) {
     if (config->core.track_mm == 0U) {
         sock_log(log, SOCK_LOG_WARNING,

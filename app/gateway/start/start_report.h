@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What people read about the gateway: what it tells of itself at start, and `--check`.
+/// Reports for people: the log lines at the start, and `--check`.
 #ifndef START_REPORT_H
 #define START_REPORT_H
 
@@ -10,21 +10,22 @@
 struct gateway_config;
 struct sock_log;
 
-/// Version, bus, e-stop, stop budget, what is not configured: to the log. `simulated`: the e-stop is; `watched`: there is a socket to
-/// watch by.
+/// Logs version, bus, e-stop, stop budget and missing configuration. `simulated`: the e-stop is simulated. `watched`:
+/// there is a socket for watchers.
 void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct sock_log *log);
 
-/// What the bus, the e-stop and a socket are to be, by the configuration.
+/// Returns the configured bus, e-stop and socket for the checks of lib/inspect.
 inspect_config_t gw_report_config(const struct gateway_config *config);
 iwl_estop_config_t gw_report_estop(const struct gateway_config *config);
 sock_listener_config_t gw_report_socket(const struct gateway_config *config, sock_right_t right);
 
-/// A bus or e-stop that cannot be opened: cause and cure.
+/// Logs a bus or e-stop that cannot be opened, with cause and fix.
 void gw_report_unopened(const struct gateway_config *config, const char *cause, int error, FILE *err);
 
-/// Lines "ok", "warn", "fail" or "skip" on `out`, each with what mends it; listens to the bus for half a second, sends and makes
-/// nothing. 1 if something failed; else EX_UNAVAILABLE if something could not be looked at on this machine; else 0, also if
-/// the gateway would start and only refuse arm: setpoint type or current role are not known yet.
+/// Prints lines "ok", "warn", "fail" or "skip" to `out`, each with its fix. It receives from the bus for half a second,
+/// and neither sends nor creates anything. Returns 1 if something failed, EX_UNAVAILABLE if something could not be
+/// checked on this machine, otherwise 0, also if the gateway would start and only refuse arm because setpoint type or
+/// current role are not configured.
 int gw_report_check(const struct gateway_config *config, FILE *out);
 
 #endif

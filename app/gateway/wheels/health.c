@@ -5,7 +5,7 @@
 
 #include <stdio.h>
 
-/// What a wheel reported last of its battery or temperature. False: that is not known.
+/// Reads the last battery voltage or temperature of a wheel. Returns false if it is not known.
 static bool find_value(const iw_snapshot_t *seen, iw_side_t side, gw_ailment_t ailment, unsigned *out_value) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
     const iw_codec_status_t *status = &wheel->told->status;

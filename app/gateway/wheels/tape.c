@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// How far back frames are looked for among requests and steps.
+/// Number of entries to search for frames among requests and steps.
 #define LOOK_BACK ((uint64_t)8U * GW_AROUND)
 #define UNTOLD    0xFFU
 #define AGAIN_US  1000000U
@@ -15,7 +15,7 @@ void gw_tape_init(gw_tape_t *self, blackbox_ring_t *ring) {
     memset(self, 0, sizeof *self);
     self->ring = ring;
     self->facts = UNTOLD;
-    self->after_count = GW_AROUND; // Nothing is waited for.
+    self->after_count = GW_AROUND; // No frames are awaited.
 }
 
 void gw_tape_put(gw_tape_t *self, const blackbox_entry_t *entry) {
@@ -43,7 +43,7 @@ static void put_value(gw_tape_t *self, blackbox_kind_t kind, uint32_t number, in
     gw_tape_put(self, &entry);
 }
 
-/// Of the frames that the port refused the first is noted: the core passes one behind it in a call of its own, or not.
+/// Records the first frame that the port refused. The core passes the frame after it in a separate call, or not at all.
 static int tape_send(void *context, const iw_can_frame_t *frames, uint32_t count) {
     gw_tape_t *self = (gw_tape_t *)context;
     const int answer = self->port.send(self->port.context, frames, count);
@@ -72,7 +72,7 @@ static iw_bus_state_t tape_bus_state(void *context) {
         gw_tape_put(self, &entry);
     }
     self->bus = state;
-    self->answered = true; // The core asks for the e-stop first.
+    self->answered = true; // The core reads the e-stop first.
     return state;
 }
 

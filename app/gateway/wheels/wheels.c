@@ -14,7 +14,7 @@ void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent) {
     self->pairs = sent->pairs;
     const uint32_t gap_us = sent->gap_us;
     if (gap_us == 0U) {
-        return; // The first pair after silence.
+        return; // The first pair after a pause.
     }
     uint32_t bucket = 0;
     while (bucket < GW_GAP_BUCKETS - 1U && gap_us > gw_gap_limits_ms[bucket] * IW_US_PER_MS) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// The wheels' side of the daemon: the core, the port below it, the tape between them, and what is noted of all three.
+/// The wheels in the daemon: the core, the port, the tape between them, and their records.
 ///
-/// Whoever only looks takes it const. Whoever acts upon the core does it at `now_us`, notes it on the tape, and sets `requested`
-/// if the loop shall step once more in this cycle.
+/// Readers use a const pointer. A function that acts on the core uses the time `now_us`, records the action on the
+/// tape, and sets `requested` if the loop must step once more in this cycle.
 #ifndef GATEWAY_WHEELS_H
 #define GATEWAY_WHEELS_H
 
@@ -18,30 +18,31 @@
 
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
-/// The warning about an e-stop line, by its name, whose button nobody has seen to work.
+/// Warning about an e-stop line, by its name, whose button was never tested.
 #define GW_ESTOP_UNTRIED                                                                                               \
     "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would go unseen; press " \
     "it for a second, then release it"
 
-/// How regularly setpoint pairs leave: a histogram of the gaps between them, and the worst, since the gateway's start.
+/// Regularity of setpoint pairs: a histogram of the gaps between them, and the largest gap, since the gateway's start.
 ///
-/// The wheels stop by themselves after 1000 ms without a setpoint, and 100 ms are the most that safety allows. Gaps are
-/// counted while pairs are being sent; silence is none.
+/// The wheels stop on their own after 1000 ms without a setpoint, and the safety rules allow 100 ms. Gaps count while
+/// pairs are sent; a pause does not count.
 #define GW_GAP_BUCKETS 10U
 
 typedef struct {
-    uint32_t count[GW_GAP_BUCKETS]; ///< Gaps up to `gw_gap_limits_ms` of the bucket; the last bucket has no limit.
+    uint32_t
+        count[GW_GAP_BUCKETS]; ///< Number of gaps up to `gw_gap_limits_ms` of the bucket. The last bucket has no limit.
     uint32_t worst_us;
-    uint32_t pairs; ///< When last looked at.
+    uint32_t pairs; ///< Number of pairs at the last check.
 } gw_gaps_t;
 
-/// Upper bounds, inclusive, of all buckets but the last.
+/// Upper limits, inclusive, of all buckets but the last.
 extern const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U];
 
-/// Looks at what was sent after a step, which sends one pair at the most.
+/// Counts the gap after a step, which sends one pair at most.
 void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent);
 
-/// Writes the object's fields.
+/// Writes the fields of the object.
 void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json);
 
 typedef struct gw_wheels {
@@ -50,68 +51,69 @@ typedef struct gw_wheels {
     gw_tape_t tape;
     iw_observation_t observation;
     gw_gaps_t gaps;
-    inspect_config_t bus; ///< As configured.
-    const char *estop;    ///< The line, as configured.
-    const char *estop2;   ///< That of its second contact.
-    iw_time_us_t now_us;  ///< Of the present cycle; never goes back.
-    iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
+    inspect_config_t bus; ///< Configured bus.
+    const char *estop;    ///< Configured e-stop line.
+    const char *estop2;   ///< Configured line of its second contact.
+    iw_time_us_t now_us;  ///< Time of the present cycle. It never decreases.
+    iw_time_us_t step_us; ///< Time of the next step, from the last one.
     bool requested;       ///< A request has changed something since the last step.
-    bool time_used;       ///< A request was carried out at `now_us` already.
+    bool time_used;       ///< A request was executed at `now_us`.
     bool shutting_down;
-    bool estop_untried;     ///< Its button was never seen to work on this wiring; not before what was kept is read.
-    gw_health_t health;     ///< Its limits are set already.
-    int64_t estop_tried_us; ///< When it was last, by the wall clock; 0: never.
-    uint32_t warnings;      ///< What is wrong enough to be said at start, in `status` and with every arm.
+    bool estop_untried; ///< The button was never tested on this wiring. False until the stored assumptions are read.
+    gw_health_t health; ///< The owner sets its limits.
+    int64_t estop_tried_us; ///< Wall clock time of the last test; 0 if there was none.
+    uint32_t warnings;      ///< Warnings that are reported at the start, in `status` and with every arm.
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
 } gw_wheels_t;
 
-/// Lets the core begin on an open `hal`, with `ring` for the tape (NULL: nothing is noted). `restarted`: the gateway before this one
-/// died while it was sending.
+/// Starts the core on the open `hal`, with `ring` for the tape (NULL: no recording). `restarted`: the gateway before
+/// this one died while it sent setpoints.
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted);
 
-/// What is known of the wheels now: after a step or a request, look again.
+/// Returns a snapshot. Take a new one after a step or a request.
 iw_snapshot_t gw_wheels_look(const gw_wheels_t *self);
 
-/// A clock has just been read.
+/// Sets the time after a clock was read.
 void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us);
 
-/// Before each request: the first one after a reading of the clock is carried out at that time, each other at a time of its own.
+/// Prepares the time of a request: the first one after a reading of the clock is executed at that time, each other one
+/// at its own time.
 void gw_wheels_time_request(gw_wheels_t *self);
 
-/// The line of the e-stop's contact that says most: one that cannot be read, else one that is pressed, else the first.
+/// Returns the line of the contact with the most severe state: unreadable, then pressed, then the first.
 const char *gw_wheels_estop(const gw_wheels_t *self);
 
-/// True while setpoints are sent, or about to be.
+/// Returns true while setpoints are sent, or are about to be.
 bool gw_wheels_are_sent_to(const gw_wheels_t *self);
 
-/// The core's cycle at `now_us`, and a look at what has come of it.
+/// Runs a cycle of the core at `now_us`, and returns a snapshot.
 iw_snapshot_t gw_wheels_step(gw_wheels_t *self);
 
-/// The machine was suspended for so long since the last step.
+/// Reports that the machine was suspended for this time since the last step.
 void gw_wheels_slept(gw_wheels_t *self, iw_time_us_t for_us);
 
-/// The wheels are to stop; `client` may be IW_CLIENT_NONE.
+/// Stops the wheels. `client` may be IW_CLIENT_NONE.
 void gw_wheels_stop(gw_wheels_t *self, iw_client_t client, iw_cause_t cause);
 
-/// The client is no longer there for the core: its lease ends now.
+/// Ends the lease of a client that is gone.
 void gw_wheels_leave(gw_wheels_t *self, iw_client_t client);
 
-/// The core is told of an assumption: it may refuse to arm for it.
+/// Sets an assumption in the core, which may then refuse to arm.
 void gw_wheels_set_assumption(gw_wheels_t *self, iw_assumption_item_t item, const iw_assumption_entry_t *entry);
 
-/// Notes what has gone into the core at `now_us`. `number` is that of the client, if one has asked for it.
+/// Records an input of the core at `now_us`. `number` is the client of the request, if there is one.
 void gw_wheels_note(gw_wheels_t *self, uint32_t number, const blackbox_entry_t *entry);
 
-/// Notes a stop that has just been seen, and keeps the frames around it.
+/// Records a stop, and retains the frames around it.
 void gw_wheels_note_stop(gw_wheels_t *self, const iw_stop_t *stop);
 
-/// Notes the state and what it was before.
+/// Records the state and the state before.
 void gw_wheels_note_state(gw_wheels_t *self, const iw_snapshot_t *seen, iw_state_t before);
 
-/// Once a second: notes the port's answers, the state and what keeps from arming again.
+/// Records the results of the port, the state and the reasons against arm, once a second.
 void gw_wheels_note_again(gw_wheels_t *self);
 
-/// The frames around the last stop, for `why`, into an object that is open.
+/// Writes the frames around the last stop, for `why`, into an open object.
 void gw_wheels_write_around(const gw_wheels_t *self, iwn_out_t *json);
 
 #endif

@@ -136,10 +136,10 @@ typedef struct {
     uint64_t kind[KINDS_MAX];
     unsigned kinds;
     size_t bytes; ///< Of what is kept.
-} kept_t;
+} survivors_t;
 
 /// Whether a line stays, seen from the newest to the oldest.
-static bool keep(iwc_t *self, kept_t *kept, iwc_span_t line) {
+static bool keep(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
     if (line.at[0] == STRUCK) {
         return false;
     }
@@ -148,27 +148,27 @@ static bool keep(iwc_t *self, kept_t *kept, iwc_span_t line) {
         self->skipped += lost_count(line);
         return false;
     }
-    bool stays = kept->kinds < KINDS_MAX && kept->bytes + line.length + 1U <= IWC_IN_SIZE / 2U;
-    for (unsigned i = 0; i < kept->kinds && stays; i++) {
-        stays = kept->kind[i] != kind;
+    bool stays = survivors->kinds < KINDS_MAX && survivors->bytes + line.length + 1U <= IWC_IN_SIZE / 2U;
+    for (unsigned i = 0; i < survivors->kinds && stays; i++) {
+        stays = survivors->kind[i] != kind;
     }
     if (!stays) {
         self->skipped++;
         return false;
     }
-    kept->kind[kept->kinds] = kind;
-    kept->kinds++;
-    kept->bytes += line.length + 1U;
+    survivors->kind[survivors->kinds] = kind;
+    survivors->kinds++;
+    survivors->bytes += line.length + 1U;
     return true;
 }
 
 void iwc_queue_thin(iwc_t *self) {
-    kept_t kept = {.kinds = 0};
+    survivors_t survivors = {.kinds = 0};
     size_t to = self->whole;
     for (size_t end = self->whole; end > self->begin;) {
         const char *before = memrchr(self->in + self->begin, '\n', end - 1U - self->begin);
         const size_t from = (before != NULL) ? (size_t)(before - self->in) + 1U : self->begin;
-        if (keep(self, &kept, (iwc_span_t){self->in + from, end - 1U - from})) {
+        if (keep(self, &survivors, (iwc_span_t){self->in + from, end - 1U - from})) {
             to -= end - from;
             memmove(self->in + to, self->in + from, end - from);
         }

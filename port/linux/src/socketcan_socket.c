@@ -96,21 +96,21 @@ static void note_drops(iwl_socketcan_socket_t *self, struct msghdr *message) {
 /// Removes entries that are not frames, and converts the hub's marks to flags. ENOTCONN: the hub is gone. Frames before
 /// the end are valid; the next call finds the end again.
 static int sieve(iwl_socketcan_socket_t *self) {
-    uint32_t kept = 0;
+    uint32_t good = 0;
     for (uint32_t i = 0; i < self->count; i++) {
         const struct can_frame *raw = &self->frame[i];
         const uint8_t mark = raw->__res0;
         if (self->message[i].msg_len == 0U) {
-            self->count = kept;
+            self->count = good;
             self->drained = false;
             return (i == 0U) ? ENOTCONN : 0;
         }
         if (self->message[i].msg_len == sizeof *raw && (self->flags[i] & MSG_TRUNC) == 0) {
-            self->flags[kept] = (mark == MARK_ECHO) ? MSG_CONFIRM : (mark == MARK_FORGED) ? MSG_DONTROUTE : 0;
-            self->frame[kept++] = *raw;
+            self->flags[good] = (mark == MARK_ECHO) ? MSG_CONFIRM : (mark == MARK_FORGED) ? MSG_DONTROUTE : 0;
+            self->frame[good++] = *raw;
         }
     }
-    self->count = kept;
+    self->count = good;
     return 0;
 }
 

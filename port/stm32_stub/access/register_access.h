@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/// Reading and writing one register of the bus controller.
+/// Read and write access to one register of the bus controller.
 ///
-/// The driver includes this file by name only. A test puts another one before it in the include path, whose two
-/// functions ask a model of the controller; the driver's text stays the same.
+/// The driver includes this file by its name only. A test puts another file of that name first in the include path. The
+/// two functions of that file call a model of the controller; the source of the driver stays the same.
 #ifndef BRD_REGISTER_ACCESS_H
 #define BRD_REGISTER_ACCESS_H
 

@@ -122,15 +122,7 @@ class WheelSaturated(TypedDict):
     force: bool
 
 
-ForceValidity = Literal[
-    "valid",
-    "not_heard",
-    "saturated",
-    "no_offset",
-    "unit_contradicted",
-    "offset_removed",
-    "offset_doubted",
-]
+ForceValidity = Literal["valid", "not_heard", "saturated", "no_offset", "unit_contradicted", "offset_removed", "offset_doubted"]
 
 Provenance = Literal["none", "stored", "estimated", "wheel", "operator"]
 

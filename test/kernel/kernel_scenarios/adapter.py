@@ -112,17 +112,17 @@ def long_stall(t, setup):
     judge_after_residue(t, rig, client, back_us)
 
 
-@kernel_test("an adapter that stalls for 2 s: what comes out is bounded and ends in zeros", "adapter", 17, SlcanRig)
+@kernel_test("an adapter that stalls for 2 s: a bounded number of old frames, then zeros", "adapter", 17, SlcanRig)
 def row17_stall(t):
     long_stall(t, None)
 
 
-@kernel_test("an adapter that stalls for 2 s, gateway without rights over the link", "adapter", 17, SlcanRig)
+@kernel_test("an adapter that stalls for 2 s, the gateway may not restart the link", "adapter", 17, SlcanRig)
 def row17_stall_no_rights(t):
     long_stall(t, netdev.without_net_admin)
 
 
-@kernel_test("an adapter that stalls for 40 ms: nothing old piles up", "adapter", 17, SlcanRig)
+@kernel_test("an adapter that stalls for 40 ms: old setpoints do not accumulate", "adapter", 17, SlcanRig)
 def row17_stall_short(t):
     rig, client, back_us = stalled(t, 0.04)
     time.sleep(0.3)
@@ -158,7 +158,7 @@ def power_cut(t, seconds, setup):
     return rig, client, back_us, late, moving
 
 
-@kernel_test("wheel power cut for 10 s at full command, echo unproven: bounded, ends in zeros", "adapter", 18, SlcanRig)
+@kernel_test("wheel power off for 10 s at full command, echo unproven: a bounded number of old frames, then zeros", "adapter", 18, SlcanRig)
 def row18_power_cut_adapter(t):
     rig, client, back_us, late, moving = power_cut(t, 10, None)
     t.check(not late or all(speed == 0 for _, _, speed in late[-2:]), f"ends in zeros: {late[-3:]}")

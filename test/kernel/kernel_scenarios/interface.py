@@ -41,7 +41,7 @@ def stale_after(t, rig, back_us, until_us=None):
     moving = [(at - back_us, value) for at, value in late if value]
     t.measure("stale_frames", len(moving))
     t.rule(not moving, f"old frames after the bus came back: {moving[:6]}")
-    t.figure(f"{len(late)} zero frames after it came back")
+    t.figure(f"{len(late)} zero frames after the fault ended")
 
 
 def fault(rig, action, within_ms, dead=True):
@@ -171,7 +171,7 @@ def row15_down_while_listening(t):
     t.judge(rig)
 
 
-@kernel_test("ENOBUFS for 300 ms in motion: stop, nothing old afterwards", "bus realtime", 17)
+@kernel_test("ENOBUFS for 300 ms in motion: stop, no old frame afterwards", "bus realtime", 17)
 def row17_no_buffers(t):
     rig, client, stream = driving(t)
     fault(rig, lambda: netdev.discipline(rig.interface, "pfifo", "limit", "0"), 120)
@@ -190,7 +190,7 @@ def row17_no_buffers(t):
     t.judge(rig)
 
 
-@kernel_test("ENOBUFS for 30 ms in motion: no old frame, and it drives on or stops from zero", "bus", 17)
+@kernel_test("ENOBUFS for 30 ms in motion: no old frame; the gateway continues, or stops from zero", "bus", 17)
 def row17_no_buffers_short(t):
     rig, client, stream = driving(t, {"limits": {"wheel_silent_ms": 200}})
     begin_us = now_us()
@@ -216,7 +216,7 @@ def needs_echo(rig):
         raise Skip("needs a boot with vcan.echo=1")
 
 
-@kernel_test("nominal drive; the echo is reported as proven", "echo", 17)
+@kernel_test("nominal drive: the gateway reports the echo as proven", "echo", 17)
 def row17_echo_proven(t):
     rig, client = t.running()
     needs_echo(rig)
@@ -228,7 +228,7 @@ def row17_echo_proven(t):
     t.judge(rig)
 
 
-@kernel_test("without IFF_ECHO: reported as unproven", "bus", 17)
+@kernel_test("without IFF_ECHO: the gateway reports the echo as unproven", "bus", 17)
 def row17_echo_unproven(t):
     rig, client = t.running()
     t.check(client.request("status")["bus"]["echo"] == "unproven", "status: echo unproven")
@@ -240,7 +240,7 @@ def row17_echo_unproven(t):
 LATE = {"limits": {"wheel_silent_ms": 200}}  # netem delays the wheels' frames on the same interface too
 
 
-@kernel_test("echo 30 ms late: within the limit, it drives on", "echo", 17)
+@kernel_test("echo 30 ms late: within the limit, the gateway continues", "echo", 17)
 def row17_echo_late_enough(t):
     rig, client = t.running(LATE)
     needs_echo(rig)
@@ -383,12 +383,12 @@ def lost_echo(t, cure):
     t.judge(rig)
 
 
-@kernel_test("a lost echo, link may not be restarted: told; cured by taking the link down and up", "echo", 17)
+@kernel_test("a lost echo, the gateway may not restart the link: it reports this; setting the link down and up fixes it", "echo", 17)
 def row17_echo_lost_no_rights(t):
     lost_echo(t, lambda rig: restart_as_doctor_says(t, rig))
 
 
-@kernel_test("a lost echo, link may not be restarted: the unit that may is asked, and cures it", "echo", 17)
+@kernel_test("a lost echo, the gateway may not restart the link: it asks the unit that may, and the unit fixes it", "echo", 17)
 def row17_echo_lost_unit_restarts(t):
     lost_echo(t, lambda rig: restart_as_the_unit_does(t, rig.interface))
 
@@ -426,7 +426,7 @@ def power_cut(t, setup):
     return rig, client, late, moving
 
 
-@kernel_test("wheel power cut for 10 s at full command, link may be restarted: no old frame", "echo", 18)
+@kernel_test("wheel power off for 10 s at full command, the gateway may restart the link: no old frame", "echo", 18)
 def row18_power_cut_purged(t):
     rig, client, late, moving = power_cut(t, None)
     t.rule(not moving, f"no old frame after a purge: {late[:6]}")
@@ -434,7 +434,7 @@ def row18_power_cut_purged(t):
     t.judge(rig)
 
 
-@kernel_test("wheel power cut for 10 s at full command, link may not be restarted: one old frame, its zero behind it", "echo", 18)
+@kernel_test("wheel power off for 10 s at full command, the gateway may not restart the link: one old frame, followed by its zero", "echo", 18)
 def row18_power_cut_no_rights(t):
     rig, client, late, _moving = power_cut(t, netdev.without_net_admin)
     for side in (LEFT, RIGHT):

@@ -242,7 +242,7 @@ class Soak:
             self.t.check(now[1] <= self.baseline[1], f"{self.where()}: descriptors {self.baseline[1]} to {now[1]}")
 
 
-@kernel_test("hours of one gateway under random faults", "soak", 0)
+@kernel_test("hours of one gateway with random faults", "soak", 0)
 def soak(t):
     rig, first = t.running()
     first.close()

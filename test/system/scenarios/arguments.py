@@ -14,15 +14,7 @@ def call(rig, program, *arguments, seconds=5, **options):
     """(exit code, what it printed); None as code if it did not end."""
     command = [rig.program(program), *arguments]
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=seconds,
-            check=False,
-            **options,
-        )
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=seconds, check=False, **options)
     except subprocess.TimeoutExpired as late:
         return None, (late.stdout or b"").decode(errors="replace")
     return done.returncode, done.stdout.decode(errors="replace")
@@ -37,10 +29,7 @@ def arguments(t):
         t.check(code == 0 and program in text and len(text.splitlines()) >= 8, f"{program} --help: {code}, {text[:100]!r}")
         t.check(max(map(len, text.splitlines())) <= 120, f"{program} --help has lines over 120 columns")
         code, text = call(rig, program, "--version")
-        t.check(
-            code == 0 and program in text and any(c.isdigit() for c in text) and text.count("\n") == 1,
-            f"{program} --version: {code}, {text!r}",
-        )
+        t.check(code == 0 and program in text and any(c.isdigit() for c in text) and text.count("\n") == 1, f"{program} --version: {code}, {text!r}")
         for bad in (("--nonsense",), ("-Z",)):
             code, text = call(rig, program, *bad)
             t.check(code == USAGE and bad[0].lstrip("-") in text, f"{program} {bad}: {code}, {text[:160]!r}")
@@ -73,18 +62,7 @@ def arguments(t):
         code, text = call(rig, program, *words)
         t.check(code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}")
         t.check(len(text) > 15, f"{program} {words} says nothing")
-    code, text = call(
-        rig,
-        "iwheel-gateway",
-        "-c",
-        rig.path("gateway.conf"),
-        "--can",
-        "can0",
-        "--socket",
-        rig.path("x.sock"),
-        "--estop",
-        "none",
-    )
+    code, text = call(rig, "iwheel-gateway", "-c", rig.path("gateway.conf"), "--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none")
     t.check("unix:" in text, f"SocketCAN is refused with the way out: {text[:200]!r}")
     made = os.path.isdir(DEFAULT_DIRECTORY) and not recorded
     if made:
@@ -226,10 +204,7 @@ def row29_bad_configuration(t):
         code, printed = call(rig, "iwheel-gateway", "-c", path, *common, seconds=2)
         name = repr(text[:50])
         t.check(code == CONFIGURATION, f"{name}: exit code {code}: {printed[-200:]}")
-        t.check(
-            path in printed and (line is None or f"{path}:{line}:" in printed),
-            f"{name}: file and line {line}: {printed[:200]!r}",
-        )
+        t.check(path in printed and (line is None or f"{path}:{line}:" in printed), f"{name}: file and line {line}: {printed[:200]!r}")
         t.check(all(word in printed for word in words), f"{name}: {words} in {printed[:300]!r}")
     code, printed = call(rig, "iwheel-gateway", "-c", rig.path("missing.conf"), *common)
     t.check(code == CONFIGURATION and "missing.conf" in printed, f"missing file: {code}, {printed[:200]!r}")
@@ -260,25 +235,10 @@ def print_config_and_check(t):
     with open(rig.path("again.conf"), "w", encoding="utf-8") as file:
         file.write(text)
     code, again = call(rig, "iwheel-gateway", "-c", rig.path("again.conf"), "--print-config")
-    t.check(
-        code == 0 and again.replace("again.conf", "gateway.conf") == text,
-        f"printed, read and printed again is the same: {code}",
-    )
-    common = (
-        "-c",
-        rig.path("gateway.conf"),
-        "--can",
-        f"unix:{rig.path('bus')}",
-        "--socket",
-        rig.path("gateway.sock"),
-        "--estop",
-        f"unix:{rig.path('button')}",
-    )
+    t.check(code == 0 and again.replace("again.conf", "gateway.conf") == text, f"printed, read and printed again is the same: {code}")
+    common = ("-c", rig.path("gateway.conf"), "--can", f"unix:{rig.path('bus')}", "--socket", rig.path("gateway.sock"), "--estop", f"unix:{rig.path('button')}")
     code, text = call(rig, "iwheel-gateway", *common, "--check")
-    t.check(
-        code == 0 and "ok" in text and "fail" not in text.lower().replace("0 fail", ""),
-        f"--check with all there: {code}, {text[:400]!r}",
-    )
+    t.check(code == 0 and "ok" in text and "fail" not in text.lower().replace("0 fail", ""), f"--check with all there: {code}, {text[:400]!r}")
     rig.sim.ask("estop press")
     code, text = call(rig, "iwheel-gateway", *common, "--check")
     t.check("press" in text.lower(), f"--check tells that the button is pressed: {text[:400]!r}")

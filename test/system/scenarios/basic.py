@@ -16,16 +16,10 @@ def nominal_drive_and_turn(t):
     status = client.request("status")
     for side in ("left", "right"):
         measured = status[side]["speed_mm_s"]
-        t.check(
-            measured is not None and abs(measured - 400) <= 40,
-            f"{side} wheel runs {measured} mm/s at 400 mm/s commanded",
-        )
+        t.check(measured is not None and abs(measured - 400) <= 40, f"{side} wheel runs {measured} mm/s at 400 mm/s commanded")
         t.check(status[side]["applied_mm_s"] == 400, f"{side} applied {status[side]['applied_mm_s']} mm/s")
     t.figure(f"measured {status['left']['speed_mm_s']}/{status['right']['speed_mm_s']} mm/s")
-    t.check(
-        status["lease"]["name"] == "test" and 0 < status["lease"]["remaining_ms"] <= 200,
-        f"lease in status: {status['lease']}",
-    )
+    t.check(status["lease"]["name"] == "test" and 0 < status["lease"]["remaining_ms"] <= 200, f"lease in status: {status['lease']}")
     t.drive_for(client, -200, 200, 1.2)
     status = client.request("status")
     t.check(status["left"]["speed_mm_s"] < -150 and status["right"]["speed_mm_s"] > 150, "the machine turns on the spot")
@@ -59,22 +53,13 @@ def limits_and_twist(t):
     rig, client = t.running({"wheels": {"track_mm": 540}})
     t.arm(client)
     reply = client.drive(2000, 1000)
-    t.check(
-        reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (1000, 500, True),
-        f"both scaled by one factor: {reply}",
-    )
+    t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (1000, 500, True), f"both scaled by one factor: {reply}")
     reply = client.drive(100, -100, left_mA=500, right_mA=600)
-    t.check(
-        reply["ok"] and (reply["left_mA"], reply["right_mA"], reply["limited"]) == (600, 600, True),
-        f"both wheels get the larger limit: {reply}",
-    )
+    t.check(reply["ok"] and (reply["left_mA"], reply["right_mA"], reply["limited"]) == (600, 600, True), f"both wheels get the larger limit: {reply}")
     reply = client.request("twist", v_mm_s=300, yaw_mrad_s=500)
     t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"]) == (165, 435), f"twist to wheels: {reply}")
     reply = client.request("twist", v_mm_s=300, yaw_mrad_s=2000)
-    t.check(
-        reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (-120, 420, True),
-        f"turned by 1 rad/s, in the same curve: {reply}",
-    )
+    t.check(reply["ok"] and (reply["left_mm_s"], reply["right_mm_s"], reply["limited"]) == (-120, 420, True), f"turned by 1 rad/s, in the same curve: {reply}")
     t.drive_for(client, 165, 435, 0.8)
     client.request("stop")
     time.sleep(0.6)
@@ -100,8 +85,7 @@ def other_configuration(t):
     t.check(refusal is None, f"drive with currents: {refusal}")
     left = [frame for frame in rig.bus.frames if frame.id == 266 and frame.data[1:3] == (-300).to_bytes(2, "big", signed=True)]
     t.check(
-        left and all(frame.data[3:5] == (-1000).to_bytes(2, "big", signed=True) for frame in left[2:]),
-        "speed and current are negated for the mirrored wheel",
+        left and all(frame.data[3:5] == (-1000).to_bytes(2, "big", signed=True) for frame in left[2:]), "speed and current are negated for the mirrored wheel"
     )
     client.request("stop")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence at the end")
@@ -112,14 +96,9 @@ def other_configuration(t):
 def force_offset_and_tare(t):
     rig, client = t.running()
     status = rig.wait_status(
-        client,
-        lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_validity"] == "valid" for side in ("left", "right")),
-        6,
+        client, lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_validity"] == "valid" for side in ("left", "right")), 6
     )
-    if not t.check(
-        status,
-        f"both offsets come from the wheels: {[client.request('status')[s]['offset_provenance'] for s in ('left', 'right')]}",
-    ):
+    if not t.check(status, f"both offsets come from the wheels: {[client.request('status')[s]['offset_provenance'] for s in ('left', 'right')]}"):
         return
     for side in ("left", "right"):
         t.check(abs(status[side]["force_net_mN"]) < 3000, f"{side} without load: {status[side]['force_net_mN']} mN")
@@ -134,10 +113,7 @@ def force_offset_and_tare(t):
     time.sleep(3.2)
     t.expect(client.request("tare", side="left"))
     status = client.request("status")
-    t.check(
-        status["left"]["offset_provenance"] == "operator",
-        f"tare counts as the operator's: {status['left']['offset_provenance']}",
-    )
+    t.check(status["left"]["offset_provenance"] == "operator", f"tare counts as the operator's: {status['left']['offset_provenance']}")
     t.check(status["right"]["offset_provenance"] == "wheel", "the other wheel is untouched")
     t.rule(not rig.bus.setpoints(), "nothing of that sends anything")
     t.judge(rig, moves=False)
@@ -155,8 +131,5 @@ def unknown_is_null(t):
             t.check(status[side][key] is None, f"{side} {key} is {status[side][key]} although never heard")
     t.expect(client.arm(), "wheel_lost")
     rig.sim.ask("power on")
-    t.check(
-        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 8),
-        "heard once they have power",
-    )
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 8), "heard once they have power")
     t.judge(rig, moves=False)

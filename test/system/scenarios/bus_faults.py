@@ -42,10 +42,7 @@ def power_cut(t, seconds, speed):
     back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(back_us, "alive", now_us()))
-    t.check(
-        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10),
-        "the wheels are heard again",
-    )
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are heard again")
     time.sleep(0.5)
     late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
     moving = [entry for entry in late if entry[2]]
@@ -93,10 +90,7 @@ def foreign(t, can_id, data):
         f"why names the id: {why['detail']}, {why['sentence']}",
     )
     reasons = wait_reset(t, client)
-    t.check(
-        "cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons,
-        f"reset waits: {set(reasons)}",
-    )
+    t.check("cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons, f"reset waits: {set(reasons)}")
     t.judge(rig)
 
 
@@ -231,18 +225,12 @@ def row15_bus_gone(t):
     time.sleep(0.3)
     stream.stop()
     status = client.request("status")
-    t.check(
-        status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"),
-        f"{status['state']}, {status['cause']}",
-    )
+    t.check(status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"), f"{status['state']}, {status['cause']}")
     first_bus.close()
     rig.restart_sim(first_bus.frames)
     back_us = now_us()
     rig.note("alive")
-    t.check(
-        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6),
-        "found again",
-    )
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6), "found again")
     wait_reset(t, client)
     time.sleep(0.3)
     late = rig.bus.setpoints(back_us)

@@ -101,19 +101,13 @@ def row04_two_clients(t):
     time.sleep(0.3)
     t.check(len([1 for _, _, speed in rig.bus.setpoints() if speed == 0]) == before, "the owner is undisturbed")
     stream.target = (0, 0)
-    t.check(
-        rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4),
-        "at rest",
-    )
+    t.check(rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4), "at rest")
     time.sleep(0.6)
     t.arm(second, takeover=True)
     time.sleep(0.15)
     refusal = stream.stop()
     t.check(refusal and refusal["error"] == "not_holder", f"the former holder is refused: {refusal}")
-    t.check(
-        any(e["event"] == "lease" and e.get("change") in ("lost", "moved") for e in first.collect(0.2)),
-        "the former holder gets an event",
-    )
+    t.check(any(e["event"] == "lease" and e.get("change") in ("lost", "moved") for e in first.collect(0.2)), "the former holder gets an event")
     t.drive_for(second, 150, 150, 0.6)
     t.expect(first.request("stop"))
     time.sleep(0.5)
@@ -169,10 +163,7 @@ def row07_stale_command(t):
         refusal = client.arm()
         t.expect(refusal, "stale_command")
         time.sleep(0.02)
-    t.check(
-        "client" in refusal["message"] or "pusher" in refusal["message"],
-        f"stale_command names the client: {refusal['message']}",
-    )
+    t.check("client" in refusal["message"] or "pusher" in refusal["message"], f"stale_command names the client: {refusal['message']}")
     rig.press()
     rig.release()
     time.sleep(0.1)

@@ -47,12 +47,7 @@ def row05_many_observers(t):
     t.arm(owner)
     stream = Streamer(owner, 300, 300)
     time.sleep(0.6)
-    descriptors, memory_kB, cpu, begin = (
-        rig.gateway.descriptors(),
-        rig.gateway.resident_kB(),
-        rig.gateway.cpu_seconds(),
-        time.monotonic(),
-    )
+    descriptors, memory_kB, cpu, begin = (rig.gateway.descriptors(), rig.gateway.resident_kB(), rig.gateway.cpu_seconds(), time.monotonic())
     for number in range(1000):
         sock = connect(path)
         if number % 3 == 0:
@@ -85,14 +80,8 @@ def row05_many_observers(t):
     refusal = stream.stop()
     t.check(refusal is None, f"the owner was refused: {refusal}")
     time.sleep(0.4)
-    t.check(
-        rig.gateway.descriptors() <= descriptors,
-        f"descriptors: {descriptors} before, {rig.gateway.descriptors()} after",
-    )
-    t.check(
-        rig.gateway.resident_kB() <= memory_kB + 1024,
-        f"memory: {memory_kB} kB before, {rig.gateway.resident_kB()} kB after",
-    )
+    t.check(rig.gateway.descriptors() <= descriptors, f"descriptors: {descriptors} before, {rig.gateway.descriptors()} after")
+    t.check(rig.gateway.resident_kB() <= memory_kB + 1024, f"memory: {memory_kB} kB before, {rig.gateway.resident_kB()} kB after")
     t.figure(f"gateway took {100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin):.0f} % CPU")
     time.sleep(0.5)
     t.judge(rig)

@@ -42,10 +42,7 @@ def presses(t, seed):
         rig.press()
         time.sleep(chance.uniform(0.02, 0.08))
         status = pusher.request("status")
-        t.check(
-            status["state"] == "latched" and status["cause"] == "estop_line",
-            f"press {number}: {status['state']}, {status['cause']}",
-        )
+        t.check(status["state"] == "latched" and status["cause"] == "estop_line", f"press {number}: {status['state']}, {status['cause']}")
         refusal = stream.stop() or client.drive(300, 300)
         t.check(refusal.get("error") in ("latched", "estop_pressed"), f"press {number}: drive after the press: {refusal}")
         t.expect(pusher.request("reset"), "estop_pressed")
@@ -90,10 +87,7 @@ def row13_pressed_at_start(t):
     rig.sim.ask("estop press")
     rig.start_gateway(wheels=False)
     client = rig.client()
-    t.check(
-        rig.wait_status(client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3),
-        "latched from the start",
-    )
+    t.check(rig.wait_status(client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3), "latched from the start")
     t.stopped_by(client, "estop_line")
     refusal = client.arm()
     t.check(not refusal["ok"] and refusal["error"] in ("estop_pressed", "latched"), f"arm is refused: {refusal}")
@@ -281,11 +275,7 @@ def row14_button_dies(t):
     t.stopped_by(client, "estop_line")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(1.0)
-    t.check(
-        (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5,
-        "no busy loop while the button is gone",
-        True,
-    )
+    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop while the button is gone", True)
     t.expect(client.request("reset"), "estop_pressed")
     button.open()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
@@ -303,10 +293,7 @@ def no_estop_line(t):
     rig.start_gateway()
     client = rig.client()
     reply = t.arm(client)
-    t.check(
-        any("e-stop" in warning or "estop" in warning for warning in reply.get("warnings", [])),
-        f"arm warns: {reply.get('warnings')}",
-    )
+    t.check(any("e-stop" in warning or "estop" in warning for warning in reply.get("warnings", [])), f"arm warns: {reply.get('warnings')}")
     t.check(client.request("status")["estop"]["state"] == "none", "status says none")
     t.check("e-stop" in rig.gateway.text().lower(), "the start says so")
     t.drive_for(client, 200, 200, 0.5)

@@ -70,10 +70,7 @@ def contradicted_sign_refuses_arm(t):
     wait_reset(t, client)
     # The left one is judged first, and its stop is the end of the comparison.
     entry = client.request("status")["ledger"]["feedback_sign_left"]
-    t.check(
-        entry["state"] == "contradicted" and entry["figure"] < 0 and "measured -" in entry["reason"],
-        f"contradicted by the bus: {entry}",
-    )
+    t.check(entry["state"] == "contradicted" and entry["figure"] < 0 and "measured -" in entry["reason"], f"contradicted by the bus: {entry}")
     t.expect(client.arm(), "denied")
     t.expect(client.request("confirm", item="feedback_sign_left"))
     t.arm(client)

@@ -172,11 +172,7 @@ def settled(path):
 @scenario("a damaged, foreign or forged file is told, ignored and set aside", 24)
 def memory_that_is_not_to_be_trusted(t):
     rig, client = t.running()
-    for spoil, fault in (
-        (damage, "it is damaged"),
-        (replace, "it is damaged"),
-        (forge, "it holds what no gateway has measured"),
-    ):
+    for spoil, fault in ((damage, "it is damaged"), (replace, "it is damaged"), (forge, "it holds what no gateway has measured")):
         t.expect(client.request("confirm", item="wheel_radius"))
         t.check(written(rig, '"wheel_radius"'), "written")
         time.sleep(1.3)

@@ -21,10 +21,7 @@ def ctl(rig, *words, **options):
 def iwheelctl_verbs(t):
     rig, client = t.running()
     code, text = ctl(rig, "status")
-    t.check(
-        code == 0 and "listening" in text.lower() and "left" in text.lower() and "mm/s" in text,
-        f"status: {code}, {text[:300]!r}",
-    )
+    t.check(code == 0 and "listening" in text.lower() and "left" in text.lower() and "mm/s" in text, f"status: {code}, {text[:300]!r}")
     t.check("\x1b" not in text, "no colours into a pipe")
     code, text = ctl(rig, "--json", "status")
     t.check(code == 0 and json.loads(text)["state"] == "listening", f"--json status: {code}, {text[:100]!r}")
@@ -34,10 +31,7 @@ def iwheelctl_verbs(t):
     code, text = ctl(rig, "drive", "300", "300", "--for", "1s", seconds=12)
     t.check(code == 0, f"drive: {code}, {text[-300:]!r}")
     moving = [at for at, _, speed in rig.bus.setpoints(begin_us) if speed]
-    t.check(
-        moving and 900_000 <= moving[-1] - moving[0] <= 1_600_000,
-        f"it moved for {((moving[-1] - moving[0]) / 1e6) if moving else 0:.2f} s",
-    )
+    t.check(moving and 900_000 <= moving[-1] - moving[0] <= 1_600_000, f"it moved for {((moving[-1] - moving[0]) / 1e6) if moving else 0:.2f} s")
     t.check(rig.bus.speed_rpm(0) in (-2, -1, 0, 1, 2), "the wheels stand when it returns")
     code, text = ctl(rig, "why")
     t.check(code == 0 and "iwheelctl" in text, f"why names who: {text!r}")
@@ -58,10 +52,7 @@ def iwheelctl_verbs(t):
 
 def interrupted(t, number):
     rig, client = t.running()
-    process = Process(
-        [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"],
-        rig.path("ctl.out"),
-    )
+    process = Process([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "drive", "300", "300", "--for", "20s"], rig.path("ctl.out"))
     rig.processes.append(process)
     time.sleep(1.2)
     cut_us = now_us()
@@ -72,11 +63,7 @@ def interrupted(t, number):
     t.check(number == signal.SIGKILL or code is not None, "it ends when interrupted")
     ms = t.first_after(rig, cut_us, lambda speed: speed < 300, "the ramp begins", 60)
     moving = [at for at, _, speed in rig.bus.setpoints(cut_us) if speed]
-    t.check(
-        not moving or moving[-1] - cut_us < 320_000,
-        f"at zero {(moving[-1] - cut_us) / 1000 if moving else 0:.0f} ms after the signal",
-        True,
-    )
+    t.check(not moving or moving[-1] - cut_us < 320_000, f"at zero {(moving[-1] - cut_us) / 1000 if moving else 0:.0f} ms after the signal", True)
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
 

@@ -133,10 +133,7 @@ def trap07_reboot_while_driving(t):
     time.sleep(0.4)
     stream.stop()
     status = client.request("status")
-    t.check(
-        status["state"] == "latched" and status["cause"] in ("wheel_lost", "wheel_rebooted"),
-        f"{status['state']}, {status['cause']}",
-    )
+    t.check(status["state"] == "latched" and status["cause"] in ("wheel_lost", "wheel_rebooted"), f"{status['state']}, {status['cause']}")
     t.check(rig.wait_status(client, lambda s: s["right"]["at_rest"], 6), "it comes back")
     wait_reset(t, client)
     t.judge(rig)
@@ -161,10 +158,7 @@ def row23_wrong_unit(t):
     status = rig.wait_status(client, lambda s: s["left"]["force_validity"] == "unit_contradicted", 6)
     t.check(status, f"flagged: {client.request('status')['left']['force_validity']}")
     left = (status or client.request("status"))["left"]
-    t.check(
-        left["force_net_mN"] is None and left["unit_evidence"] == "dN",
-        f"no value from it: {left['force_net_mN']}, {left['unit_evidence']}",
-    )
+    t.check(left["force_net_mN"] is None and left["unit_evidence"] == "dN", f"no value from it: {left['force_net_mN']}, {left['unit_evidence']}")
     t.arm(client)
     t.drive_for(client, 100, 100, 0.5)
     t.judge(rig)

@@ -70,7 +70,8 @@ static void step(void) {
     brd_serial_step();
 }
 
-/// Each line comes back, from the ring and from a buffer that is lent, in that order; "end" ends it.
+/// Each line comes back, from the ring and from a buffer that is lent, in that order. After "end" it waits for one more
+/// byte before it exits: a terminal whose other end is gone loses what was not read.
 int main(void) {
     static char line[600];
     static char copy[600];
@@ -94,6 +95,9 @@ int main(void) {
             step();
         }
         if (strncmp(line, "end\n", 4) == 0) {
+            while (brd_serial_read(line, 1) == 0U) {
+                step();
+            }
             exit(brd_serial_had_error() ? 1 : 0);
         }
         length = 0;

@@ -17,6 +17,7 @@ function padSays(words) {
 function showRights() {
   $("drive").hidden = !page.rights.may_drive;
   document.body.classList.toggle("may-drive", page.rights.may_drive);
+  if (drive.on && !page.rights.may_drive) switchPad(false); // The bridge was started again with other rights.
 }
 
 // A place on the pad, from its middle: forward is up, left is left.
@@ -160,8 +161,8 @@ function setUpDriving() {
     letGo("why_second");
     if (pad.contains(event.target)) event.stopPropagation(); // It does not begin to drive, either.
   }, true);
-  visualViewport.addEventListener("resize", () => letGo("why_second"));
-  addEventListener("wheel", (event) => { if (event.ctrlKey) letGo("why_second"); }, { passive: true });
+  visualViewport.addEventListener("resize", () => letGo("why_view"));
+  addEventListener("wheel", (event) => { if (event.ctrlKey) letGo("why_view"); }, { passive: true });
   pad.addEventListener("pointermove", (event) => { if (drive.held && event.pointerId === drive.pointer) { hand(); aim(...from(event)); } });
   for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(name, () => letGo("why_let_go"));
   pad.addEventListener("keydown", keyDown);

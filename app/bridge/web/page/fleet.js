@@ -29,7 +29,7 @@ function row(machine) {
     name.append(link);
   } else name.textContent = machine.machine;
   const stop = machine.cause === null ? STRINGS.fleet_never : `${when(machine.stop_wall_us)}: ${machine.cause}${machine.sentence ? `. ${machine.sentence}` : ""}`;
-  made.append(name, cell("fleet_state", online ? machine.state : STRINGS.fleet_offline, online ? { latched: "bad", stopping: "care" }[machine.state] ?? "" : "care"),
+  made.append(name, cell("fleet_state", online ? STRINGS.states[machine.state] ?? machine.state : STRINGS.fleet_offline, online ? { latched: "bad", stopping: "care" }[machine.state] ?? "" : "care"),
     cell("fleet_last", stop, machine.cause === null ? "quiet" : ""),
     cell("fleet_battery", online ? pair(machine.left_battery_dV, machine.right_battery_dV, 1) : null),
     cell("fleet_zero", pair(machine.left_zero, machine.right_zero), [machine.left_zero, machine.right_zero].includes("doubted") ? "care" : ""),

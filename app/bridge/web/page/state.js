@@ -87,6 +87,8 @@ function inOneWord(state) {
   if (state.state === "armed") return [word.armed, "busy", drive.held ? here.armed_here : fill(here.armed, { name: state.lease.name })];
   if (state.state === "stopping") return [state.holding ? word.holding : word.stopping, "care", first];
   if (first === next.ready) return [word.ready, "good", page.rights.may_drive ? here.ready_drive : here.ready];
+  const [present] = state.present;
+  if (present) return [word.not_ready, "care", `${causeInWords({ cause: present })}: ${cureOf(state, present) ?? next.see}`];
   return state.listen_only && first === next.listen_only ? [word.watching, "care", first] : [word.not_ready, "care", first];
 }
 

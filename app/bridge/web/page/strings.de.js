@@ -129,6 +129,7 @@
   why_no_hand: "2 s lang keine Bewegung und keine Taste; loslassen, dann wieder halten",
   why_slow: "die Verbindung ist zu langsam",
   why_second: "ein zweiter Finger war auf dem Bildschirm",
+  why_view: "die Ansicht hat sich geändert (Zoom oder Drehung)",
   why_off: "das Steuerfeld wurde ausgeschaltet",
   news_live: "live",
   news_none: "Seit {s} s kein Zustand: Nichts hier ist aktuell.",

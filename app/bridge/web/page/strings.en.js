@@ -130,6 +130,7 @@
   why_no_hand: "no movement and no key for 2 s; let go, then hold the pad again",
   why_slow: "the connection is too slow",
   why_second: "a second finger touched the screen",
+  why_view: "the view changed (zoom or rotation)",
   why_off: "the pad was switched off",
   news_live: "live",
   news_none: "No state for {s} s: nothing here is live.",

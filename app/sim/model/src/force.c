@@ -23,7 +23,7 @@ static int64_t divide(int64_t value, int64_t unit) {
 void sim_force_init(sim_force_t *self, int32_t sensor_zero_mN, iw_force_unit_t unit) {
     *self = (sim_force_t){
         .sensor_zero_mN = sensor_zero_mN, .noise_mN = NOISE_mN, .forced_raw = SIM_FORCE_AUTO, .unit = unit};
-    self->learnt_dN = saturate(divide(sensor_zero_mN, MN_PER_DN));
+    self->learned_dN = saturate(divide(sensor_zero_mN, MN_PER_DN));
 }
 
 void sim_force_restart(sim_force_t *self) {
@@ -46,7 +46,7 @@ int16_t sim_force_sample(sim_force_t *self, iw_time_us_t now_us, bool learning, 
     if (learning) {
         self->learn_sum_mN += shown;
         self->learn_count += 1U;
-        self->learnt_dN = saturate(divide(self->learn_sum_mN / (int64_t)self->learn_count, MN_PER_DN));
+        self->learned_dN = saturate(divide(self->learn_sum_mN / (int64_t)self->learn_count, MN_PER_DN));
     }
     if (self->forced_raw != SIM_FORCE_AUTO) {
         return saturate(self->forced_raw);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_sim/motion.h"
 
-/// Circumference at 192 mm.
+/// Circumference at 192 mm radius.
 #define CIRCUMFERENCE_nm INT64_C(1206371579)
-/// Longest step of integration. A third of the shortest sensible response time.
+/// Longest step of integration: a third of the shortest sensible response time.
 #define STEP_MAX_US 20000U
-/// Slower than this and told to stand still is standing still.
+/// A slower wheel with setpoint 0 is at standstill.
 #define STICTION_um_s 2000
-/// The motor's own losses, drawn while it turns.
+/// Losses of the motor: current that it draws while it turns.
 #define IDLE_DRAW_mA   150U
 #define TOP_SPEED_um_s 6000000
-/// As fast as a hand turns a wheel.
+/// Speed at which a hand turns a wheel.
 #define PUSH_um_s 1500000
 
 void sim_motion_default(sim_motion_config_t *out_config) {
@@ -36,14 +36,15 @@ static int64_t clamp(int64_t value, int64_t bound) {
     return (value < -bound) ? -bound : value;
 }
 
-/// Friction holds a slope that is not steeper than it.
+/// Returns the speed after `dt_us` without a motor. Friction holds the wheel on a slope that is not steeper than the
+/// friction.
 static int64_t coasting(const sim_motion_t *self, int64_t speed_um_s, int64_t dt_us) {
     int64_t const friction = (int64_t)self->config.coast_mm_s2 * dt_us / 1000;
     int64_t const pulled = speed_um_s + (int64_t)self->slope_mm_s2 * dt_us / 1000;
     return pulled - clamp(pulled, friction);
 }
 
-/// Acceleration that the current gives, in mm/s2, with the current's sign.
+/// Returns the acceleration that the current gives, in mm/s2, with the sign of the current.
 static int64_t torque_mm_s2(const sim_motion_t *self) {
     int64_t const current = clamp(self->setpoint.current_mA, IW_CURRENT_LIMIT_mA);
     return (int64_t)self->config.accel_mm_s2 * current / IW_CURRENT_LIMIT_mA;
@@ -93,7 +94,7 @@ static void count_ticks(sim_motion_t *self, int64_t way_nm) {
     self->ticks += (uint32_t)(uint64_t)ticks;
 }
 
-/// The hand is stronger than the motor, and lets go at rest.
+/// Moves the wheel by hand. The hand is stronger than the motor, and releases the wheel at standstill.
 static void follow_hand(sim_motion_t *self, int64_t dt_us) {
     int64_t const way_nm = clamp(self->push_nm, PUSH_um_s * dt_us / 1000);
     self->push_nm -= way_nm;
@@ -104,12 +105,13 @@ static void follow_hand(sim_motion_t *self, int64_t dt_us) {
     count_ticks(self, way_nm);
 }
 
-/// What is left of a speed on a kerb.
+/// Returns the part of a speed that a kerb leaves.
 static int64_t over_kerb(const sim_motion_t *self, int64_t speed_um_s) {
     return speed_um_s * (1000 - self->kerb_permille) / 1000;
 }
 
-/// The motors of both wheels, shared out by the yaw inertia: the sum stays, the difference becomes smaller.
+/// Distributes the acceleration of both motors by the yaw inertia: the sum stays, the difference becomes smaller.
+/// Returns the new speed.
 static int64_t share_out(sim_motion_t *self, int64_t before, int64_t after, int64_t dt_us) {
     int64_t const permille = self->config.yaw_permille;
     int64_t const other = (int64_t)self->other_motor_mm_s2 * dt_us / 1000;
@@ -136,7 +138,7 @@ static void integrate(sim_motion_t *self, int64_t dt_us) {
     count_ticks(self, way_nm);
 }
 
-/// Where the next step of integration ends: nothing changes in the middle of one.
+/// Returns the end of the next step of integration. Nothing changes within a step.
 static iw_time_us_t step_end_us(const sim_motion_t *self, iw_time_us_t to_us) {
     iw_time_us_t end_us = to_us;
     if (self->driven && self->received_us + IW_WHEEL_WATCHDOG_US < end_us) {

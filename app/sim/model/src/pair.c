@@ -58,7 +58,7 @@ static void encode(const sim_pair_t *self, iw_side_t side, const sim_message_t *
     }
 }
 
-/// Each wheel learns what the other's motor adds, whenever one of them sends: every 2 ms.
+/// Sets in each wheel the acceleration of the other wheel's motor whenever one of them sends: every 2 ms.
 static void couple(sim_pair_t *self) {
     sim_motion_t *const left = &self->wheel[IW_LEFT].motion;
     sim_motion_t *const right = &self->wheel[IW_RIGHT].motion;

@@ -75,7 +75,7 @@ uint32_t sim_bus_frame_bits(const iw_can_frame_t *frame) {
     return data + (extended ? 67U : 47U) + stuffed / 10U;
 }
 
-/// The bits that arbitrate, as a number: the lower wins.
+/// Returns the bits that arbitrate as a number; the lower number wins.
 static uint64_t priority(const iw_can_frame_t *frame) {
     uint64_t const remote = (frame->id & IW_CAN_REMOTE) != 0U;
     if ((frame->id & IW_CAN_EXTENDED) == 0U) {
@@ -104,7 +104,7 @@ static iw_time_us_t start_us(const sim_bus_t *self) {
     return (earliest_us != IW_NEVER && earliest_us < self->free_us) ? self->free_us : earliest_us;
 }
 
-/// The port whose first frame wins, of those submitted by then.
+/// Returns the port whose first frame wins, among the frames submitted by `at_us`.
 static uint8_t winner_at(const sim_bus_t *self, iw_time_us_t at_us) {
     uint8_t winner = SIM_BUS_NONE;
     uint64_t best = UINT64_MAX;

@@ -2,14 +2,14 @@
 #include "iwheel_sim/sim_wheel.h"
 
 #define TEMPERATURE_AMBIENT_degC 28
-/// 2000 mA end 40 K above ambient, after some minutes of this time constant in status frames of 40 ms.
+/// With 2000 mA the temperature settles 40 K above ambient, with a time constant of HEAT_RESPONSE_FRAMES.
 #define HEAT_PER_mA_mdegC    20
 #define HEAT_RESPONSE_FRAMES 5000
 #define CPU_PERCENT          22U
 #define CPU_NOISE_PERCENT    3
 #define CPU_DRIVEN_PERCENT   6U
 #define RPM_DITHER           1000U
-/// Frames of one wheel, and the wheels, do not come at the same instant.
+/// Delay of the right wheel, so that the frames of both wheels do not come at the same instant.
 #define PHASE_RIGHT_US 1300U
 
 static const uint32_t period_us[SIM_TELEMETRY_KINDS] = {4000U, 40000U, 40000U, 50000U, 1000000U};
@@ -50,7 +50,7 @@ static void boot(sim_wheel_t *self, iw_time_us_t now_us) {
     self->next_us = now_us + self->boot_us;
 }
 
-/// The firmware runs from `start_us` on; what would have been sent before `now_us` is not.
+/// The firmware runs at `now_us` as if it had started `age_us` before. Frames from before `now_us` are not sent.
 static void run(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us) {
     uint64_t const learn_us = (age_us < SIM_FORCE_LEARN_US) ? SIM_FORCE_LEARN_US - age_us : 0U;
     self->state = SIM_WHEEL_RUNNING;
@@ -109,7 +109,7 @@ static bool lose(sim_wheel_t *self) {
     return true;
 }
 
-/// What a late wheel has received and is to obey by now, each at its time.
+/// Applies the setpoints of a late wheel that are due by `now_us`, each at its time.
 static void obey_late(sim_wheel_t *self, iw_time_us_t now_us) {
     while (self->late_count > 0U && self->late[self->late_first].at_us <= now_us) {
         sim_late_t const *const late = &self->late[self->late_first];
@@ -140,8 +140,8 @@ static int16_t saturate(int64_t value) {
     return (value < INT16_MIN) ? INT16_MIN : (int16_t)value;
 }
 
-/// Rounds up or down by chance, so that the mean over many frames is exact, or cuts off. At rest there is nothing to
-/// round.
+/// Returns whole rpm: rounded up or down at random, so that the mean over many frames is exact, or truncated. At
+/// standstill the result is not used.
 static int64_t whole_rpm(sim_wheel_t *self) {
     int64_t const milli_rpm = sim_motion_milli_rpm(&self->motion);
     if (self->truncates) {
@@ -200,7 +200,7 @@ static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, s
         out->told.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
         out->told.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
     } else if (kind == SIM_TELEMETRY_OFFSET) {
-        out->told.offset.offset_dN = self->force.learnt_dN;
+        out->told.offset.offset_dN = self->force.learned_dN;
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_sim/world.h"
 
-/// Frames a wheel holds: it never sends more at the same instant.
+/// Capacity of a wheel's queue: a wheel never sends more frames at the same instant.
 #define WHEEL_QUEUE 6U
 
 void sim_world_init(sim_world_t *self, const sim_pair_config_t *config, iw_time_us_t now_us, uint64_t seed) {
@@ -89,7 +89,7 @@ static void step_nodes(sim_world_t *self, iw_time_us_t at_us) {
     }
 }
 
-/// What the wheels and other nodes have to say at this instant goes to their ports.
+/// Submits the frames that the wheels and other nodes send at this instant to their ports.
 static void step_senders(sim_world_t *self, iw_time_us_t at_us) {
     sim_sent_t sent;
     while (sim_pair_step(&self->pair, at_us, &sent)) {

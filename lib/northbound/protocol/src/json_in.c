@@ -90,7 +90,8 @@ static void close_container(check_t *self) {
     }
 }
 
-/// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which closes it.
+/// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which
+/// closes it.
 static bool open_container(check_t *self, int *token) {
     if (self->depth == IWN_DEPTH_MAX) {
         return fail(self, "nested too deeply");

@@ -247,8 +247,8 @@ static int32_t read_exponent(const char *c, const char *end) {
     return negative ? -exponent : exponent;
 }
 
-/// Whether the digits from `c` on, whose first is not zero, are at least those of what is no double any more: halfway between
-/// the largest one and the power of two behind it. Nobody writes more of its 309 digits than these.
+/// Whether the digits from `c` on, whose first is not zero, are at least those of what is no double any more: halfway
+/// between the largest one and the power of two behind it. Nobody writes more of its 309 digits than these.
 static bool is_beyond(const char *c, const char *end) {
     static const char limit[] = "179769313486231580793728";
     for (const char *wanted = limit; *wanted != '\0'; wanted++) {

@@ -5,7 +5,8 @@
 
 #include "iwheel_northbound/json_in.h"
 
-/// What `iwn_scan` finds: a punctuation mark as itself, or one of these. A scalar is a number or one of true, false, null.
+/// What `iwn_scan` finds: a punctuation mark as itself, or one of these. A scalar is a number or one of true, false,
+/// null.
 enum { IWN_TOKEN_END = 0, IWN_TOKEN_INVALID = 1, IWN_TOKEN_TEXT = '"', IWN_TOKEN_SCALAR = '0' };
 
 typedef struct {

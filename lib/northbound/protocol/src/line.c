@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define CRC_DIGITS 8U
-/// The most that a stamp has: 20 digits hold any 64-bit number.
+/// Largest number of digits of a stamp: 20 digits hold every 64-bit number.
 #define STAMP_DIGITS 20U
 
 const char *iwn_line_verdict_name(iwn_line_verdict_t verdict) {
@@ -18,7 +18,7 @@ const char *iwn_line_verdict_name(iwn_line_verdict_t verdict) {
     return ((unsigned)verdict < IWN_LINE_VERDICTS) ? names[verdict] : "unknown";
 }
 
-/// Four bits at a time: 64 bytes of table are what a small flash gives.
+/// Processes four bits per step: a table of 64 bytes suits a small flash.
 uint32_t iwn_line_crc(uint32_t crc, const void *bytes, size_t length) {
     static const uint32_t table[16] = {
         0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U, 0x4DB26158U, 0x5005713CU,
@@ -38,7 +38,7 @@ static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-/// The value of a lower-case hexadecimal digit; 16 if it is none.
+/// Returns the value of a lower-case hexadecimal digit; 16 if it is none.
 static unsigned hex_value(char c) {
     if (is_digit(c)) {
         return (unsigned)(c - '0');
@@ -46,7 +46,7 @@ static unsigned hex_value(char c) {
     return (c >= 'a' && c <= 'f') ? (unsigned)(c - 'a') + 10U : 16U;
 }
 
-/// Writes decimal digits; how many.
+/// Writes decimal digits. Returns their number.
 static size_t write_number(uint64_t number, char out[STAMP_DIGITS]) {
     char reversed[STAMP_DIGITS];
     size_t digits = 0;
@@ -60,7 +60,7 @@ static size_t write_number(uint64_t number, char out[STAMP_DIGITS]) {
     return digits;
 }
 
-/// How many bytes of the text are a number in its one spelling; 0 if none, or it is beyond 64 bits.
+/// Returns the number of bytes of a number in its only valid form; 0 if there is none, or it exceeds 64 bits.
 static size_t read_number(const char *text, size_t length, uint64_t *out_number) {
     size_t digits = 0;
     uint64_t number = 0;
@@ -117,7 +117,7 @@ size_t iwn_line_write(const iwn_line_t *line, char *out, size_t size) {
     return iwn_line_end(out, prefix + line->length, size);
 }
 
-/// The CRC at the end of a line; false if none is there.
+/// Reads the CRC at the end of a line. Returns false if there is none.
 static bool read_crc(const char *bytes, size_t length, uint32_t *out_crc) {
     if (length < CRC_DIGITS + 1U || bytes[length - CRC_DIGITS - 1U] != '*') {
         return false;
@@ -133,7 +133,7 @@ static bool read_crc(const char *bytes, size_t length, uint32_t *out_crc) {
     return true;
 }
 
-/// The stamp and its space, behind the channel's: how many bytes; 0 if they are not there.
+/// Reads the stamp and its space after the channel. Returns the number of bytes; 0 if there is none.
 static size_t read_stamp(const char *text, size_t length, uint64_t *out_t_us) {
     const size_t digits = read_number(text, length, out_t_us);
     return (digits > 0U && digits < length && text[digits] == ' ') ? digits + 1U : 0U;
@@ -143,7 +143,7 @@ static bool is_braced(const char *json, size_t length) {
     return length >= 2U && json[0] == '{' && json[length - 1U] == '}';
 }
 
-/// Channel, stamp and braces of a line whose CRC is right.
+/// Reads channel, stamp and braces of a line whose CRC matches.
 static bool read_parts(const char *bytes, size_t length, bool stamped, iwn_line_t *out_line) {
     iwn_line_t line = {.stamped = stamped};
     if (length < 4U || bytes[0] < '0' || bytes[0] > (char)('0' + (char)IWN_LINE_CHANNELS) || bytes[1] != ' ') {
@@ -178,7 +178,7 @@ void iwn_receiver_init(iwn_receiver_t *self, char *data, size_t size, bool stamp
 
 iwn_line_verdict_t iwn_receiver_put(iwn_receiver_t *self, char byte, iwn_line_t *out_line) {
     if (byte != '\n') {
-        // The newline counts too: a line that needs the whole buffer and has no end yet is too long.
+        // The newline counts: a line that needs the whole buffer and has not ended is too long.
         if (self->length + 1U >= self->size) {
             if (self->fault == IWN_LINE_NOTHING) {
                 self->fault = IWN_LINE_TOO_BIG;
@@ -217,13 +217,13 @@ size_t iwn_quote_write(const iwn_quote_t *quote, const char *json, size_t length
     return text.length;
 }
 
-/// What is left to read of a request's first fields.
+/// Unread part of the first fields of a request.
 typedef struct {
     const char *at;
     size_t left;
 } rest_t;
 
-/// Goes on behind a text if it stands there.
+/// Skips a text if it is next.
 static bool take_text(rest_t *rest, const char *text) {
     const size_t length = strlen(text);
     if (rest->left < length || memcmp(rest->at, text, length) != 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// One word out of a table; "unknown" beyond its end and for its gaps.
+/// Returns one word of a table; "unknown" beyond its end and for its gaps.
 #ifndef IWHEEL_NORTHBOUND_PICK_H
 #define IWHEEL_NORTHBOUND_PICK_H
 

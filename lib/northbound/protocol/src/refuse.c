@@ -3,7 +3,7 @@
 
 #include "iwheel_northbound/why.h"
 
-/// Where a message is being written.
+/// Message that is written.
 typedef struct {
     const iwn_refuse_context_t *context;
     const iw_snapshot_t *seen;
@@ -13,7 +13,7 @@ typedef struct {
 
 #define SAY(self, ...) IWN_TEXT_JOIN(&(self)->text, __VA_ARGS__)
 
-/// A number of a request may be any.
+/// A number of a request may have any value.
 static void big_number(wording_t *self, int64_t value, const char *after) {
     iwn_text_int(&self->text, value);
     iwn_text_add(&self->text, after);
@@ -24,7 +24,7 @@ static void number(wording_t *self, const char *before, int32_t value, const cha
     big_number(self, value, after);
 }
 
-/// Milliseconds since then; at most INT32_MAX, 24 days.
+/// Appends the milliseconds since a time, at most INT32_MAX (24 days).
 static void since(wording_t *self, const char *before, iw_time_us_t then_us, const char *after) {
     const iw_time_us_t at_us = self->seen->at_us;
     const iw_time_us_t ms = (then_us < at_us) ? (at_us - then_us) / IW_US_PER_MS : 0U;
@@ -86,7 +86,8 @@ static void say_lost(wording_t *self) {
     iwn_text_add(&self->text, "check its power, cable and termination");
 }
 
-/// Both measured within `rest_rpm` and told zero, but not for long enough: figures of zero would contradict the sentence.
+/// Returns true if both wheels are within `rest_rpm` and receive zero, but not for long enough: values of zero would
+/// contradict the message.
 static bool stands_too_short(const iw_snapshot_t *seen) {
     const int32_t rest_rpm = (int32_t)seen->config->rest_rpm;
     bool is_still = true;
@@ -100,7 +101,7 @@ static bool stands_too_short(const iw_snapshot_t *seen) {
 
 static void say_not_at_rest(wording_t *self) {
     const iw_snapshot_t *seen = self->seen;
-    // Nothing is held yet, so that there is nothing to release: the wheels may stand all the same.
+    // Nothing is held yet, so there is nothing to release, even if the wheels are at standstill.
     if (self->request->cmd == IWN_CMD_RELEASE && seen->holder != IW_CLIENT_NONE) {
         say_holder(self);
         return;
@@ -146,7 +147,7 @@ static void say_second_master(wording_t *self) {
           self->seen->seen_us[IW_CAUSE_SECOND_MASTER], " ms ago; switch the other sender off, wait a second");
 }
 
-/// Whoever keeps stopping is to be found, whatever way it came in.
+/// Names the client that sends stops repeatedly, on any way.
 static void say_estopped(wording_t *self) {
     since(self, "estop_software was asked for ", self->context->estopped_us, " ms ago by ");
     SAY(self, self->context->estopped_by, "; end that program if it keeps asking, and wait a second");
@@ -210,7 +211,7 @@ static void say_missing(wording_t *self) {
         " needs currents because current_role is setpoint: use drive with left_mA and right_mA");
 }
 
-/// The last stop still holds.
+/// The last stop is still in effect.
 static void say_stop(wording_t *self) {
     SAY(self, (self->seen->state == IW_STATE_LATCHED) ? "latched: " : "stopped: ", self->context->last_stop);
 }

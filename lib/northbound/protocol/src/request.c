@@ -7,22 +7,22 @@
 
 typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind_t;
 
-/// A field that some commands have. `cmd` and `id` are common to all and treated apart.
+/// A field of some commands. `cmd` and `id` are common to all and handled separately.
 typedef struct {
     const char *name;
-    uint32_t allowed : 24; ///< Bit per iwn_cmd_t.
+    uint32_t allowed : 24; ///< Bit mask of iwn_cmd_t.
     uint32_t kind : 7;     ///< field_kind_t
     uint32_t required : 1;
-    uint16_t offset; ///< Of the value in iwn_request_t.
-    uint16_t max;    ///< Of a text, in bytes.
+    uint16_t offset; ///< Offset of the value in iwn_request_t.
+    uint16_t max;    ///< Largest size of a text in bytes.
 } field_t;
 
-/// A line that has been checked, and the names in it that all requests have in common.
+/// A checked line, and the names in it that all requests have.
 typedef struct {
     const char *line;
     const iwn_work_t *work;
-    iwn_json_t id;  ///< NULL: there is none.
-    iwn_json_t cmd; ///< The same.
+    iwn_json_t id;  ///< NULL if there is none.
+    iwn_json_t cmd; ///< NULL if there is none.
 } members_t;
 
 #define BIT(cmd) (1U << IWN_CMD_##cmd)
@@ -69,7 +69,7 @@ bool iwn_refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const
     return false;
 }
 
-/// The same, with all of some words at the end.
+/// Does the same, with a list of words at the end.
 static bool refuse_but(iwn_refusal_t *out_refusal, iwn_error_t error, const char *text, const char *(*word)(unsigned)) {
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = error;
@@ -88,7 +88,7 @@ static const char *topic_word(unsigned index) {
     return (index < IWN_TOPICS) ? iwn_topic_name((iwn_topic_t)index) : NULL;
 }
 
-/// Which of the words it is; how many there are if it is none.
+/// Returns the index of the word, or the number of words if it is none of them.
 static unsigned find_word(iwn_json_t value, const char *(*word)(unsigned)) {
     unsigned i = 0;
     while (word(i) != NULL && !iwn_json_is(value, word(i))) {
@@ -97,7 +97,7 @@ static unsigned find_word(iwn_json_t value, const char *(*word)(unsigned)) {
     return i;
 }
 
-/// Brackets of the line, whatever else is wrong with it. Those in texts do not count.
+/// Counts the brackets of the line, whatever else is wrong with it. Brackets in texts do not count.
 static bool is_too_deep(const char *line, size_t length) {
     unsigned depth = 0;
     bool in_text = false;
@@ -170,7 +170,7 @@ static bool read_item(iwn_json_t value, iw_assumption_item_t *target, iwn_refusa
                       "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
 }
 
-/// A number becomes its digits, so that 192 and "192" are the same.
+/// A number is stored as digits, so that 192 and "192" are equal.
 static bool read_value(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
     if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
         return read_text(field, value, target, out_refusal);
@@ -235,7 +235,7 @@ static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_re
     return true;
 }
 
-/// The name of a member; `at` is NULL if there is none.
+/// Returns the name of a member; `at` is NULL if there is none.
 static iwn_json_t find_name(const members_t *members, const char *text) {
     for (unsigned i = 0; i < members->work->names; i++) {
         const iwn_json_t name = iwn_json_name(members->line, members->work, i);
@@ -246,7 +246,7 @@ static iwn_json_t find_name(const members_t *members, const char *text) {
     return (iwn_json_t){NULL};
 }
 
-/// What all requests have in common, wherever in the object it stands.
+/// Reads the members that all requests have, at any place in the object.
 static bool read_common(members_t *members, iwn_request_t *request, iwn_refusal_t *out_refusal) {
     members->id = find_name(members, "id");
     members->cmd = find_name(members, "cmd");
@@ -268,7 +268,7 @@ static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
     return NULL;
 }
 
-/// Names 64 characters of it, if all of it can be shown.
+/// Reports an unknown name with up to 64 characters, if all of them can be shown.
 static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_refusal) {
     iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     iwn_json_t rest = iwn_json_inside(name);
@@ -288,8 +288,8 @@ static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_re
     return false;
 }
 
-/// Every field that is there is known and right; otherwise the refusal names the first in the line that is not. `*out_seen` has a bit
-/// for each of them.
+/// Reads the fields. If one is unknown or invalid, the refusal names the first of these in the line. `*out_seen` has a
+/// bit for each field.
 static bool read_fields(const members_t *members, iwn_request_t *request, uint32_t *out_seen,
                         iwn_refusal_t *out_refusal) {
     iwn_json_t wrong = {NULL};
@@ -313,7 +313,7 @@ static bool read_fields(const members_t *members, iwn_request_t *request, uint32
     return wrong.at == NULL;
 }
 
-/// Every field that must be there is.
+/// Checks that every required field is there.
 static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *out_refusal) {
     for (unsigned i = 0; i < FIELDS; i++) {
         const bool needed = fields[i].required != 0U && (fields[i].allowed & 1U << request->cmd) != 0U;
@@ -331,7 +331,7 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     return true;
 }
 
-/// One object, right in form.
+/// Checks that the line is one valid object.
 static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_refusal_t *out_refusal) {
     iwn_json_t root;
     char digits[NUMBER_SIZE];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Apart from the other words: an image without the protocol has these alone.
+// Separate from the other words: an image without the protocol needs only these.
 #include "pick.h"
 
 const char *iwn_pick(const char *const *table, size_t size, size_t index) {

@@ -16,7 +16,7 @@ static bool contradicted(const iw_snapshot_t *seen, iw_assumption_item_t item) {
     return seen->assumed[item].state == IW_CONTRADICTED;
 }
 
-/// Whether speeds in mm/s, or distances, mean anything: they rest on radius and gear ratio.
+/// Returns true if speeds in mm/s and distances are valid: they depend on radius and gear ratio.
 static bool is_speed_known(const iw_snapshot_t *seen) {
     return !contradicted(seen, IW_ASSUMPTION_WHEEL_RADIUS) &&
            !(seen->config->rpm_of_rotor && contradicted(seen, IW_ASSUMPTION_GEAR_RATIO));

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Forces, with where their zero comes from and how good it is.
+// Forces, with source and quality of their offset.
 #include "tell_force.h"
 
-/// Where the zero comes from, and how good it is.
+/// Source and quality of the offset.
 typedef struct {
     const char *word;
-    int64_t age_ms; ///< -1: unknown.
+    int64_t age_ms; ///< -1 if unknown.
     uint32_t samples;
     uint32_t deviation_mN;
     int32_t drift_mN;
-    bool measured;     ///< The three before mean something.
-    bool judged;       ///< The next means something.
-    bool contaminated; ///< Taken while the wheel turned, or under load or unrest.
+    bool measured;     ///< The three members before are valid.
+    bool judged;       ///< The next member is valid.
+    bool contaminated; ///< Measured while the wheel turned, under load, or with a noisy sensor.
 } zero_t;
 
 static int64_t age_ms(iw_time_us_t now_us, int64_t wall_us, const iw_force_t *force, const iwn_zero_note_t *noted) {
@@ -46,7 +46,7 @@ static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t 
         zero.measured = true;
         zero.judged = true;
         zero.contaminated = false;
-    } else if (force->provenance == IW_OFFSET_WHEEL) { // We judge what we saw: its first two seconds, or its rest now.
+    } else if (force->provenance == IW_OFFSET_WHEEL) { // Judged by the core: its first two seconds, or its rest now.
         const bool doubted = force->observation == IW_UNIT_UNCLEAR;
         zero.judged = doubted || force->observation != IW_UNIT_UNKNOWN || (force->boot_seen && window);
         zero.contaminated = doubted;

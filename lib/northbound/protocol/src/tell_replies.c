@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The small replies and events, and how each of them begins.
+// Short replies and events, and the beginning of all of them.
 #include "iwheel_northbound/tell.h"
 
 static void write_id(const iwn_id_t *id, iwn_out_t *json) {

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/// Every character that moves a terminal takes four digits.
+/// Every character that controls a terminal needs four digits.
 #define ESCAPE_SIZE sizeof "\\uFFFD"
 
 static const struct {
@@ -23,7 +23,7 @@ bool iwn_plain_is(uint32_t code_point) {
     return code_point != IWN_PLAIN_BROKEN;
 }
 
-/// How many bytes a character has that begins so; 0: none does.
+/// Returns the number of bytes of a character that begins with this byte; 0 if none does.
 static size_t length_of(unsigned char first) {
     if (first < 0x80U) {
         return 1;
@@ -83,9 +83,9 @@ void iwn_plain_copy(const char *text, char *out, size_t size) {
     out[used] = '\0';
 }
 
-/// As it stands in JSON.
+/// Writes the form in JSON.
 static size_t escape(uint32_t code_point, char out_escape[ESCAPE_SIZE]) {
-    if (code_point < 0x20U) { // Such a one stands between values only.
+    if (code_point < 0x20U) { // Such a character stands between values only.
         out_escape[0] = ' ';
         return 1;
     }
@@ -127,8 +127,8 @@ size_t iwn_utf8(uint32_t code_point, char out_bytes[4]) {
     return length;
 }
 
-/// 32 bits: a controller divides 64 bits by a function of a hundred instructions. Two digits at a time by a table, or one at a time in a
-/// program compiled for size.
+/// Divides 32-bit numbers, because a controller divides 64 bits by a function of a hundred instructions. It uses a
+/// table of two digits, or one digit at a time in a program compiled for size.
 static char *digits_32(uint32_t number, char *end) {
 #ifndef __OPTIMIZE_SIZE__
     static const char pairs[] =

@@ -9,7 +9,7 @@ static const char *wheels(uint8_t sides) {
     return names[sides & IW_SIDES_BOTH];
 }
 
-static const char *reboot_evidence(uint32_t detail) {
+static const char *reboot_sign(uint32_t detail) {
     return (detail == IW_REBOOT_SILENCE)    ? "it was silent for a second"
            : (detail == IW_REBOOT_ODOMETRY) ? "its odometry jumped"
                                             : "its start-up offset frames came back";
@@ -20,7 +20,7 @@ static void add_number(iwn_text_t *text, int64_t number, const char *unit) {
     iwn_text_add(text, unit);
 }
 
-/// How many it takes.
+/// Returns the number of digits.
 static unsigned hex_digits(uint32_t number) {
     unsigned digits = 1;
     while (number >= 16U) {
@@ -30,9 +30,8 @@ static unsigned hex_digits(uint32_t number) {
     return digits;
 }
 
-/// A cause in words, and what to do about it before `then`. In a clause stand for what is known of the stop: $w the wheels, $n the detail as
-/// a number, $x the same as hexadecimal digits, $d what it says in words, $c the client, $r its reason, $b the bus, $e the
-/// e-stop.
+/// A cause as a clause, and the fix before `then`. In a clause, $w is the wheels, $n the detail as a number, $x the
+/// detail in hexadecimal, $d the detail as text, $c the client, $r its reason, $b the bus, $e the e-stop.
 typedef struct {
     const char *clause;
     const char *cure;
@@ -40,7 +39,7 @@ typedef struct {
 
 static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_NONE] = {"none", "nothing to do"},
-    // On our side.
+    // Causes in the gateway.
     [IW_CAUSE_ESTOP_LINE] = {"e-stop $e $d", "release the button"},
     [IW_CAUSE_ESTOP_DISAGREES] = {"the two contacts of e-stop $e disagree",
                                   "mend contact or wire, press and release the button"},
@@ -51,13 +50,13 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_SHUTDOWN] = {"the gateway was told to end", "start it again to go on"},
     [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
                           "look for the crash in the log, then arm again"},
-    // A person or a client is behind it.
+    // Causes by a person or a client.
     [IW_CAUSE_ESTOP_SOFTWARE] = {"software e-stop by $c$r", "when it is safe: iwheelctl reset"},
     [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms",
                              "send drive commands more often or raise lease_ms, then arm again"},
     [IW_CAUSE_CLIENT_GONE] = {"$c disconnected", "arm again to go on"},
     [IW_CAUSE_CLIENT_STOP] = {"$c said stop", "arm again to go on"},
-    // In the machine: bus and wheels.
+    // Causes in the machine: bus and wheels.
     [IW_CAUSE_WHEEL_LOST] = {"$w not heard for $n ms", "check the wheel's power and cable"},
     [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power"},
     [IW_CAUSE_SEND_STALLED] = {"setpoint not acknowledged on the bus for $n ms",
@@ -79,7 +78,7 @@ static const char *detail_words(const iw_stop_t *stop) {
     if (stop->cause == IW_CAUSE_BUS_DOWN) {
         return (stop->detail == IW_BUS_OFF) ? "bus-off" : "down or gone";
     }
-    return reboot_evidence(stop->detail);
+    return reboot_sign(stop->detail);
 }
 
 static const char *word_for(char part, const iw_stop_t *stop, const iwn_why_context_t *context) {
@@ -135,18 +134,18 @@ static const char *manner(const iw_stop_t *stop) {
     return stop->at_once ? "zero at once" : "ramped to zero";
 }
 
-/// What was going on.
+/// Appends the activity at the time of the stop.
 static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
     if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
         iwn_text_add(text, (stop->from == IW_STATE_ARMED) ? " while driving " : " while stopping from ");
         add_number(text, stop->applied.wheel[IW_LEFT].speed_mm_s, "/");
         add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
-    } else if (stop->cause != IW_CAUSE_RESTART) { // Then nobody here knows.
+    } else if (stop->cause != IW_CAUSE_RESTART) { // Otherwise the gateway does not know it.
         IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from));
     }
 }
 
-/// In seconds, with three decimals.
+/// Appends seconds with three decimals.
 static void add_time(iw_time_us_t at_us, iwn_text_t *text) {
     const iw_time_us_t ms = at_us / IW_US_PER_MS;
     const unsigned decimals = (unsigned)(ms % 1000U);

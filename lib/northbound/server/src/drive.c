@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Commands that move wheels: whose key, how old, how fast.
+// Commands that move wheels: checks of key, age and values.
 #include "server_calls.h"
 
-/// A number too large for the core is too large for the wheels: the core refuses it by its range.
+/// Limits a number that is too large for the core; the core then refuses it by its range.
 static int32_t saturate(int64_t value) {
     return (value > INT32_MAX) ? INT32_MAX : (value < INT32_MIN) ? INT32_MIN : (int32_t)value;
 }
@@ -20,8 +20,8 @@ static bool would_move(const iw_config_t *config, const iw_drive_t *wanted) {
            (by_current && (wanted->current_mA[IW_LEFT] != 0 || wanted->current_mA[IW_RIGHT] != 0));
 }
 
-/// Refuses a command before the core judges it. The core is given one that is out of range instead, so that nobody may arm into a
-/// command that goes on.
+/// Refuses a command before the core judges it. The core receives a command out of range instead, so that no client can
+/// arm while the command continues.
 static void refuse_unjudged(iwn_server_t *self, iwn_client_t *client, const iw_drive_t *wanted) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
@@ -31,8 +31,8 @@ static void refuse_unjudged(iwn_server_t *self, iwn_client_t *client, const iw_d
     iwn_server_refuse(self, client, &self->request.id);
 }
 
-/// A command of the holder's connection with another key is another person's. Where the core refuses it in any case, its reason
-/// says more.
+/// A command on the holder's connection with another key comes from another person. If the core refuses it anyway, the
+/// core's reason is reported.
 static bool has_wrong_key(iwn_server_t *self, const iwn_client_t *client) {
     const char *const key = self->request.lease_key;
     return key[0] != '\0' && iw_gateway_state(self->core) == IW_STATE_ARMED &&
@@ -66,7 +66,7 @@ void iwn_server_drive(iwn_server_t *self, iwn_client_t *client) {
     drive(self, client, &wanted);
 }
 
-/// A turn for which no speeds are known.
+/// Refuses a turn for which no speeds are known.
 static void refuse_turn(iwn_server_t *self, iwn_client_t *client) {
     const iw_drive_t turn = {.speed_mm_s = {-1, 1}};
     self->refusal.error = IWN_DENIED;
@@ -75,7 +75,7 @@ static void refuse_turn(iwn_server_t *self, iwn_client_t *client) {
 }
 
 static int64_t limit(int64_t value) {
-    const int64_t most = 1000000; // Far outside, and no product of it overflows.
+    const int64_t most = 1000000; // Far outside the range, and no product of it overflows.
     return (value > most) ? most : (value < -most) ? -most : value;
 }
 

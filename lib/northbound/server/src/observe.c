@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What has changed since the last look, told to watchers: a state that lasts is told once.
+// Reports changes since the last call to watchers. A state that continues is reported once.
 #include "iwheel_server/target.h"
 
 #include <string.h>
@@ -51,13 +51,13 @@ static void tell_fault(iwn_server_t *self, const iw_snapshot_t *seen, const char
     iwn_server_tell_fault(self, cause, present);
 }
 
-/// The first telemetry comes a moment after the start: until then a wheel without any is not a fault.
+/// The first telemetry arrives shortly after the start: until then a wheel without telemetry is not a fault.
 static uint32_t faults_of(const iwn_server_t *self, const iw_snapshot_t *seen) {
     const bool early = self->now_us < self->told.started_us + IWN_FIRST_TELEMETRY_US;
     return early ? seen->present & ~(1U << IW_CAUSE_WHEEL_LOST) : seen->present;
 }
 
-/// Not a fault `rolling` that begins too soon after the last one.
+/// Omits a fault `rolling` that begins too soon after the last one.
 static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen) {
     iwn_reported_t *const told = &self->told;
     const bool again = told->rolling_us != 0U && self->now_us - told->rolling_us < IWN_ROLLING_FAULT_US;
@@ -72,7 +72,7 @@ static void observe_rolling_fault(iwn_server_t *self, const iw_snapshot_t *seen)
     tell_fault(self, seen, "rolling", seen->rolling_fault);
 }
 
-/// While armed or stopping a cause makes a stop, which is reported as such; these are the others.
+/// While armed or stopping, a cause results in a stop, which is reported as a stop. This function reports the others.
 static void observe_faults(iwn_server_t *self, const iw_snapshot_t *seen) {
     iwn_reported_t *const told = &self->told;
     const uint32_t present = faults_of(self, seen);
@@ -110,7 +110,7 @@ static void observe_rolling(iwn_server_t *self, const iw_snapshot_t *seen) {
     iwn_server_send_event(self, IWN_TOPIC_STOP, &json);
 }
 
-/// Who asked for it or held the lease, while that is still known; NULL: it is not.
+/// Returns the client that requested the stop or held the lease, while it is known; otherwise NULL.
 static const char *note_client(iwn_server_t *self) {
     iwn_stop_note_t *const note = &self->last_stop;
     if (note->stop.cause == IW_CAUSE_ESTOP_SOFTWARE) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What each request does.
+// Execution of each request.
 #include "server_calls.h"
 
 #include <string.h>
@@ -111,7 +111,7 @@ static void do_estop(iwn_server_t *self, iwn_client_t *client) {
     if (!latched) {
         memcpy(self->estop_reason, self->request.reason, sizeof self->estop_reason);
     }
-    // In force already: repeating it many times costs neither a step nor what the recorder holds.
+    // Already in effect: repeated requests cost neither a step nor room in the recorder.
     if (!latched || self->now_us - seen->seen_us[IW_CAUSE_ESTOP_SOFTWARE] >= IWN_ESTOP_AGAIN_US) {
         iw_gateway_estop(self->core, self->now_us, client->id);
         iwn_target_judged(self, client, IW_REFUSE_NONE);
@@ -119,7 +119,7 @@ static void do_estop(iwn_server_t *self, iwn_client_t *client) {
     reply_state(self, client);
 }
 
-/// Reset or release: only the core judges it, once it may go there.
+/// Reset or release: only the core judges it, after the target permits it.
 static void do_judged(iwn_server_t *self, iwn_client_t *client) {
     if (!iwn_target_permits(self, client)) {
         iwn_server_refuse(self, client, &self->request.id);
@@ -169,7 +169,7 @@ static void do_why(iwn_server_t *self, iwn_client_t *client) {
     iwn_server_send_reply(self, client, &json);
 }
 
-/// What is asked for seldom.
+/// Executes rare requests.
 static void carry_out_seldom(iwn_server_t *self, iwn_client_t *client) {
     switch (self->request.cmd) {
     case IWN_CMD_HELLO:
@@ -194,7 +194,7 @@ static void carry_out_seldom(iwn_server_t *self, iwn_client_t *client) {
     }
 }
 
-/// No table of functions: the worst stack is found by following the calls.
+/// There is no table of functions, so that the worst-case stack can be computed from the calls.
 static void carry_out(iwn_server_t *self, iwn_client_t *client) {
     switch (self->request.cmd) {
     case IWN_CMD_STATUS:
@@ -222,7 +222,7 @@ static void carry_out(iwn_server_t *self, iwn_client_t *client) {
     }
 }
 
-/// By what the request says of its age and its stop.
+/// Judges by the age and the stop in the request.
 static bool is_late(iwn_server_t *self) {
     if (!self->request.has_t_us && !self->request.has_stop) {
         return false;

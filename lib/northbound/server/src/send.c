@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Lines to clients, and the queries about them.
+// Lines to clients, and queries about clients.
 #include "server_calls.h"
 
 #include <string.h>
@@ -59,7 +59,7 @@ iwn_out_t iwn_server_begin_event(iwn_server_t *self, const char *name) {
     return iwn_tell_event(line, size, name);
 }
 
-/// Closes an event and sends it to those who watch the topic.
+/// Ends an event and sends it to the watchers of the topic.
 static void send_event(iwn_server_t *self, iwn_topic_t topic, bool due_only, iwn_out_t *json) {
     iwn_out_close(json, '}');
     const size_t length = iwn_out_finish(json);
@@ -84,7 +84,7 @@ void iwn_server_hello(iwn_server_t *self, iwn_client_t *client) {
     iwn_server_write_hello(self, client, &json);
     iwn_out_int(&json, "t_us", (int64_t)self->now_us);
     iwn_server_send_reply(self, client,
-                          &json); // A client waits for it before it sends anything, so it must not be dropped.
+                          &json); // A client waits for it before it sends anything, so it must not be lost.
 }
 
 void iwn_server_write_status(iwn_server_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
@@ -98,7 +98,7 @@ static bool is_periodic(const iwn_client_t *client) {
     return (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
 }
 
-/// No burst after a stall.
+/// Returns the next time without a burst after a stall.
 static iw_time_us_t next_of(const iwn_server_t *self, const iwn_client_t *client) {
     const iw_time_us_t period_us = 1000000U / client->rate_hz;
     const iw_time_us_t own_us = client->next_us + period_us;
@@ -108,7 +108,7 @@ static iw_time_us_t next_of(const iwn_server_t *self, const iwn_client_t *client
     return (own_us > self->now_us) ? own_us : self->now_us + period_us;
 }
 
-/// The topics of periodic events that are due.
+/// Returns the topics of periodic events that are due.
 static uint8_t find_due(iwn_server_t *self) {
     uint8_t topics = 0;
     for (iwn_client_t *client = iwn_target_next(self, NULL); client != NULL; client = iwn_target_next(self, client)) {
@@ -121,7 +121,7 @@ static uint8_t find_due(iwn_server_t *self) {
     return topics;
 }
 
-/// Written once, for all who are due and watch it.
+/// Written once for all clients that are due and watch it.
 static void send_force(iwn_server_t *self, const iw_snapshot_t *seen) {
     const iwn_surroundings_t around = iwn_target_around(self, seen);
     iwn_out_t json = iwn_server_begin_event(self, "force");

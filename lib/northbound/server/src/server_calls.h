@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// Between the files of the server.
+/// Functions shared by the files of the server.
 #ifndef IWHEEL_SERVER_CALLS_H
 #define IWHEEL_SERVER_CALLS_H
 
 #include "iwheel_server/target.h"
 
-/// Carries out `drive` and `twist`.
+/// Executes `drive` and `twist`.
 void iwn_server_drive(iwn_server_t *self, iwn_client_t *client);
 void iwn_server_twist(iwn_server_t *self, iwn_client_t *client);
 

@@ -5,11 +5,11 @@
 
 #include <stdint.h>
 
-/// The value that stands for 1.
+/// Value that represents 1.
 #define SIM_TRIG_ONE       ((int64_t)1 << 30)
 #define SIM_TRIG_TURN_nrad INT64_C(6283185307)
 
-/// Sine of an angle in nanoradians, any angle, in units of 1 / SIM_TRIG_ONE. Error below 1e-5.
+/// Returns the sine of any angle in nanoradians, in units of 1 / SIM_TRIG_ONE. The error is below 1e-5.
 int64_t sim_trig_sin(int64_t angle_nrad);
 
 int64_t sim_trig_cos(int64_t angle_nrad);

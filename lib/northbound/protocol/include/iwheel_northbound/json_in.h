@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Reads JSON where it lies: nothing is copied, nothing is allocated, and what is not JSON to the letter (RFC 8259) is refused.
+/// Reads JSON where it lies: nothing is copied, nothing is allocated, and what is not JSON to the letter (RFC 8259) is
+/// refused.
 ///
 ///     iwn_json_check     once, judges every byte of the text and finds the members of the root
 ///     iwn_json_name      then reads the members of the root where the check found them
 ///     iwn_json_...       or walks what has been checked, and only that
 ///
-/// Refused are, beside wrong syntax: bytes that are no UTF-8, NUL in any spelling, single surrogates, control characters in
-/// texts, a name twice in one object however it is spelt, integers beyond 64 bits, other numbers beyond what a double holds,
-/// and nesting beyond IWN_DEPTH_MAX. The cost is bounded: it grows with the length and the logarithm of the number of names.
+/// Refused are, beside wrong syntax: bytes that are no UTF-8, NUL in any spelling, single surrogates, control
+/// characters in texts, a name twice in one object however it is spelt, integers beyond 64 bits, other numbers beyond
+/// what a double holds, and nesting beyond IWN_DEPTH_MAX. The cost is bounded: it grows with the length and the
+/// logarithm of the number of names.
 #ifndef IWHEEL_NORTHBOUND_JSON_IN_H
 #define IWHEEL_NORTHBOUND_JSON_IN_H
 
@@ -22,12 +24,12 @@
 #define IWN_JSON_MAX 65536U
 /// Deepest nesting that is read at all; requests need 2.
 #define IWN_DEPTH_MAX 8U
-/// Names in objects that are open at one time. A name, its colon, a value and what follows take five bytes at least, so no
-/// line of 4096 bytes holds more.
+/// Names in objects that are open at one time. A name, its colon, a value and what follows take five bytes at least, so
+/// no line of 4096 bytes holds more.
 #define IWN_NAMES_MAX 832U
 
-/// The names of the open objects, sorted within each object; after a check that returned true, those of the root. Its owner need not
-/// set anything. The next check overwrites it, so one for all of a program will do.
+/// The names of the open objects, sorted within each object; after a check that returned true, those of the root. Its
+/// owner need not set anything. The next check overwrites it, so one for all of a program will do.
 typedef struct {
     uint16_t name_at[IWN_NAMES_MAX]; ///< Offsets in the text, behind the first quote.
     uint16_t names;                  ///< How many of these are in use.
@@ -50,15 +52,15 @@ typedef struct {
     const char *at; ///< Its first byte.
 } iwn_json_t;
 
-/// True: the text, of at most IWN_JSON_MAX bytes, is one object or list, and `*out_root` is that. False: the reason is added to
-/// `fault`, in printable ASCII.
+/// True: the text, of at most IWN_JSON_MAX bytes, is one object or list, and `*out_root` is that. False: the reason is
+/// added to `fault`, in printable ASCII.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
 
 /// The object or list of a text that has been checked.
 iwn_json_t iwn_json_root(const char *text);
 
-/// The name of a member of the root, in the order of the names. `text` and `work` are those of the check; `index` is below
-/// `work->names`.
+/// The name of a member of the root, in the order of the names. `text` and `work` are those of the check; `index` is
+/// below `work->names`.
 iwn_json_t iwn_json_name(const char *text, const iwn_work_t *work, unsigned index);
 
 /// The value that belongs to a name.

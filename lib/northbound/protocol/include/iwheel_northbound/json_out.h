@@ -2,12 +2,12 @@
 /// @file
 /// Writes one JSON object as one line into a buffer of fixed size.
 ///
-/// Commas are placed by the writer. A name of NULL is for elements of a list. What does not fit sets `overflow` and the line must not
-/// be used. Texts are escaped: what moves a terminal (text.h) stands as `\uXXXX`, and what is no UTF-8 as U+FFFD. Names are words of
-/// ours, in which nothing is to be escaped. No heap, no stdio.
+/// Commas are placed by the writer. A name of NULL is for elements of a list. What does not fit sets `overflow` and the
+/// line must not be used. Texts are escaped: what moves a terminal (text.h) stands as `\uXXXX`, and what is no UTF-8 as
+/// U+FFFD. Names are words of ours, in which nothing is to be escaped. No heap, no stdio.
 ///
-/// Each element is written as a whole, in one or two copies. The functions that take a name are inline, so that the compiler
-/// knows how long a literal one is, unless the program is compiled for size.
+/// Each element is written as a whole, in one or two copies. The functions that take a name are inline, so that the
+/// compiler knows how long a literal one is, unless the program is compiled for size.
 #ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
 #define IWHEEL_NORTHBOUND_JSON_OUT_H
 

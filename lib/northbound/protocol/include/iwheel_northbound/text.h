@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// Texts: which are fit to be shown, and how one is put together from parts, without stdio.
+/// Checks whether a text is safe to show, and builds texts from parts without stdio.
 ///
-/// A plain text: nothing in it moves a terminal's cursor, changes its state, or turns the order of what is shown.
+/// A plain text contains nothing that moves the cursor of a terminal, changes its state, or reorders the shown text.
 ///
-/// Not plain are the control characters (U+0000-001F, U+007F-009F), the separators of lines and paragraphs (U+2028,
-/// U+2029), Unicode's bidirectional controls (U+061C, U+200E, U+200F, U+202A-202E, U+2066-2069), and bytes that are
-/// no UTF-8, which an old terminal takes for control characters. Such a text is refused where it comes in, and nothing of
-/// it is printed raw. Pure functions.
+/// These characters are not plain: control characters (U+0000-001F, U+007F-009F), separators of lines and paragraphs
+/// (U+2028, U+2029), bidirectional controls (U+061C, U+200E, U+200F, U+202A-202E, U+2066-2069), and bytes that are not
+/// UTF-8, which an old terminal treats as control characters. Programs refuse such a text in their input, and never
+/// print it unchanged. Pure functions.
 #ifndef IWHEEL_NORTHBOUND_TEXT_H
 #define IWHEEL_NORTHBOUND_TEXT_H
 
@@ -15,53 +15,55 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/// What a byte that is no UTF-8 reads as.
+/// Code point of a byte that is not UTF-8.
 #define IWN_PLAIN_BROKEN UINT32_MAX
 
-/// The code point that begins at `text`, which ends with a zero byte, and how many bytes it has: 1 with IWN_PLAIN_BROKEN.
+/// Returns the code point at the beginning of the terminated `text`, and its number of bytes: 1 with IWN_PLAIN_BROKEN.
 uint32_t iwn_plain_read(const char *text, size_t *out_bytes);
 
-/// True if it is plain: not for IWN_PLAIN_BROKEN.
+/// Returns true if the code point is plain. IWN_PLAIN_BROKEN is not.
 bool iwn_plain_is(uint32_t code_point);
 
-/// True if all of it is plain.
+/// Returns true if all characters are plain.
 bool iwn_plain_text(const char *text);
 
-/// Copies with a `?` in place of each character that is not plain; what does not fit is left out, never half a character.
+/// Copies a text with `?` instead of each character that is not plain. Characters that do not fit are omitted as a
+/// whole.
 void iwn_plain_copy(const char *text, char *out, size_t size);
 
-/// Copies a line of JSON that is right in form, as much of it as fits, with such characters as `\uXXXX` (a space between
-/// values). Returns where to go on; `*out_length` bytes were written. 12 bytes are enough to go on at all.
+/// Copies the beginning of a valid line of JSON, with such characters as `\uXXXX` (a space between values). Returns the
+/// rest; `*out_length` is the number of written bytes. With 12 bytes there is always progress.
 const char *iwn_plain_json(const char *line, char *out, size_t size, size_t *out_length);
 
-/// The bytes of a code point that is one; how many, 1 to 4.
+/// Writes the bytes of a valid code point. Returns their number, 1 to 4.
 size_t iwn_utf8(uint32_t code_point, char out_bytes[4]);
 
-/// Writes the decimal digits of a number so that they end at `end`, which 20 bytes must lie before. Where they begin.
+/// Writes the decimal digits of a number so that they end at `end`; 20 bytes before it must be writable. Returns their
+/// beginning.
 char *iwn_digits(int64_t number, char *end);
 #define IWN_DIGITS_MAX 20U ///< Bytes of the longest number, with its sign.
 
-/// A text being put together in a buffer of its owner's. It ends with a zero byte at any time; what does not fit is left out.
+/// Text in a buffer of its owner. It is always terminated; parts that do not fit are omitted.
 typedef struct {
     char *data;    ///< The buffer.
-    size_t size;   ///< Of the buffer, at least 1.
-    size_t length; ///< Without the zero byte.
+    size_t size;   ///< Size of the buffer, at least 1.
+    size_t length; ///< Length without the terminator.
 } iwn_text_t;
 
-/// Empty. The size is at least 1.
+/// Returns an empty text. `size` is at least 1.
 iwn_text_t iwn_text_begin(char *data, size_t size);
-/// Adds `length` bytes.
+/// Appends `length` bytes.
 void iwn_text_span(iwn_text_t *self, const char *text, size_t length);
-/// Adds a whole text.
+/// Appends a text.
 void iwn_text_add(iwn_text_t *self, const char *text);
-/// Adds decimal digits.
+/// Appends decimal digits.
 void iwn_text_int(iwn_text_t *self, int64_t number);
-/// So many hexadecimal digits, upper case.
+/// Appends this number of hexadecimal digits, upper case.
 void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits);
 
-/// Adds texts: IWN_TEXT_JOIN(&text, name, " needs ", field).
+/// Appends texts: IWN_TEXT_JOIN(&text, name, " needs ", field).
 #define IWN_TEXT_JOIN(self, ...) iwn_text_join((self), (const char *const[]){__VA_ARGS__, NULL})
-/// Adds texts, the last of which is NULL.
+/// Appends texts; the last one is NULL.
 void iwn_text_join(iwn_text_t *self, const char *const *texts);
 
 #endif

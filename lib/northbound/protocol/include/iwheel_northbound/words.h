@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// The words of the northbound protocol for errors, causes, states and the rest. Each list is closed and documented in
-/// docs/user/northbound.md; a value outside its list is "unknown".
+/// Names of the northbound protocol for errors, causes, states and other lists. Each list is closed and documented in
+/// docs/user/northbound.md. A value outside its list is "unknown".
 #ifndef IWHEEL_NORTHBOUND_WORDS_H
 #define IWHEEL_NORTHBOUND_WORDS_H
 
 #include "iwheel/gateway.h"
 
-/// Errors of the protocol, in the words of docs/user/northbound.md.
+/// Errors of the protocol: docs/user/northbound.md.
 typedef enum {
     IWN_OK = 0,
     IWN_BAD_JSON,
@@ -41,7 +41,7 @@ typedef enum {
     IWN_ERRORS,
 } iwn_error_t;
 
-/// Subscriptions, usable as bit numbers.
+/// Topics. The values are bit numbers.
 typedef enum {
     IWN_TOPIC_STATE = 0,
     IWN_TOPIC_BUS,
@@ -53,44 +53,45 @@ typedef enum {
     IWN_TOPICS,
 } iwn_topic_t;
 
-/// Of the longest value of a ledger item, with its terminator.
+/// Size of the longest value of an assumption, with its terminator.
 #define IWN_VALUE_SIZE 40U
-#define IWN_HOW_SIZE   128U ///< Of the longest text on how it was found, with its terminator.
+#define IWN_HOW_SIZE   128U ///< Size of the longest description of a method, with its terminator.
 
-/// Such as "bad_json".
+/// Returns the name of an error, for example "bad_json".
 const char *iwn_error_name(iwn_error_t error);
-/// The northbound error for a refusal of the core.
+/// Returns the error of the protocol for a refusal of the core.
 iwn_error_t iwn_error_of(iw_refusal_t refusal);
 
-/// Such as "state".
+/// Returns the name of a topic, for example "state".
 const char *iwn_topic_name(iwn_topic_t topic);
-/// Such as "listening".
+/// Returns the name of a state, for example "listening".
 const char *iwn_state_name(iw_state_t state);
-/// Such as "estop_line".
+/// Returns the name of a cause, for example "estop_line".
 const char *iwn_cause_name(iw_cause_t cause);
-/// Such as "active".
+/// Returns the name of a state of the bus, for example "active".
 const char *iwn_bus_state_name(iw_bus_state_t state);
-/// Of the last answer of the HAL's `estop_pressed`; `present` is false if there is no e-stop at all.
+/// Returns the name of a result of `estop_pressed`. `present`: there is an e-stop.
 const char *iwn_estop_name(int answer, bool present);
-/// "left", "right", "both"; NULL for none.
+/// Returns "left", "right" or "both"; NULL for none.
 const char *iwn_sides_name(uint8_t sides);
-/// Such as "operator".
+/// Returns the name of a provenance, for example "operator".
 const char *iwn_provenance_name(iw_offset_provenance_t provenance);
-/// The same of an offset in force: one of an earlier run (`offset_us` is IW_NEVER) is "stored", whoever took it.
+/// Returns the word for an offset in use: "stored" for one of an earlier run (`offset_us` is IW_NEVER), otherwise its
+/// provenance.
 const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us);
-/// Such as "good".
+/// Returns the name of a judgement, for example "good".
 const char *iwn_window_name(iw_window_t window);
-/// Such as "cN".
+/// Returns the name of an observed unit, for example "cN".
 const char *iwn_unit_observation_name(iw_unit_observation_t source);
-/// Such as "valid".
+/// Returns the name of a validity, for example "valid".
 const char *iwn_force_validity_name(iw_force_validity_t validity);
-/// Such as "setpoint_type".
+/// Returns the name of an item, for example "setpoint_type".
 const char *iwn_assumption_item_name(iw_assumption_item_t item);
-/// False if no item has that name.
+/// Finds an item by its name. Returns false if there is none.
 bool iwn_assumption_item_of(const char *name, iw_assumption_item_t *out_item);
-/// Such as "assumed".
+/// Returns the name of a state of an assumption, for example "assumed".
 const char *iwn_assumption_state_name(iw_assumption_state_t state);
-/// Such as "document".
+/// Returns the name of a source, for example "document".
 const char *iwn_source_name(iw_source_t source);
 
 #endif

@@ -1,17 +1,12 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""From the version before to this one and back, by the Debian packages of both, while somebody drives.
+"""From the version before to this one and back, by the Debian packages of both (packages.py), while somebody drives.
 
-usage: test/upgrade/run [--from COMMIT] [--build]
-
-Builds the packages of these sources and those of the version before, which are the commit in this repository's history that gave it its number (or
-COMMIT), into build/upgrade, where they are kept; those of test/debian/run, if they are of these sources. --build: no more. Installs them in a copy of this system that is thrown away (an overlay in a mount
-namespace of its own: nothing here changes; needs root), with a service manager that only stops and starts. The last line sums up:
-"N passed, N failed, N skipped".
+In a copy of this system that is thrown away (an overlay in a mount namespace of its own: nothing here changes; needs root), with a service manager that
+only stops and starts. Each sentence counts as a test.
 """
 
-import argparse
-import fcntl
+import contextlib
+import ctypes
 import hashlib
 import json
 import os
@@ -19,18 +14,16 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "test/system"), str(ROOT / "test/support")]
+import pytest
 import verdict
 from bus import Bus, now_us
+from packages import WANTED, Missing, of_both
 
-OUT = ROOT / "build/upgrade"
-WANTED = ("iwheel-gateway_", "iwheel-tools_", "libiwheel-client0_", "libiwheel-dev_", "python3-iwheel_")
+CLONE_NEWNS = 0x00020000
 CONF = "etc/iwheel/gateway.conf"
 # The answer to dpkg's question about a configuration that both sides have changed; its default, when nobody answers.
 KEEP = ("--force-confdef", "--force-confold")
@@ -78,119 +71,15 @@ DRIVER = """import iwheel
 with iwheel.Gateway("/run/iwheel/gateway.sock", wait=10) as gateway:
     gateway.arm("walker").drive_for(60, 300, 300)
 """
-counts = {"passed": 0, "failed": 0, "skipped": 0}
-failures = []
-
-
-def attempt(old, new):
-    """All of it, as test/support/verdict.py judges it. Of an attempt that is not the last nothing counts."""
-    counts.update(passed=0, failed=0)
-    failures.clear()
-    try:
-        test(old, new)
-    except (RuntimeError, OSError, subprocess.SubprocessError, KeyError) as error:
-        judge("it came to its end", False, error)
-    return verdict.Attempt(list(failures))
+EVIDENCE, JUDGED = verdict.Evidence(), []  # Of this attempt, which is a process of its own.
 
 
 def judge(sentence, good, detail="", rule=False):
     """`rule`: a safety rule, which holds however late the machine is."""
-    counts["passed" if good else "failed"] += 1
+    JUDGED.append(sentence)
     if not good:
-        failures.append(verdict.Failure(f"{sentence}: {detail}", verdict.RULE if rule else verdict.kind_of(str(detail))))
-    print(f"{'ok     ' if good else 'FAILED '} {sentence}" + ("" if good else f": {detail}"), flush=True)
-
-
-def end(inconclusive=()):
-    if inconclusive:
-        counts["failed"] = 0
-        sys.exit(verdict.summary(*counts.values(), inconclusive, real_time=1))
-    print(", ".join(f"{count} {word}" for word, count in counts.items()))
-    sys.exit(1 if counts["failed"] or not (counts["passed"] or counts["skipped"]) else 0)
-
-
-def skip(why):
-    counts["skipped"] += 1
-    print(f"skip: no upgrade is tested: {why}")
-    end()
-
-
-def git(*arguments):
-    done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
-    return done.stdout if done.returncode == 0 else ""
-
-
-# ---- the packages --------------------------------------------------------------------------------------------------
-
-
-def version_before():
-    versions = re.findall(r"^iwheel-gateway \(([^)]+)\)", (ROOT / "debian/changelog").read_text(), re.MULTILINE)
-    return versions[1] if len(versions) > 1 else skip("debian/changelog tells of one version only")
-
-
-def release_of(version):
-    """The commit that gave the sources this version, by debian/changelog; None: the history here does not reach so far."""
-    for commit in git("log", "--reverse", "--format=%H", "--", "debian/changelog").split():
-        if git("show", f"{commit}:debian/changelog").startswith(f"iwheel-gateway ({version})"):
-            return commit
-    return None
-
-
-def build(folder, fill):
-    """Packages of the sources that `fill` puts into a folder, in `folder`, where they may be already."""
-    if not (folder / "built").exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        (folder / "iwheel").mkdir(parents=True)
-        fill(folder / "iwheel")
-        environment = {name: value for name, value in os.environ.items() if name != "CMAKE_C_COMPILER_LAUNCHER"}
-        # What is installed has no debug information.
-        environment.update(
-            LC_ALL="C.UTF-8",
-            DEB_CFLAGS_STRIP="-g",
-            DEB_BUILD_OPTIONS=f"nocheck noautodbgsym parallel={os.cpu_count()}",
-            DEB_BUILD_PROFILES="pkg.iwheel.nomqtt pkg.iwheel.noros2 pkg.iwheel.noweb",
-        )
-        with open(folder / "log", "w", encoding="utf-8") as log:
-            done = subprocess.run(
-                ["dpkg-buildpackage", "--unsigned-changes", "--build=binary"], cwd=folder / "iwheel", env=environment, stdout=log, stderr=log, check=False
-            )
-        if done.returncode != 0:
-            print((folder / "log").read_text()[-3000:])
-            judge(f"the packages in {folder} are built", False, "the end of the log is above")
-            end()
-        shutil.rmtree(folder / "iwheel")
-        (folder / "built").touch()
-    return [str(path) for path in sorted(folder.glob("*.deb")) if path.name.startswith(WANTED)]
-
-
-def packages_of_commit(commit):
-    def fill(folder):
-        archive = subprocess.run(["git", "archive", commit], cwd=ROOT, capture_output=True, check=True).stdout
-        subprocess.run(["tar", "-x", "-C", folder], input=archive, check=True)
-
-    return build(OUT / commit[:12], fill)
-
-
-def packages_of_these_sources():
-    kept = ROOT / "build/debian"
-    fingerprint = subprocess.run([ROOT / "scripts/fingerprint"], capture_output=True, text=True, check=False).stdout
-    if fingerprint and (kept / "built").exists() and (kept / "built").read_text().split()[:1] == fingerprint.split():
-        return [str(path) for path in sorted(kept.glob("first/*.deb")) if path.name.startswith(WANTED)]
-    files = [
-        name for name in git("ls-files", "-z", "-co", "--exclude-standard").split("\0") if name and (ROOT / name).is_file() and not (ROOT / name).is_symlink()
-    ]
-    digest = hashlib.sha256()
-    for name in sorted(name for name in files if not name.startswith("test/")):
-        digest.update(name.encode() + b"\0" + (ROOT / name).read_bytes())
-    folder = OUT / f"now-{digest.hexdigest()[:12]}"
-    for other in OUT.glob("now-*"):
-        if other != folder:
-            shutil.rmtree(other)
-
-    def fill(target):
-        subprocess.run(["xargs", "-0", "cp", "-p", "--parents", "-t", target], cwd=ROOT, input="\0".join(files).encode(), check=True)
-
-    return build(folder, fill)
+        EVIDENCE.failures.append(verdict.Failure(f"{sentence}: {detail}", verdict.RULE if rule else verdict.kind_of(str(detail))))
+    print(f"{'ok     ' if good else 'FAILED '} {sentence}")
 
 
 # ---- the copy of this system ---------------------------------------------------------------------------------------
@@ -218,7 +107,6 @@ class Machine:
         systemctl.write_text(MANAGER)
         systemctl.chmod(0o755)
         (self.root / "tmp/driver.py").write_text(DRIVER)
-        self.children = []
         self.run("dpkg", "--purge", *(name.rstrip("_") for name in WANTED), "libiwheel-client-dev")
 
     def run(self, *command):
@@ -234,7 +122,7 @@ class Machine:
 
     def start(self, *command):
         with open(self.root / "run/wheels/out", "ab") as out:
-            child = subprocess.Popen(
+            return subprocess.Popen(
                 self.inside(command),
                 stdin=subprocess.DEVNULL,
                 stdout=out,
@@ -242,8 +130,6 @@ class Machine:
                 env=self.environment(),
                 preexec_fn=lambda: os.setpriority(os.PRIO_PROCESS, 0, -10),
             )
-        self.children.append(child)
-        return child
 
     def install(self, packages, *options):
         names = []
@@ -276,16 +162,14 @@ class Machine:
         return os.path.exists(f"/proc/{self.pid()}/exe")
 
     def close(self):
-        if counts["failed"] or sys.exc_info()[0]:
-            for name in ("asked", "gateway.out", "out"):
-                path = self.root / "run/wheels" / name
-                print(f"---- {name}", path.read_text()[-1500:] if path.exists() else "", sep="\n")
-        pid = self.pid()
-        if pid and os.path.exists(f"/proc/{pid}"):
-            os.kill(pid, signal.SIGKILL)
-        for child in self.children:
-            child.kill()
-            child.wait()
+        for name in ("asked", "gateway.out", "out"):
+            path = self.root / "run/wheels" / name
+            print(f"---- {name}", path.read_text()[-1500:] if path.exists() else "", sep="\n")
+        mine = os.readlink("/proc/self/ns/mnt")
+        for process in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                if process.name != str(os.getpid()) and os.readlink(process / "ns/mnt") == mine:
+                    os.kill(int(process.name), signal.SIGKILL)
         subprocess.run(["umount", "--recursive", "--lazy", self.folder], check=False)
         self.folder.rmdir()
 
@@ -293,7 +177,7 @@ class Machine:
 def mount(*arguments):
     done = subprocess.run(["mount", *map(str, arguments)], capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        skip(f"mount {' '.join(map(str, arguments))}: {done.stderr.strip()}")
+        pytest.skip(f"mount {' '.join(map(str, arguments))}: {done.stderr.strip()}")
 
 
 def sums(folder):
@@ -532,76 +416,64 @@ def conffiles(machine, old, new):
     )
 
 
-def test(old, new):
-    versions = [re.search(r"iwheel-gateway_([^_]+)_", " ".join(packages))[1] for packages in (old, new)]
-    machine = Machine()
-    try:
-        code, said = machine.install(old)
-        judge(f"{versions[0]} is installed", code == 0, said[-800:])
-        (machine.root / CONF).write_text(EDITED)
-        machine.start("iwheel-sim", "--quiet", "--can", "unix:/run/wheels/bus", "--estop", "/run/wheels/button", "--control", "/run/wheels/control")
-        while not (machine.root / "run/wheels/button").exists():
-            time.sleep(0.05)
-        machine.run("chmod", "-R", "a+rwX", "/run/wheels")
-        bus = Bus(str(machine.root / "run/wheels/bus"))
-        machine.run("systemctl", "start", "iwheel-gateway.service")
-        live_some(machine)
-        before = facts(machine)
-        old_tool, new_tool = keep_tool(machine, old, "old"), keep_tool(machine, new, "new")
-        talk_across(machine, new_tool, f"iwheelctl {versions[1]} with the gateway {versions[0]}")
-        change_in_motion(machine, bus, new, versions[1], "upgrade")
-        kept(machine, "upgrade", before)
-        replays = [machine.run("iwheelctl", "replay", f"/var/lib/iwheel/{name}") for name in before["recordings"] if name.endswith(".log")]
-        same = bool(replays) and all(code == 0 for code, _ in replays)
-        judge(
-            "upgrade: the new version replays the old recordings, with the same decisions",
-            same,
-            (sorted(before["recordings"]), [said[-500:] for _, said in replays]),
-        )
-        talk_across(machine, old_tool, f"iwheelctl {versions[0]} with the gateway {versions[1]}")
-        before = facts(machine)
-        change_in_motion(machine, bus, old, versions[0], "downgrade")
-        kept(machine, "downgrade", before)
-        killed_in_motion(machine, bus, new, "upgrade")
-        killed_in_motion(machine, bus, old, "downgrade")
-        refused_now(machine, old, new)
-        track_is_missing(machine, old, new)
-        bus.close()
-        conffiles(machine, old, new)
-    finally:
-        machine.close()
+@pytest.fixture
+def evidence():
+    return EVIDENCE
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--from", dest="commit", help="the commit to upgrade from, instead of that of the version before")
-    parser.add_argument("--build", action="store_true", help="only build the packages")
-    parser.add_argument("--inside", nargs=2, help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.inside:
-        session = verdict.run_all(["upgrade"], lambda _: attempt(*(json.loads(packages) for packages in arguments.inside)), tell=lambda *_: None)
-        counts["skipped"] += bool(session.inconclusive)
-        end(session.inconclusive)
+@pytest.fixture
+def machine():
     if os.geteuid() != 0:
-        skip("only root can install packages, even in a copy of this system")
+        pytest.skip("only root can install packages, even in a copy of this system")
     if not any(line.split()[4] == "/" for line in Path("/proc/self/mountinfo").read_text().splitlines()):
-        skip("the root folder is no mount point, as in a plain chroot, so its mounts cannot be kept apart; bind it first: mount --bind DIR DIR")
-    for tool in ("dh", "dpkg-buildpackage", "unshare", "systemd-sysusers", "setpriv"):
+        pytest.skip("the root folder is no mount point, as in a plain chroot, so its mounts cannot be kept apart; bind it first: mount --bind DIR DIR")
+    for tool in ("systemd-sysusers", "setpriv"):
         if not shutil.which(tool):
-            skip(f"{tool} is missing (scripts/install_tools check brings it)")
-    version = version_before()
-    commit = git("rev-parse", "--verify", f"{arguments.commit}^{{commit}}").strip() if arguments.commit else release_of(version)
-    if not commit:
-        skip(f"the history here does not reach back to {arguments.commit or version}: a full clone has it (git fetch --unshallow)")
-    OUT.mkdir(parents=True, exist_ok=True)
-    with open(OUT / "lock", "w", encoding="utf-8") as lock:  # The one that builds them may be still at it.
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        old, new = packages_of_commit(commit), packages_of_these_sources()
-    if arguments.build:
-        return
-    sys.stdout.flush()
-    os.execvp("unshare", ["unshare", "--mount", "--propagation", "private", sys.executable, __file__, "--inside", json.dumps(old), json.dumps(new)])
+            pytest.skip(f"{tool} is missing (scripts/install_tools check brings it)")
+    assert ctypes.CDLL(None).unshare(CLONE_NEWNS) == 0
+    mount("--make-rprivate", "/")
+    one = Machine()
+    yield one
+    one.close()
 
 
-if __name__ == "__main__":
-    main()
+@pytest.mark.limit(3600)
+def test_upgrade(evidence, machine, record_property):
+    try:
+        old, new = of_both()
+    except Missing as why:
+        pytest.skip(str(why))
+    versions = [re.search(r"iwheel-gateway_([^_]+)_", " ".join(files))[1] for files in (old, new)]
+    code, said = machine.install(old)
+    judge(f"{versions[0]} is installed", code == 0, said[-800:])
+    (machine.root / CONF).write_text(EDITED)
+    machine.start("iwheel-sim", "--quiet", "--can", "unix:/run/wheels/bus", "--estop", "/run/wheels/button", "--control", "/run/wheels/control")
+    while not (machine.root / "run/wheels/button").exists():
+        time.sleep(0.05)
+    machine.run("chmod", "-R", "a+rwX", "/run/wheels")
+    bus = Bus(str(machine.root / "run/wheels/bus"))
+    machine.run("systemctl", "start", "iwheel-gateway.service")
+    live_some(machine)
+    before = facts(machine)
+    old_tool, new_tool = keep_tool(machine, old, "old"), keep_tool(machine, new, "new")
+    talk_across(machine, new_tool, f"iwheelctl {versions[1]} with the gateway {versions[0]}")
+    change_in_motion(machine, bus, new, versions[1], "upgrade")
+    kept(machine, "upgrade", before)
+    replays = [machine.run("iwheelctl", "replay", f"/var/lib/iwheel/{name}") for name in before["recordings"] if name.endswith(".log")]
+    same = bool(replays) and all(code == 0 for code, _ in replays)
+    judge(
+        "upgrade: the new version replays the old recordings, with the same decisions",
+        same,
+        (sorted(before["recordings"]), [said[-500:] for _, said in replays]),
+    )
+    talk_across(machine, old_tool, f"iwheelctl {versions[0]} with the gateway {versions[1]}")
+    before = facts(machine)
+    change_in_motion(machine, bus, old, versions[0], "downgrade")
+    kept(machine, "downgrade", before)
+    killed_in_motion(machine, bus, new, "upgrade")
+    killed_in_motion(machine, bus, old, "downgrade")
+    refused_now(machine, old, new)
+    track_is_missing(machine, old, new)
+    bus.close()
+    conffiles(machine, old, new)
+    record_property("tests", len(JUDGED))
