@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Drives for a stated time, then stops: one command for a person at a keyboard.
 

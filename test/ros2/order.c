@@ -244,6 +244,10 @@ static void test_ros_estop_topic_shows_the_line_once_for_each_change(void) {
     pass(300);
     TEST_ASSERT_EQUAL_INT(1, estop_shown);
     TEST_ASSERT_EQUAL_UINT(4, estop_count);
+    daemon_rig.estop = 0;
+    pass(300);
+    bridge_step(&bridge); // Takes what waits.
+    TEST_ASSERT_EQUAL_INT(0, estop_shown);
     (void)snprintf(bridge.facts.machine.estop, sizeof bridge.facts.machine.estop, "none");
     bridge.facts.link = ROS_LINK_SILENT;
     bridge_step(&bridge);

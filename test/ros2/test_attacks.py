@@ -195,3 +195,64 @@ def other_machine(t):
         t.judge(ride.rig)
     finally:
         cable.close()
+
+
+CROWD = """
+import sys, time
+sys.path[:0] = sys.argv[3:]
+from peer import Peer, DataWriter, Topic, Qos, Policy
+peer = Peer(int(sys.argv[1]))
+topics = [Topic(peer.participant, f"rt/crowd{i}", peer.types.of("std_msgs/msg/String")) for i in range(4)]
+qos, writers = Qos(Policy.Userdata(b"x" * 8000)), []
+for number in range(int(sys.argv[2])):
+    writers.append(DataWriter(peer.participant, topics[number % 4], qos))
+    time.sleep(0.002)
+print("announced", flush=True)
+time.sleep(60)
+"""
+
+
+@scenario("4,000 announced writers with 8 kB of user data each: memory is bounded, and a stop works", 60)
+def announced_crowd(t):
+    ride = Ride(t)
+    stream = ride.driving()
+    before_kB = ride.bridge.resident_kB()
+    command = [sys.executable, "-c", CROWD, str(ride.domain), "4000", HERE, *sys.path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        try:
+            t.check(child.stdout.readline().strip() == "announced", "4,000 writers")
+            time.sleep(2)
+            after_kB = ride.bridge.resident_kB()
+            t.check(after_kB < 40_000, f"{before_kB} kB became {after_kB} kB; 8 kB for each would be {before_kB + 32_000}")
+            t.figure(f"{before_kB} to {after_kB} kB")
+            t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
+        finally:
+            child.kill()
+    stream.stop()
+    ride.silence()
+    t.judge(ride.rig)
+
+
+@scenario("20,000 samples that nobody can read, and texts of 60 kB: the log and the memory are bounded, a publisher drives", 40)
+def garbage_at_1_khz(t):
+    ride = Ride(t)
+    odd = make_idl_struct("Twist_", "geometry_msgs::msg::dds_::Twist_", {"data": str})
+    bad = Writer.of(ride.peer, Topic(ride.peer.participant, ride.peer.topic("cmd_vel"), odd))
+    ask = ride.peer.writer("iwheel/ask", "std_msgs/msg/String")
+    bad.await_match()
+    ask.await_match()
+    words = ride.peer.make("std_msgs/msg/String", data="arm" + "x" * 60_000)
+    for number in range(20_000):
+        bad.write(odd(data="somebody's own type"))
+        if number % 20 == 0:
+            ask.write(words)
+            time.sleep(0.005)
+    text, size_kB = ride.bridge.text(), ride.bridge.resident_kB()
+    t.check(len(text) < 20_000, f"{len(text)} bytes of log: {text[-600:]}")
+    t.check(size_kB < 40_000, f"{size_kB} kB")
+    t.rule(ride.client.request("status")["state"] == "listening", "nobody has armed")
+    t.figure(f"{len(text)} bytes of log, {size_kB} kB")
+    stream = ride.driving()
+    stream.stop()
+    ride.silence()
+    t.judge(ride.rig)

@@ -144,6 +144,32 @@ def typed_services_cyclonedds(t):
     services(t, "cyclonedds")
 
 
+FLIGHT = """
+import sys, time, rclpy
+from std_srvs.srv import Trigger
+rclpy.init()
+node = rclpy.create_node("many")
+clients = [node.create_client(Trigger, f"/iwheel/{verb}") for verb in ("stop", "reset", "arm", "stop", "stop")]
+for client in clients:
+    client.wait_for_service(10)
+futures = [client.call_async(Trigger.Request()) for _ in range(4) for client in clients]
+end = time.monotonic() + 8
+while time.monotonic() < end and not all(future.done() for future in futures):
+    rclpy.spin_once(node, timeout_sec=0.05)
+print(sum(future.done() for future in futures), "answered of", len(futures))
+print(sum(future.done() and future.result().success for index, future in enumerate(futures) if index % 5 in (0, 3, 4)), "stops")
+"""
+
+
+@scenario("20 calls of five service clients in flight: each is answered, each stop is done (Fast DDS)", 20)
+def calls_in_flight(t):
+    typed = Typed(t)
+    done = subprocess.run([typed.jazzy.python, "-c", FLIGHT], env=typed.jazzy.environment, capture_output=True, text=True, timeout=60, check=False)
+    t.check("20 answered of 20" in done.stdout and "12 stops" in done.stdout, f"{done.stdout} {done.stderr[-300:]}")
+    typed.ride.silence()
+    t.judge(typed.ride.rig, moves=False)
+
+
 PUBLISHED = {
     'ros2 topic pub -r 20 /cmd_vel geometry_msgs/msg/Twist "{linear: {x: 0.2}}"': ("commands are refused", 1),
     'ros2 topic pub -r 20 /cmd_vel geometry_msgs/msg/TwistStamped "{twist: {linear: {x: 0.2}}}"': ("commands are refused", 1),

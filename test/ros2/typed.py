@@ -14,7 +14,7 @@ from rclpy.duration import Duration
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-DISCOVERY_S = 3.0
+DISCOVERY_S = 2.0
 WAIT_S = 8.0
 
 

@@ -248,6 +248,7 @@ ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, 
     }
     self->settings = *settings;
     name_robot(self);
+    ros_limit_log();
     self->came = came;
     self->context = context;
     self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);

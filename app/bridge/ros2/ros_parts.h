@@ -77,6 +77,9 @@ dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool ret
 dds_entity_t ros_reader(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react);
 dds_entity_t ros_writer(ros_t *self, dds_entity_t topic, dds_qos_t *qos);
 
+/// Bounds what CycloneDDS writes to stderr.
+void ros_limit_log(void);
+
 /// Makes `ros_fd` readable; for a reader that has something.
 void ros_wake(dds_entity_t reader, void *context);
 

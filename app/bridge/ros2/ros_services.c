@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
+#include "announced.h"
 #include "common/bridge_service.h"
 #include "firsts.h"
 #include "ros_parts.h"
@@ -92,13 +93,15 @@ static struct {
     rtps_firsts_t firsts;
 } in = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/// In the place of libc's, for the whole process: CycloneDDS asks for what a new writer of Fast DDS wrote before it was known.
+/// In the place of libc's, for the whole process: CycloneDDS asks for what a new writer of Fast DDS wrote before it was known,
+/// and stores little of what strangers announce.
 ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     const ssize_t came = (ssize_t)syscall(SYS_recvmsg, fd, message, flags);
     if (came <= 0 || message->msg_iovlen != 1 || (message->msg_flags & MSG_TRUNC) != 0) {
         return came;
     }
     const struct iovec *room = &message->msg_iov[0];
+    rtps_drop_large_data(room->iov_base, (size_t)came);
     (void)pthread_mutex_lock(&in.lock);
     const size_t length =
         rtps_await_firsts(&in.firsts, (int64_t)bridge_now_us(), room->iov_base, (size_t)came, room->iov_len);

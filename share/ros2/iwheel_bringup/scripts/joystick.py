@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Drives by a gamepad with a deadman: topic `joy` in, `cmd_vel` out at 20 Hz.
 
