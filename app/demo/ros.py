@@ -12,8 +12,9 @@ import sys
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("system", "ros2")]
+sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("support", "system", "ros2")]
 
+from free_domain import free_domain
 from harness import Process, Rig
 from peer import Peer
 
@@ -136,7 +137,7 @@ def main():
     parser.add_argument("--build", required=True)
     parser.add_argument("--plain", action="store_true")
     options = parser.parse_args()
-    domain = 1 + os.getpid() % 230
+    domain = free_domain()
     rig = Rig(options.build, CONFIG)
     view = View(options.plain)
     try:

@@ -5,7 +5,6 @@ iwheel-web has no client and iwheel-ros2 no reader; iwheel-mqtt sends every stat
 that arrive together, so they are compared with limits.
 """
 
-import os
 import shutil
 import signal
 import socket
@@ -15,6 +14,7 @@ import time
 from pathlib import Path
 
 import loop
+from free_domain import free_domain
 
 START_S = 30
 SETTLE_S = 7.0  # iwheel-web keeps its full rate for 5 s after it has connected.
@@ -43,7 +43,7 @@ def settings(build, name, pair, folder, port):
     if name == "iwheel-mqtt":
         (folder / "spool").mkdir(mode=0o700)
         return gateway + f"[machine]\nid = bench\n[broker]\nport = {port}\n[state]\nevery_ms = 100\n[spool]\ndirectory = {folder}/spool\n"
-    return gateway + f"[ros]\ndomain = {1 + os.getpid() % 230}\nnetwork = loopback\n"
+    return gateway + f"[ros]\ndomain = {free_domain()}\nnetwork = loopback\n"
 
 
 def await_words(path, words):

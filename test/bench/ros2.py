@@ -16,9 +16,10 @@ import subprocess
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("system", "ros2")]
+sys.path[:0] = [os.path.join(ROOT, "test", part) for part in ("support", "system", "ros2")]
 
 from bus import now_us
+from free_domain import free_domain
 from harness import Process, Rig
 from judge_log import percentile
 from peer import Peer
@@ -99,7 +100,7 @@ def main():
     rig = Rig(options.build, CONFIG)
     try:
         rig.start_gateway()
-        domain = 1 + os.getpid() % 230
+        domain = free_domain()
         with open(rig.path("ros2.conf"), "w", encoding="utf-8") as file:
             file.write(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[ros]\ndomain = {domain}\nnetwork = loopback\n")
         preload = rig.path("stamps.so")

@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: MIT
 // The node itself, without a bridge: what it opens, as the kernel reports it.
 #include "common/reach.h"
+#include "free_domain.h"
 #include "raw.h"
 #include "ros.h"
 
 #include "unity.h"
 
 #include <stdlib.h>
-#include <unistd.h>
 
 static ros_settings_t settings;
 static ros_t *ros;
 
 void setUp(void) {
+    static uint32_t domain;
+    domain = (domain == 0U) ? free_domain() : domain;
+    TEST_ASSERT_NOT_EQUAL_UINT32(0, domain);
     settings = ros_settings_standard;
-    settings.ros.domain = 1U + (uint32_t)getpid() % 230U;
+    settings.ros.domain = domain;
 }
 
 void tearDown(void) {

@@ -9,6 +9,7 @@ import threading
 import time
 
 from bus import now_us
+from free_domain import free_domain
 from harness import Process, wait_connect
 from judge_log import Event
 from peer import Peer
@@ -121,10 +122,11 @@ class Ride:
 
     def __init__(self, t, settings=None, config=None, gateway=True, start=True, **options):
         self.t, self.rig = t, t.rig({**PATIENT, **(config or {})}, **options)
-        self.domain = 1 + os.getpid() % 230
-        self.settings = {"gateway": {"socket": self.rig.path("tap.sock")}, "ros": {"domain": self.domain, "network": "loopback"}}
+        self.settings = {"gateway": {"socket": self.rig.path("tap.sock")}, "ros": {"network": "loopback"}}
         for section, keys in (settings or {}).items():
             self.settings.setdefault(section, {}).update(keys)
+        ros = self.settings["ros"]
+        self.domain = ros["domain"] = ros.get("domain") or free_domain()
         self.tap = Tap(self.rig.path("tap.sock"), self.rig.path("gateway.sock"), self.rig.timeline)
         self.conf = self.rig.path("ros2.conf")
         with open(self.conf, "w", encoding="utf-8") as file:
@@ -136,7 +138,6 @@ class Ride:
         self.bridge = None
         if start:
             self.start_bridge()
-        ros = self.settings["ros"]
         self.peer = Peer(self.domain, ros.get("namespace", ""), ros.get("release", "jazzy").upper())
         self.state = self.peer.reader("iwheel/state", "std_msgs/msg/String", depth=50, kept=True)
         self.diagnostics = self.peer.reader("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", depth=50)

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+"""A DDS domain for one test. free_domain.h chooses one in the same way."""
+
+import socket
+
+HELD = []
+
+
+def free_domain():
+    """A domain that no other test on this machine uses while this process runs. Above 100, its ports are those that the kernel gives to any socket."""
+    for domain in range(1, 101):
+        held = socket.socket(socket.AF_UNIX)
+        try:
+            held.bind(f"\0iwheel-test-domain-{domain}")
+        except OSError:
+            held.close()
+            continue
+        HELD.append(held)  # The name is free again when the process has ended.
+        return domain
+    raise RuntimeError("each of the domains 1 to 100 is in use by a test")
