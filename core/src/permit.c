@@ -49,12 +49,12 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->diverged_us[0] = IW_NEVER;
     self->diverged_us[1] = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
-    self->keeps = config->hold;
+    self->latch_until_release = config->hold;
     // Fault 25: after a crash in ARMED the wheels hold the last command until their own watchdog ends it.
     if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
-        self->kept = self->keeps;
+        self->until_release = self->latch_until_release;
         self->stop.cause = IW_CAUSE_RESTART;
         self->stop.at_once = true;
         self->stop.at_us = now_us;
@@ -138,7 +138,7 @@ static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_u
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     // The client that released the hold before did not know of this latch.
-    self->kept = self->keeps;
+    self->until_release = self->latch_until_release;
     self->at_once = is_at_once(event);
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
@@ -160,7 +160,9 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
 /// controller. More of them show a second master that drives, and the hold ends (fault 25).
 static void count_stranger(iw_permit_t *self) {
     self->strangers++;
-    self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
+    if (self->strangers > LEFT_BEHIND_MAX) {
+        self->phase = IW_PHASE_LISTENING;
+    }
 }
 
 /// Handles a cause that neither latches nor stops a holder: it ends arming.
@@ -252,7 +254,8 @@ static bool is_holding(iw_phase_t phase) {
 
 /// R19: a machine on a slope must not roll because time has passed.
 bool iw_permit_holding(const iw_permit_t *self) {
-    return self->kept && (self->phase == IW_PHASE_HOLDING || self->phase == IW_PHASE_CUT) && !is_contested(self);
+    return self->until_release && (self->phase == IW_PHASE_HOLDING || self->phase == IW_PHASE_CUT) &&
+           !is_contested(self);
 }
 
 /// Returns the phase after the zeros.
@@ -260,7 +263,7 @@ static iw_phase_t after_hold(const iw_permit_t *self) {
     if (self->phase == IW_PHASE_CUT) {
         return IW_PHASE_LATCHED;
     }
-    return (self->phase == IW_PHASE_RESTARTING && self->kept) ? IW_PHASE_HOLDING : IW_PHASE_LISTENING;
+    return (self->phase == IW_PHASE_RESTARTING && self->until_release) ? IW_PHASE_HOLDING : IW_PHASE_LISTENING;
 }
 
 /// Sends zeros for `zero_hold_ms` and until the wheels are at standstill, but at most `hold_max_s`. Otherwise a wheel
@@ -279,7 +282,9 @@ static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
     // The end of zeros for a moving wheel is an event that the operator must see.
     const bool gives_up = held_us >= longest_us(self) && !self->view.settled;
-    self->still_moving += gives_up ? 1U : 0U;
+    if (gives_up) {
+        self->still_moving++;
+    }
     if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
         self->phase = after_hold(self);
         // Setpoints that the dead process left in its controller do not count as a second master in the next hold.
@@ -322,8 +327,8 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
     self->phase = (self->phase == IW_PHASE_LISTENING) ? IW_PHASE_ARMING : IW_PHASE_REARMING;
     self->arming_us = now_us;
     self->arm_refusal = IW_REFUSE_NONE;
-    self->keeps = self->config->hold;
-    self->kept = self->keeps;
+    self->latch_until_release = self->config->hold;
+    self->until_release = self->latch_until_release;
 }
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
@@ -379,8 +384,8 @@ void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, 
         self->stop.client = client;
     }
     if (cause == IW_CAUSE_SHUTDOWN) {
-        self->keeps = false;
-        self->kept = false;
+        self->latch_until_release = false;
+        self->until_release = false;
     }
 }
 
@@ -405,7 +410,7 @@ iw_refusal_t iw_permit_release(iw_permit_t *self) {
     if (!is_holding(self->phase) && iw_permit_demand(self) != IW_DEMAND_SILENCE) {
         return IW_REFUSE_NOT_AT_REST;
     }
-    self->kept = false;
+    self->until_release = false;
     return IW_REFUSE_NONE;
 }
 
