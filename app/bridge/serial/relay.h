@@ -52,7 +52,7 @@ typedef enum { RELAY_FREE, RELAY_NEW, RELAY_OPENING, RELAY_WELCOMED } relay_chan
 typedef struct {
     relay_channel_state_t state;
     iw_client_t client; ///< IW_CLIENT_NONE in FREE.
-    bool watch;
+    bool watch;         ///< It is connected to the watch socket, in any state: its requests may only watch.
     bool close_due; ///< A close must be sent for the client before, in any state: the next client may already be there.
     bool granted;   ///< It has requested a lease, in any state: commands may follow.
     uint64_t since_us;   ///< Time of its connection.
