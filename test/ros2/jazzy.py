@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A real ROS 2: Jazzy's rclpy as ./check installs it, with ros2cli and rmw_cyclonedds_cpp where somebody has installed them.
+"""A real ROS 2: rclpy of Jazzy or Kilted as ./check installs it, with ros2cli and rmw_cyclonedds_cpp where somebody has installed them.
 
-IWHEEL_ROS: its folder (default build/ros-jazzy). IWHEEL_ROS2CLI: a folder of Python modules with ros2cli and its commands; without it the same
+IWHEEL_ROS: its folder (default build/ros-jazzy; build/ros-kilted is Kilted). IWHEEL_ROS2CLI: a folder of Python modules with ros2cli and its commands; without it the same
 commands go through rclpy (typed.py). IWHEEL_RMW_CYCLONEDDS: librmw_cyclonedds_cpp.so of Jazzy; without it that vendor's tests are skipped.
 """
 
@@ -18,23 +18,27 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
 PROFILE = os.path.join(ROOT, "share", "ros2", "fastdds-loopback.xml")
 SHARE = "/usr/share/iwheel-ros2/"  # As the pages write it; in the tree it is share/ros2.
+PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # Fast DDS 2 (Jazzy) and 3 (Kilted).
 CLI = "import sys; from ros2cli.cli import main; sys.exit(main())"
 
 
 class Jazzy:
     def __init__(self, domain, vendor="fastrtps", profile=True):
-        self.folder = os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy"))
+        self.folder = os.path.abspath(os.environ.get("IWHEEL_ROS", os.path.join(ROOT, "build", "ros-jazzy")))
+        release = os.path.basename(self.folder)
         self.python = os.path.join(self.folder, "bin", "python")
         if not os.path.exists(os.path.join(self.folder, "lib", "librmw_fastrtps_cpp.so")):
-            raise Skip("no ROS 2 Jazzy: PYTHON=python3.11 scripts/python_packages build/ros-jazzy requirements/ros-jazzy.txt installs it in a minute")
-        dropped = ("PYTHONPATH", "CYCLONEDDS_URI", "FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_DOMAIN_ID")
+            raise Skip(
+                f"no ROS 2 in {self.folder}: PYTHON=python3.11 scripts/python_packages build/{release} requirements/{release}.txt installs it in a minute"
+            )
+        dropped = ("PYTHONPATH", "CYCLONEDDS_URI", *PROFILES, "ROS_DOMAIN_ID")
         self.environment = {
             **{name: value for name, value in os.environ.items() if name not in dropped},
             "ROS_DOMAIN_ID": str(domain), "AMENT_PREFIX_PATH": self.folder, "LD_LIBRARY_PATH": os.path.join(self.folder, "lib"),
             "RMW_IMPLEMENTATION": f"rmw_{vendor}_cpp", "PYTHONUNBUFFERED": "1",
         }  # fmt: skip
         if profile:
-            self.environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = PROFILE
+            self.environment.update(dict.fromkeys(PROFILES, PROFILE))
         if vendor == "cyclonedds":
             library = os.environ.get("IWHEEL_RMW_CYCLONEDDS", "")
             if not os.path.exists(library):

@@ -88,6 +88,8 @@ GRAPH = {
 def graph(t, vendor):
     typed = Typed(t, vendor)
     for command, parts in GRAPH.items():
+        if "topic info" in command and "kilted" in typed.jazzy.folder:  # Fast DDS 3 does not find the node of a CycloneDDS writer.
+            parts = tuple(part.replace("iwheel", "_CREATED_BY_BARE_DDS_APP_") for part in parts)
         said = typed.expect(command, *parts)
         if command == "ros2 topic echo --once /odom":
             t.check(not re.search(r"\b(nan|inf)\b", said), f"finite numbers: {said[:400]}")
