@@ -267,8 +267,8 @@ TEST(test_diagnosis_without_a_fault_is_ok) {
 
 TEST(test_diagnosis_gateway_offline_is_an_error_others_stale) {
     facts.link = ROS_LINK_GONE;
-    (void)snprintf(facts.trouble, sizeof facts.trouble, "nobody listens");
-    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "nobody listens");
+    (void)snprintf(facts.trouble, sizeof facts.trouble, "no program listens");
+    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "no program listens");
     expect(ROS_TELLS_LEFT, ROS_STALE, "gone");
     facts.link = ROS_LINK_SILENT;
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "does not answer");
