@@ -51,7 +51,7 @@ void settings_complain(settings_report_t *report, unsigned line, const char *for
 
 static int finish(const settings_report_t *report) {
     if (report->errors > SETTINGS_ERRORS_SHOWN) {
-        (void)fprintf(report->err, "%s: %u more errors are not shown; mend these first\n", report->name,
+        (void)fprintf(report->err, "%s: %u more errors are not shown; fix these first\n", report->name,
                       report->errors - SETTINGS_ERRORS_SHOWN);
     }
     return (report->errors == 0U) ? 0 : SETTINGS_ERROR;
@@ -219,9 +219,9 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
     const char *hint = (loader->form->hint != NULL) ? loader->form->hint(key) : NULL;
     const settings_key_t *elsewhere = settings_find(loader->form, NULL, key);
     if (key[0] == '\0') {
-        settings_complain(loader->report, loader->line, "no key stands before the '='; write KEY = VALUE");
+        settings_complain(loader->report, loader->line, "there is no key before the '='; write KEY = VALUE");
     } else if (section[0] == '\0') {
-        settings_complain(loader->report, loader->line, "%s stands before any section; put it under [%s]", key,
+        settings_complain(loader->report, loader->line, "%s is before any section; put it under [%s]", key,
                           (elsewhere != NULL) ? elsewhere->section : "its section");
     } else if (elsewhere != NULL) {
         settings_complain(loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
@@ -252,7 +252,7 @@ static int take_value(void *context, const char *section, const char *key, const
     }
     unsigned *line = &loader->lines[row - loader->form->keys];
     if (*line != 0) {
-        settings_complain(loader->report, loader->line, "%s is here a second time (first on line %u); keep one", key,
+        settings_complain(loader->report, loader->line, "%s is given a second time (first on line %u); delete one", key,
                           *line);
         return 1;
     }

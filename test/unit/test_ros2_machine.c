@@ -344,7 +344,8 @@ TEST(test_diagnosis_unmatched_publisher_is_named_with_the_fix) {
            "1 publishers of /w1/cmd_vel are not received: one sends ackermann_msgs/msg/AckermannDrive; publish "
            "geometry_msgs/msg/Twist, or set [drive] command = both");
     unmatched->policy = "partition";
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "the QoS policy partition of a publisher of ackermann_msgs/msg/AckermannDrive");
+    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+           "the QoS policy partition of a publisher of ackermann_msgs/msg/AckermannDrive");
     *unmatched = (ros_unmatched_t){.topic = "/cmd_vel", .elsewhere = "/diff_drive/cmd_vel"};
     expect(ROS_TELLS_COMMANDS, ROS_OK, "no publisher of /cmd_vel, but /diff_drive/cmd_vel has one: remap it");
     facts.commands.publishers = 1;

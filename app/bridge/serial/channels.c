@@ -109,7 +109,7 @@ static const char *too_late(const relay_t *self, const relay_channel_t *channel,
         return "the relay was stopped or starved while this waited, so it was not sent; ask again";
     }
     if (kind == SERIAL_MOVES && came_us < channel->armed_us) {
-        return "this command was sent before arm was answered; wait for that answer, then command anew";
+        return "this command was sent before the reply to arm; wait for that reply, then send a new command";
     }
     if (kind == SERIAL_MOVES && self->now_us - came_us >= SERIAL_FRESH_US) {
         return "this command waited too long behind earlier ones; send no faster than they are answered";
