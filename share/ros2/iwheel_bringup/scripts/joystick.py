@@ -3,8 +3,8 @@
 
 The node publishes speeds while the deadman button is held and the gamepad has reported a change within `report_timeout` seconds. A wireless gamepad whose
 link has died reports nothing, with the button held or not. A stick that is held still reports nothing either: move it slightly. After the timeout, and
-when the button is released, the node publishes zeros for half a second, then nothing. To drive again, release the button once. The node never arms: call
-iwheel/arm.
+when the button is released, the node publishes zeros for half a second, then nothing. To drive again, release the button once. The node
+never arms: call iwheel/arm.
 """
 
 import math
