@@ -50,7 +50,7 @@ struct bridge_stop {
 bool bridge_stop_open(bridge_stop_t *self, const char *socket, int epoll_fd);
 void bridge_stop_close(bridge_stop_t *self);
 
-/// Connects, sends, reads, and gives up requests without an answer.
+/// Connects, sends, reads, and drops requests whose reply is overdue.
 void bridge_stop_step(bridge_stop_t *self, uint64_t now_us);
 uint64_t bridge_stop_next_us(const bridge_stop_t *self, uint64_t now_us);
 

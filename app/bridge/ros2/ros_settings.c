@@ -23,7 +23,7 @@ static const char *wrong_name(const char *text) {
     for (; *text != '\0'; text++) {
         const unsigned char c = (unsigned char)*text;
         if ((first && isdigit(c)) || (!isalnum(c) && c != '_' && (c != '/' || first || text[1] == '\0'))) {
-            return "no name for ROS; use letters, digits and _, no digit or / first";
+            return "is not a valid name for ROS; use letters, digits and _, no digit or / first";
         }
         first = c == '/';
     }
