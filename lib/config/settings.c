@@ -224,7 +224,7 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
         settings_complain(loader->report, loader->line, "%s is before any section; put it under [%s]", key,
                           (elsewhere != NULL) ? elsewhere->section : "its section");
     } else if (elsewhere != NULL) {
-        settings_complain(loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
+        settings_complain(loader->report, loader->line, "%s is not a key of [%s]; move it to [%s]", key, section,
                           elsewhere->section);
     } else if (hint != NULL) {
         settings_complain(loader->report, loader->line, "unknown key %s in [%s]; %s", key, section, hint);
@@ -283,7 +283,7 @@ int settings_parse(const settings_form_t *form, settings_report_t *report, const
 static bool read_file(settings_report_t *report, const char *program, int file, char *out, size_t *out_size) {
     struct stat status;
     if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-        settings_complain(report, 0, "is not a regular file; give the configuration file with -c FILE");
+        settings_complain(report, 0, "is not a regular file; name the configuration file with -c FILE");
         return false;
     }
     *out_size = 0;
@@ -298,7 +298,7 @@ static bool read_file(settings_report_t *report, const char *program, int file, 
         }
         *out_size += (size_t)got;
     }
-    settings_complain(report, 0, "is larger than %u bytes; this is no configuration of %s, give another",
+    settings_complain(report, 0, "is larger than %u bytes; this is not a configuration of %s; use another",
                       SETTINGS_FILE_MAX - 1U, program);
     return false;
 }
@@ -332,7 +332,7 @@ int settings_override(const settings_form_t *form, settings_report_t *report, co
     (void)snprintf(section, sizeof section, "%.*s", (key != NULL) ? (int)(key - name) : 0, name);
     const settings_key_t *row = (key != NULL) ? settings_find(form, section, key + 1) : NULL;
     if (row == NULL) {
-        settings_complain(report, 0, "%s is no key of the configuration; write SECTION.KEY", name);
+        settings_complain(report, 0, "%s is not a key of the configuration; write SECTION.KEY", name);
     } else if (!settings_value_parse(form, row, value, values, why)) {
         settings_complain(report, 0, "%s", why);
     } else if (form->relate != NULL) {

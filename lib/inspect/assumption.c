@@ -288,7 +288,7 @@ const char *inspect_assumption_cure(iw_assumption_item_t item) {
         [IW_ASSUMPTION_GEAR_RATIO] =
             "correct gear_ratio or rpm_of under [wheels], then: systemctl restart iwheel-gateway",
         [IW_ASSUMPTION_POSE_BYTE_ORDER] =
-            "the pose is lost, all else works; send us a recording (iwheelctl record), and if "
+            "the pose is lost, everything else works; send us a recording (iwheelctl record), and if "
             "it came from another device: iwheelctl confirm pose_byte_order",
         [IW_ASSUMPTION_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
                               "it is gone: iwheelctl confirm dlc",

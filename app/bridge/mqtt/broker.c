@@ -157,8 +157,8 @@ static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
     judge_end(self);
     if (!self->told_away) {
-        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); trying for ever\n", self->listener.program,
-                      self->host, self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
+        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); retrying\n", self->listener.program, self->host,
+                      self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
     }
     self->told_away = true;
     mosquitto_destroy(self->client);

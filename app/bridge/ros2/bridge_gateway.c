@@ -30,8 +30,8 @@ void bridge_lose(bridge_t *self, const char *why) {
     self->retry_us = bridge_monotonic_us() + self->backoff_us * 3 / 4 + bridge_monotonic_us() % (self->backoff_us / 2);
     self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
     if (!self->told_gone) {
-        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
-                      self->settings.gateway.socket, why);
+        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; retrying\n", self->settings.gateway.socket,
+                      why);
     }
     self->told_gone = true;
 }

@@ -86,7 +86,7 @@ class _Stream(asyncio.Protocol):
         stream = cls(path, await _connected_socket(path, until))
         try:
             await stream._loop.create_unix_connection(lambda: stream, sock=stream._socket)
-            error = NoAnswer(f"{path}: the gateway did not say hello within {timeout:g} s")
+            error = NoAnswer(f"{path}: the gateway sent no greeting within {timeout:g} s")
             timer = stream._loop.call_later(max(0.0, until - time.monotonic()), _end_wait, stream.hello, error)
             try:
                 await stream.hello
