@@ -19,7 +19,7 @@ static const char *option_of(const sock_listener_t *self) {
     return (self->config.right == SOCK_DRIVE) ? "--socket" : "--watch-socket";
 }
 
-/// `cure` ends at the place of the option's name.
+/// Reports an error. `cure` is the fix up to the name of the option, which the function appends.
 static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *cure) {
     (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, cure,
                   option_of(self));

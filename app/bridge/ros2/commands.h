@@ -34,8 +34,9 @@ ros_twist_verdict_t ros_twist_read(const double linear[3], const double angular[
 ///                                +------------------------+--another's stop--> WAITING
 ///
 /// A person's stop is a stop request through the bridge, also at standstill, when the gateway has nothing to stop. A
-/// stop because the bridge's own source fell silent changes nothing; every other stop is another's. The service arms in
-/// every state, and leads to TRUSTED. In TRUSTED one command after ROS_QUIET_US of zeros or silence requests the lease.
+/// stop because the bridge's own source fell silent changes nothing; every other stop counts as another's. The service
+/// arms in every state, and leads to TRUSTED. In TRUSTED one command after ROS_QUIET_US of zeros or silence requests
+/// the lease.
 typedef enum { ROS_AUTO_TRUSTED = 0, ROS_AUTO_WAITING, ROS_AUTO_STOPPED, ROS_AUTO_RESUMED } ros_auto_state_t;
 
 typedef struct {
