@@ -57,7 +57,7 @@ class Description:
 # The Python client's types -------------------------------------------------------------------------------------------
 
 HEADER = '''# SPDX-License-Identifier: MIT
-"""What the gateway answers, as types. Written by scripts/northbound.py from share/northbound.json; None means unknown."""
+"""Types of the gateway's replies and events. Written by scripts/northbound.py from share/northbound.json; None means unknown."""
 
 from __future__ import annotations
 
@@ -154,11 +154,11 @@ def python_types(description):
 # The C reader's table ------------------------------------------------------------------------------------------------
 
 FIELDS_HEADER = """// SPDX-License-Identifier: MIT
-// The requests and their fields, beside cmd and id. Written by scripts/northbound.py from share/northbound.json.
+// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 #define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 
-/// In the order of iwn_cmd_t.
+/// Names in the order of iwn_cmd_t.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
 MEMBERS = {"side": "sides", "recording.name": "file", "drive.key": "lease_key", "twist.key": "lease_key"}  # Of iwn_request_t, where it is called otherwise.
@@ -186,7 +186,7 @@ def c_fields(description):
             rows.setdefault(row, []).append(f"BIT({cmd.upper()})")
     fields = c_macro("IWN_REQUEST_FIELDS(ROW)", [f"ROW({', '.join(row)}, {' | '.join(bits)})" for row, bits in rows.items()])
     names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd})" for cmd in description.requests])
-    told = "/// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.\n"
+    told = "/// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.\n"
     return f"{FIELDS_HEADER}{names}\n\n{told}{fields}\n\n#endif\n"
 
 

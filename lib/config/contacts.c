@@ -19,7 +19,7 @@ void config_relate_contacts(const gateway_config_t *config, settings_report_t *r
                           line2);
     } else if (strcmp(line, line2) == 0) {
         settings_complain(report, line2_at,
-                          "line and line2 are both %s, and one line shows nothing of a second contact; write the line "
+                          "line and line2 are both %s, so there is no second contact; write the line "
                           "of the other contact, or line2 = none",
                           line2);
     } else if (is_simulated(line) != is_simulated(line2)) {

@@ -20,7 +20,7 @@
 #define RULE(text)                .rule = (text)
 #define TEXT(member, judge)       .kind = SETTINGS_TEXT, .wrong = (judge), AT(member)
 
-#define REST_RULE "rule R15, a wheel that rolls must not count as at rest"
+#define REST_RULE "rule R15, a wheel that rolls must not count as at standstill"
 
 static const settings_word_t release_hold[] = {{"release", 0}, {"hold", 1}, {NULL, 0}};
 static const settings_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};
@@ -120,9 +120,9 @@ static const settings_key_t keys[] = {
     {"limits", "blocked_ms", " ms", CORE(blocked_ms, IW_CONFIG_BLOCKED),
      RULE("rule R13, a blocked wheel must stop the pair")},
     {"limits", "pair_mm", " mm", CORE(pair_mm, IW_CONFIG_PAIR),
-     RULE("rule R14, a machine that turns by itself must stop")},
+     RULE("rule R14, a machine that turns on its own must stop")},
     {"limits", "pair_leak_ms", " ms", CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK),
-     RULE("rule R14, a machine that turns by itself must stop")},
+     RULE("rule R14, a machine that turns on its own must stop")},
     {"limits", "wheel_lag_ms", " ms", CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
     {"limits", "battery_low_dV", " dV", NUMBER(health.battery_low_dV, 10, 254),
      .set = offsetof(gateway_config_t, health.has_battery)},
@@ -253,7 +253,7 @@ static const settings_form_t form = {
     .help = gateway_keys,
     .count = sizeof keys / sizeof keys[0],
     .program = "the gateway",
-    .missing = "create it from share/gateway.conf, or give another with -c FILE",
+    .missing = "create it from share/gateway.conf, or name another with -c FILE",
     .range = find_range,
     .hint = hint,
     .complete = complete,

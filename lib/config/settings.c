@@ -51,7 +51,7 @@ void settings_complain(settings_report_t *report, unsigned line, const char *for
 
 static int finish(const settings_report_t *report) {
     if (report->errors > SETTINGS_ERRORS_SHOWN) {
-        (void)fprintf(report->err, "%s: %u more errors are not shown; mend these first\n", report->name,
+        (void)fprintf(report->err, "%s: %u more errors are not shown; fix these first\n", report->name,
                       report->errors - SETTINGS_ERRORS_SHOWN);
     }
     return (report->errors == 0U) ? 0 : SETTINGS_ERROR;
@@ -219,12 +219,12 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
     const char *hint = (loader->form->hint != NULL) ? loader->form->hint(key) : NULL;
     const settings_key_t *elsewhere = settings_find(loader->form, NULL, key);
     if (key[0] == '\0') {
-        settings_complain(loader->report, loader->line, "no key stands before the '='; write KEY = VALUE");
+        settings_complain(loader->report, loader->line, "there is no key before the '='; write KEY = VALUE");
     } else if (section[0] == '\0') {
-        settings_complain(loader->report, loader->line, "%s stands before any section; put it under [%s]", key,
+        settings_complain(loader->report, loader->line, "%s is before any section; put it under [%s]", key,
                           (elsewhere != NULL) ? elsewhere->section : "its section");
     } else if (elsewhere != NULL) {
-        settings_complain(loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
+        settings_complain(loader->report, loader->line, "%s is not a key of [%s]; move it to [%s]", key, section,
                           elsewhere->section);
     } else if (hint != NULL) {
         settings_complain(loader->report, loader->line, "unknown key %s in [%s]; %s", key, section, hint);
@@ -252,7 +252,7 @@ static int take_value(void *context, const char *section, const char *key, const
     }
     unsigned *line = &loader->lines[row - loader->form->keys];
     if (*line != 0) {
-        settings_complain(loader->report, loader->line, "%s is here a second time (first on line %u); keep one", key,
+        settings_complain(loader->report, loader->line, "%s is given a second time (first on line %u); delete one", key,
                           *line);
         return 1;
     }
@@ -283,7 +283,7 @@ int settings_parse(const settings_form_t *form, settings_report_t *report, const
 static bool read_file(settings_report_t *report, const char *program, int file, char *out, size_t *out_size) {
     struct stat status;
     if (fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-        settings_complain(report, 0, "is not a regular file; give the configuration file with -c FILE");
+        settings_complain(report, 0, "is not a regular file; name the configuration file with -c FILE");
         return false;
     }
     *out_size = 0;
@@ -298,7 +298,7 @@ static bool read_file(settings_report_t *report, const char *program, int file, 
         }
         *out_size += (size_t)got;
     }
-    settings_complain(report, 0, "is larger than %u bytes; this is no configuration of %s, give another",
+    settings_complain(report, 0, "is larger than %u bytes; this is not a configuration of %s; use another",
                       SETTINGS_FILE_MAX - 1U, program);
     return false;
 }
@@ -332,7 +332,7 @@ int settings_override(const settings_form_t *form, settings_report_t *report, co
     (void)snprintf(section, sizeof section, "%.*s", (key != NULL) ? (int)(key - name) : 0, name);
     const settings_key_t *row = (key != NULL) ? settings_find(form, section, key + 1) : NULL;
     if (row == NULL) {
-        settings_complain(report, 0, "%s is no key of the configuration; write SECTION.KEY", name);
+        settings_complain(report, 0, "%s is not a key of the configuration; write SECTION.KEY", name);
     } else if (!settings_value_parse(form, row, value, values, why)) {
         settings_complain(report, 0, "%s", why);
     } else if (form->relate != NULL) {

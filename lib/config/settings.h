@@ -59,7 +59,7 @@ typedef struct {
     const char *not_zero; ///< SETTINGS_NUMBER: reason why 0 is refused, or NULL.
     const char *rule;     ///< SETTINGS_NUMBER: rule that limits the range, for the message; NULL if there is none.
     const settings_word_t *words; ///< SETTINGS_WORD: two or more words; the last one is NULL.
-    /// SETTINGS_TEXT: returns what is wrong with the text, as in "TEXT is no socket", or NULL.
+    /// SETTINGS_TEXT: returns what is wrong with the text, as in "TEXT is not a group name", or NULL.
     const char *(*wrong)(const char *text);
     /// SETTINGS_OWN: stores the value. Returns false, leaves the values unchanged and writes a message to `out_why` if
     /// the value is not valid.
@@ -87,7 +87,7 @@ typedef struct settings_form {
     const settings_key_t *keys;  ///< The keys in the order of printing.
     const settings_help_t *help; ///< Comments of all keys; the last one has a NULL section.
     size_t count;                ///< Number of keys, at most SETTINGS_KEYS_MAX.
-    const char *program;         ///< Name of the program for messages, as in "no configuration of the gateway".
+    const char *program;         ///< Name of the program for messages, as in "not a configuration of the gateway".
     const char *missing;         ///< Fix for a missing file: "create it from share/gateway.conf".
     /// Returns the range of rows that have a `range`; the pointer is NULL if there is none.
     void (*range)(uint16_t range, uint32_t *out_min, uint32_t *out_max);

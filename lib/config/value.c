@@ -134,7 +134,7 @@ static bool parse_mode(const settings_key_t *row, const char *text, uint32_t *ou
         return settings_wrong(out_why, "%s = %s is not an octal file mode; write for example 0660", row->key, text);
     }
     if ((*out_number & OWNER_READ_WRITE) != OWNER_READ_WRITE) {
-        return settings_wrong(out_why, "%s = %s takes the socket from its owner; write for example 0660", row->key,
+        return settings_wrong(out_why, "%s = %s locks the owner out of the socket; write for example 0660", row->key,
                               text);
     }
     return true;

@@ -175,29 +175,30 @@ static void write_figure(iw_assumption_item_t item, const iw_assumption_entry_t 
     case IW_ASSUMPTION_FORCE_UNIT_LEFT:
     case IW_ASSUMPTION_FORCE_UNIT_RIGHT:
     case IW_ASSUMPTION_OFFSET_INCLUDED:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE,
-                       "at rest, raw / offset is %s%d.%03d (about 10 is cN, 1 is dN, 0 is a raw force without offset)",
-                       sign, whole, part);
+        (void)snprintf(
+            out_text, INSPECT_SOURCE_SIZE,
+            "at standstill, raw / offset is %s%d.%03d (about 10 is cN, 1 is dN, 0 is a raw force without offset)", sign,
+            whole, part);
         break;
     case IW_ASSUMPTION_FEEDBACK_SIGN_LEFT:
     case IW_ASSUMPTION_FEEDBACK_SIGN_RIGHT:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "measured %d mm/s while told to go forward", figure);
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "measured %d mm/s while commanded forward", figure);
         break;
     case IW_ASSUMPTION_SETPOINT_TYPE:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the wheels ran at %s%d.%03d of the speed they were told", sign,
-                       whole, part);
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the wheels ran at %s%d.%03d of the commanded speed", sign, whole,
+                       part);
         break;
     case IW_ASSUMPTION_GEAR_RATIO:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the ticks moved %s%d.%03d times as far as the rpm say", sign,
-                       whole, part);
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the ticks moved %s%d.%03d times as far as the rpm", sign, whole,
+                       part);
         break;
     case IW_ASSUMPTION_POSE_BYTE_ORDER:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "read the other way round, the pose moves %s%d.%03d times as far",
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "in the other byte order the pose moves %s%d.%03d times as far",
                        sign, whole, part);
         break;
     case IW_ASSUMPTION_DLC:
     default:
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "a frame of %d bytes was heard%s", figure,
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "received a frame of %d bytes%s", figure,
                        (entry->state == IW_CONTRADICTED) ? "; the table has another length" : ", as in the table");
         break;
     }
@@ -213,7 +214,7 @@ static void write_word(bool denied, const inspect_word_t *word, char out_text[IN
     } else if (word->how[0] != '\0') {
         (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "found by %s", word->how);
     } else {
-        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "the operator says so");
+        (void)snprintf(out_text, INSPECT_SOURCE_SIZE, "confirmed by the operator");
     }
 }
 
@@ -287,12 +288,11 @@ const char *inspect_assumption_cure(iw_assumption_item_t item) {
         [IW_ASSUMPTION_GEAR_RATIO] =
             "correct gear_ratio or rpm_of under [wheels], then: systemctl restart iwheel-gateway",
         [IW_ASSUMPTION_POSE_BYTE_ORDER] =
-            "the pose is lost, all else works; send us a recording (iwheelctl record), and if "
+            "the pose is lost, everything else works; send us a recording (iwheelctl record), and if "
             "it came from another device: iwheelctl confirm pose_byte_order",
         [IW_ASSUMPTION_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
                               "it is gone: iwheelctl confirm dlc",
     };
     const char *cure = ((unsigned)item < IW_ASSUMPTION_ITEMS) ? cures[item] : NULL;
-    return (cure != NULL) ? cure
-                          : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
+    return (cure != NULL) ? cure : "decide it: iwheelctl ledger shows it, iwheelctl confirm stores the right value";
 }

@@ -48,7 +48,7 @@ inspect_found_t inspect_assumption_compare(const inspect_configured_t *configure
 /// Returns the possible values of `found`, for messages.
 const char *inspect_assumption_values(iw_assumption_item_t item);
 
-/// Writes the source of the entry as a clause: "measured -392 mm/s while told to go forward". `word` is used only for
+/// Writes the source of the entry as a clause: "measured -392 mm/s while commanded forward". `word` is used only for
 /// entries of the operator.
 void inspect_assumption_source(iw_assumption_item_t item, const iw_assumption_entry_t *entry,
                                const inspect_word_t *word, char out_text[INSPECT_SOURCE_SIZE]);

@@ -49,14 +49,14 @@ static void judge_rate(const inspect_heard_t *heard, unsigned index, inspect_fin
     write_rate(inspect_rate_mHz(heard, index), rate);
     write_rate(inspect_nominal_mHz(row), nominal);
     if (heard->count[index] == 0U) {
-        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": not heard; the document has %s a second",
+        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": none received; the document has %s a second",
                     side_of(row), name_of(row), row->id, row->id, nominal);
     } else {
         inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s", side_of(row),
                     name_of(row), row->id, row->id, rate, nominal);
     }
     inspect_cure(findings, "frames get lost: check termination (60 ohm between CAN-H and CAN-L), cable and adapter; or "
-                           "this wheel's firmware is another");
+                           "this wheel has another firmware");
 }
 
 /// Judges the presence of a wheel and the rates of its messages.
@@ -80,7 +80,8 @@ static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_fi
         }
     }
     if (speeds == 0U) {
-        inspect_say(findings, wheel_check(side), INSPECT_FAIL, "%s wheel: not heard for %" PRIu64 " ms", name, span_ms);
+        inspect_say(findings, wheel_check(side), INSPECT_FAIL, "%s wheel: no telemetry for %" PRIu64 " ms", name,
+                    span_ms);
         inspect_cure(findings, "check its power, cable and termination");
         return;
     }
@@ -97,8 +98,8 @@ static void judge_others(const inspect_heard_t *heard, const inspect_config_t *c
         heard->count[inspect_message_of(IW_ID_LEFT_SETPOINT)] + heard->count[inspect_message_of(IW_ID_RIGHT_SETPOINT)];
     if (setpoints > 0U && !config->others_may_send) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
-                    "somebody sends setpoints: %" PRIu32 " frames with id 266 (0x10A) or 298 (0x12A)", setpoints);
-        inspect_cure(findings, "switch it off, or stop the gateway that does");
+                    "another device sends setpoints: %" PRIu32 " frames with id 266 (0x10A) or 298 (0x12A)", setpoints);
+        inspect_cure(findings, "switch it off, or stop the gateway that sends them");
     }
 }
 
@@ -116,9 +117,9 @@ static void judge_strangers(const inspect_heard_t *heard, const inspect_config_t
         (void)snprintf(&list[length], sizeof list - length, extended ? "%s0x%08" PRIX32 : "%s0x%03" PRIX32,
                        (i > 0U) ? " " : "", number);
     }
-    inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames are none of the wheels': %s%s",
+    inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames do not belong to the wheels: %s%s",
                 heard->strange, list, (heard->strange_ids == INSPECT_STRANGERS) ? " ..." : "");
-    inspect_cure(findings, "find out who sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
+    inspect_cure(findings, "find out which device sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
                  config->name);
 }
 
@@ -127,13 +128,13 @@ static void judge_damage(const inspect_heard_t *heard, inspect_findings_t *findi
         inspect_say(findings, "lengths", INSPECT_WARN,
                     "%" PRIu32 " frames of the wheels' ids are shorter than the document's table, and are ignored",
                     heard->bad_length);
-        inspect_cure(findings, "another device uses these ids, or this wheel's firmware is another");
+        inspect_cure(findings, "another device uses these ids, or this wheel has another firmware");
     }
     if (heard->bad_format > 0U) {
         inspect_say(findings, "lengths", INSPECT_WARN,
-                    "%" PRIu32 " remote, extended or FD frames bear the wheels' ids, and are ignored",
+                    "%" PRIu32 " remote, extended or FD frames have the wheels' ids, and are ignored",
                     heard->bad_format);
-        inspect_cure(findings, "find the device that sends them and give it other ids");
+        inspect_cure(findings, "find the device that sends them and configure other ids for it");
     }
 }
 
@@ -144,14 +145,14 @@ static void judge_load(const inspect_heard_t *heard, const inspect_config_t *con
                 "bus load: %" PRIu32 ".%" PRIu32 " %% without stuff bits; both wheels alone make about 6 %%",
                 load / 10U, load % 10U);
     if (high) {
-        inspect_cure(findings, "setpoints have to wait for lower ids: take other devices off this bus");
+        inspect_cure(findings, "setpoints have to wait for lower ids: remove other devices from this bus");
     }
 }
 
-/// Reports a controller that is bus-off: missing frames then say nothing about wheels and cables.
+/// Reports a controller that is bus-off: missing frames then give no information about wheels and cables.
 static void say_bus_off(const iwl_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
-    inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off: too many errors, it takes no part any more",
-                bus);
+    inspect_say(findings, "bus_state", INSPECT_FAIL,
+                "bus %s: bus-off: too many errors, the controller has left the bus", bus);
     if (link->presence == IWL_LINK_LOCAL) {
         inspect_cure(findings, "end it in the simulator: iwheel-sim busoff off");
     } else {
@@ -168,16 +169,16 @@ static bool judge_life(const iwl_bus_link_t *link, const inspect_heard_t *heard,
     if (link->presence == IWL_LINK_LOCAL && (heard->was_up || off)) {
         inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
     } else if (link->presence == IWL_LINK_LOCAL) {
-        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: nobody there", bus);
+        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: no simulator there", bus);
         inspect_cure(findings, "start the simulator: iwheel-sim --can %s", bus);
     }
     if (off) {
         say_bus_off(link, bus, findings);
     } else if (heard->was_up && heard->worst == IW_BUS_OFF) {
-        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: it was bus-off while it was listened to", bus);
+        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: it was bus-off during the check", bus);
         inspect_cure(findings, "check cable, termination and bit rate");
     } else if (heard->was_up && heard->worst == IW_BUS_PASSIVE) {
-        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames go wrong", bus);
+        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames fail", bus);
         inspect_cure(findings, "check bit rate, sample point, termination; a wheel without power acknowledges nothing");
     }
     return heard->was_up && !off;

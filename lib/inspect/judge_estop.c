@@ -33,9 +33,9 @@ const char *inspect_estop_trouble(const iwl_hal_t *hal) {
                "lists them)";
     case EREMCHG:
         return (first != 0)
-                   ? "the line is of another chip, or has another name, than [estop] chip and chip_line say: find "
+                   ? "the line belongs to another chip, or has another name, than [estop] chip and chip_line: find "
                      "the wired one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor"
-                   : "line2 is of another chip, or has another name, than [estop] chip2 and chip2_line say: find "
+                   : "line2 belongs to another chip, or has another name, than [estop] chip2 and chip2_line: find "
                      "the wired one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor";
     case EBUSY:
         return "the line is busy: another program has it; gpioinfo names that program";
@@ -77,7 +77,7 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
     } else if (estop->level == IW_ESTOP_DISAGREES) {
         inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: its two contacts disagree, pressed at %s", estop->line,
                     (estop->pressed_at != NULL) ? estop->pressed_at : "one");
-        inspect_cure(findings, "mend contact or wire, press and release the button");
+        inspect_cure(findings, "fix contact or wire, press and release the button");
     } else {
         const bool where = estop->level > 0 && estop->pressed_at != NULL;
         inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s%s%s", estop->line,
@@ -100,8 +100,7 @@ void inspect_unopened(const char *cause, bool is_bus, int error, inspect_finding
         inspect_cure(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
     } else if (error == ENOTUNIQ && !is_bus) {
         inspect_say(findings, check, INSPECT_FAIL,
-                    "e-stop %s: [estop] line and line2 are the same line, which shows nothing of a second contact",
-                    cause);
+                    "e-stop %s: [estop] line and line2 are the same line, so there is no second contact", cause);
         inspect_cure(findings, "write the line of the other contact as line2 (gpioinfo lists them), or line2 = none");
     } else if (error == EAFNOSUPPORT && is_bus) {
         inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", cause);

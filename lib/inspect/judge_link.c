@@ -93,7 +93,7 @@ static void judge_restart(const iwl_bus_link_t *link, const inspect_config_t *co
     if (link->presence < IWL_LINK_DOWN || link->is_virtual || link->restart_ms != 0U) {
         return;
     }
-    inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until somebody restarts it", bus);
+    inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until a person restarts it", bus);
     inspect_cure(findings, "ip link set %s down; ip link set %s type can restart-ms 100; ip link set %s up", bus, bus,
                  bus);
 }
@@ -113,9 +113,9 @@ void inspect_room(const iwl_bus_link_t *link, inspect_findings_t *findings) {
     }
     const bool granted = link->room_bytes >= 2U * IWL_LINK_ROOM_BYTES;
     inspect_say(findings, "room", granted ? INSPECT_OK : INSPECT_WARN,
-                "room for frames: %" PRIu32 " of %u KiB granted, %" PRIu32 " ms of a full bus%s",
+                "receive buffer: %" PRIu32 " of %u KiB granted, %" PRIu32 " ms of a full bus%s",
                 link->room_bytes / 2U / 1024U, IWL_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
-                granted ? "" : "; when others have the processor for longer, frames get lost");
+                granted ? "" : "; if other programs use the processor for longer, frames get lost");
     if (!granted) {
         inspect_cure(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IWL_LINK_ROOM_BYTES);
     }

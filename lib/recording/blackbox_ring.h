@@ -39,7 +39,7 @@ size_t blackbox_ring_size(uint32_t seconds);
 /// Initializes the ring. `memory` has blackbox_ring_size(seconds) bytes, aligned for uint64_t.
 void blackbox_ring_init(blackbox_ring_t *self, uint32_t seconds);
 
-/// Adds an entry. Of the data of a frame it stores as many bytes as its length says, at most 8.
+/// Adds an entry. It stores as many data bytes of a frame as the frame's length states, at most 8.
 void blackbox_ring_put(blackbox_ring_t *self, const blackbox_entry_t *entry);
 
 uint64_t blackbox_ring_written(const blackbox_ring_t *self);

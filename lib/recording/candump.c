@@ -51,7 +51,7 @@ static const char *parse_bytes(cursor_t *cursor, size_t most, candump_t *frame) 
             return "an odd number of data digits; a byte has two: is the line cut?";
         }
         if (frame->length == most) {
-            return "more data than a frame holds; CAN FD data stands behind ##";
+            return "more data than a frame holds; write CAN FD data behind ##";
         }
         frame->data[frame->length] = (uint8_t)(next_hex(cursor, 0) * 16 + low);
         frame->length++;
@@ -67,7 +67,7 @@ static const char *parse_raw_dlc(cursor_t *cursor, const candump_t *frame) {
         return NULL;
     }
     if (frame->length != IW_CAN_DATA_MAX || next_hex(cursor, 0) <= (int)IW_CAN_DATA_MAX) {
-        return "a length code (_9 to _F) stands only behind 8 bytes; delete it";
+        return "a length code (_9 to _F) is valid only behind 8 bytes; delete it";
     }
     cursor->at++;
     return NULL;

@@ -51,7 +51,7 @@ void sock_service_refuse_crowd(const sock_clients_t *self, const sock_client_t *
     const sock_right_t door = door_of(self, client);
     out_refusal->error = IWN_TOO_MANY_CLIENTS;
     (void)snprintf(out_refusal->message, sizeof out_refusal->message,
-                   "%u %s are connected and there is no room for more, except to stop; close one, or raise %s and the "
+                   "%u %s are connected and there is no place for more, except to stop; close one, or raise %s and the "
                    "limit of open files",
                    (unsigned)self->count[door], (door == SOCK_DRIVE) ? "clients" : "watchers",
                    (door == SOCK_DRIVE) ? "max_clients" : "max_watchers");
@@ -66,7 +66,7 @@ static void turn_away(sock_clients_t *self, sock_client_t *client) {
     sock_clients_refuse(self, client, &nobody, &refusal);
     sock_service_finish(self, client);
     if (!listener->full_told) {
-        sock_log(self->log, SOCK_LOG_WARNING, "a client was turned away: %s", refusal.message);
+        sock_log(self->log, SOCK_LOG_WARNING, "refused a client: %s", refusal.message);
     }
     listener->full_told = listener->config.right == SOCK_WATCH; // A flood of these must not displace other messages.
 }
@@ -176,7 +176,7 @@ static bool accept_one(sock_clients_t *self, sock_listener_t *listener) {
         return false;
     }
     if (result == SOCK_ACCEPT_PAUSE) {
-        sock_log(self->log, SOCK_LOG_WARNING, "cannot accept clients for want of descriptors; trying again in %u ms",
+        sock_log(self->log, SOCK_LOG_WARNING, "cannot accept clients: no free descriptor; trying again in %u ms",
                  SOCK_LISTENER_PAUSE_US / IW_US_PER_MS);
         pause_listening(self, listener, SOCK_LISTENER_PAUSE_US);
         return false;

@@ -19,7 +19,7 @@ static const char *option_of(const sock_listener_t *self) {
     return (self->config.right == SOCK_DRIVE) ? "--socket" : "--watch-socket";
 }
 
-/// `cure` ends at the place of the option's name.
+/// Reports an error. `cure` is the fix up to the name of the option, which the function appends.
 static int complain(const sock_listener_t *self, FILE *err, const char *what, const char *cure) {
     (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->config.program, self->config.path, what, cure,
                   option_of(self));
@@ -67,8 +67,8 @@ int sock_listener_prepare(sock_listener_t *self, const sock_listener_config_t *c
     }
     if (self->folder.shared) {
         (void)fprintf(err,
-                      "%s: warning: socket %s: while no gateway runs, anybody can put another socket there "
-                      "and answer for it; for more than a trial choose a directory of its own with %s\n",
+                      "%s: warning: socket %s: while no gateway runs, any user can create another socket there "
+                      "and answer instead; for more than a trial choose a separate directory with %s\n",
                       config->program, path, option_of(self));
     }
     return 0;
@@ -105,7 +105,7 @@ static int remove_name(const sock_listener_t *self, bool stranger, FILE *err) {
         return 0;
     }
     if (stranger) {
-        (void)complain(self, err, "it is another user's, and only he can take it away",
+        (void)complain(self, err, "it belongs to another user, and only that user can remove it",
                        "choose a directory of your own with");
         return EX_NOPERM;
     }
@@ -124,7 +124,7 @@ static int read_name(const sock_listener_t *self, struct stat *out_status, FILE 
                         "remove it, or name the real path with");
     }
     return S_ISSOCK(out_status->st_mode) ? 0
-                                         : complain(self, err, "exists and is no socket, so it is left alone",
+                                         : complain(self, err, "exists and is not a socket, so it is left unchanged",
                                                     "remove it, or choose another path with");
 }
 
@@ -154,8 +154,8 @@ static int verify(sock_listener_t *self, FILE *err) {
         return complain_errno(self, err, errno);
     }
     if (!S_ISSOCK(status.st_mode) || status.st_uid != geteuid()) {
-        return complain(self, err, "something else took its place",
-                        "choose a directory to which nobody else may write with");
+        return complain(self, err, "another file replaced it",
+                        "choose a directory to which no other user may write with");
     }
     self->device = status.st_dev;
     self->inode = status.st_ino;
@@ -202,10 +202,11 @@ static void give_to_group(const sock_listener_t *self, sock_log_t *log) {
         return; // As a service, which must not call chown.
     }
     if (group == NULL) {
-        sock_log(log, SOCK_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)",
-                 name, self->config.path, name);
+        sock_log(log, SOCK_LOG_WARNING,
+                 "there is no group %s; socket %s has the group of the gateway (groupadd --system %s)", name,
+                 self->config.path, name);
     } else if (fchownat(self->folder.fd, self->name, (uid_t)-1, group->gr_gid, AT_SYMLINK_NOFOLLOW) != 0) {
-        sock_log(log, SOCK_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group",
+        sock_log(log, SOCK_LOG_WARNING, "cannot change socket %s to group %s: %s; it has the group of the gateway",
                  self->config.path, name, strerror(errno));
     }
 }

@@ -35,7 +35,7 @@ typedef enum {
 typedef enum {
     SOCK_ACCEPT_NONE = 0, ///< No connection waits.
     SOCK_ACCEPT_ONE,      ///< `*out_fd` is the connection.
-    SOCK_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: report it and close it. The next call makes room again.
+    SOCK_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: report and close it. The next call restores the reserve.
     SOCK_ACCEPT_PAUSE,    ///< Out of resources: call again after SOCK_LISTENER_PAUSE_US.
 } sock_accept_t;
 

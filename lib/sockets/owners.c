@@ -101,11 +101,11 @@ void sock_folder_of(const char *path, char *out_folder, size_t size) {
 const char *sock_folder_fault(int error) {
     switch (error) {
     case SOCK_FOLDER_FOREIGN:
-        return "the directory belongs to another user, who could put anything there";
+        return "the directory belongs to another user, who could put any file there";
     case SOCK_FOLDER_SHARED:
-        return "others than the directory's owner may write to it and put anything there";
+        return "other users than the directory's owner may write to it and put any file there";
     case SOCK_FOLDER_FILE:
-        return "the file belongs to another user, has a second name, or is no ordinary file";
+        return "the file belongs to another user, has a second name, or is not a regular file";
     case ELOOP:
         return "the directory is a symbolic link, which is not followed";
     default:
@@ -118,16 +118,16 @@ const char *sock_folder_cure(int error) {
     case SOCK_FOLDER_FOREIGN:
     case EACCES:
     case EPERM:
-        return "give the directory to the gateway's user";
+        return "make the gateway's user its owner (chown)";
     case SOCK_FOLDER_SHARED:
-        return "take that right away (chmod go-w)";
+        return "remove that right (chmod go-w)";
     case SOCK_FOLDER_FILE:
         return "remove it";
     case ELOOP:
         return "name the directory itself";
     case ENOSPC:
     case EDQUOT:
-        return "make room there";
+        return "free space there";
     case EROFS:
         return "mount it for writing";
     default:

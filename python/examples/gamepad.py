@@ -4,11 +4,11 @@
 
 usage: gamepad.py [--socket PATH] [--device /dev/input/js0] [--speed MM_S] [--yaw MRAD_S] [--button N]
 
-The left stick gives speed and turning rate, but only while the button (4: usually the left shoulder) is held. The wheels stop when the button is
-let go, and at once when the device disappears (unplugged).
+The left stick sets speed and yaw rate, but only while the button (4: usually the left shoulder) is held. The wheels stop when the button is
+released, and when the device disappears (unplugged).
 
-A wireless gamepad whose link dies reports nothing more, and its receiver stays. The wheels therefore also stop 2 s after the last report; from 1 s
-on a warning is printed. Move the stick a little to go on driving; after such a stop let go of the button and press it again.
+A wireless gamepad whose link has died reports nothing, while its receiver stays connected. The wheels therefore also stop 2 s after the last report;
+after 1 s the program prints a warning. Move the stick slightly to drive on. After such a stop release the button and press it again.
 """
 
 import argparse
@@ -24,23 +24,23 @@ EVENT = struct.Struct("=IhBB")  # struct js_event of linux/joystick.h: time, val
 BUTTON, AXIS, INITIAL = 0x01, 0x02, 0x80
 FULL = 32767
 CENTRE = 3000
-"""Sticks rest not quite in the middle."""
+"""Dead zone: a released stick is not exactly in the middle."""
 WARN_S, HELD_S = 1.0, 2.0
-"""Without a report of the device for so long: a warning; the button no longer counts as held."""
+"""Seconds without a report of the device until the program warns, and until the button no longer counts as held."""
 
 
 class Gamepad:
-    """What is pressed. OSError or EOFError when the gamepad is gone."""
+    """State of the gamepad. Raises OSError or EOFError when the gamepad is gone."""
 
     def __init__(self, device: str) -> None:
         self.file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
         self.axes = {0: 0, 1: 0}
         self.buttons: set[int] = set()
         self.at_start: set[int] = set()
-        """Pressed by the kernel's own account of the state: no evidence of a hand."""
+        """Buttons that the kernel reports as pressed at the start. A hand need not hold them."""
         self.pending = b""
         self.reported = time.monotonic()
-        """When the device reported last: the evidence of a hand."""
+        """Time of the last report of the device, which shows that a hand holds it."""
 
     def update(self, seconds: float) -> None:
         if not select.select([self.file], [], [], seconds)[0]:
@@ -67,7 +67,7 @@ class Gamepad:
 
 
 class Hold:
-    """Whether the dead man's button counts as held: pressed, and the device has reported within HELD_S."""
+    """Decides whether the dead man's button counts as held: it is pressed, and the device has reported within HELD_S."""
 
     def __init__(self, gamepad: Gamepad, button: int) -> None:
         self.gamepad, self.button = gamepad, button
@@ -78,11 +78,11 @@ class Hold:
         if self.button not in self.gamepad.buttons:
             self.warned = False
         elif silent_s >= HELD_S:
-            self.gamepad.buttons.clear()  # Motion begins again with a new press only, not with the link.
+            self.gamepad.buttons.clear()  # Only a new press starts motion again, not the return of the link.
             print(f"stopped: no report of the gamepad for {HELD_S:g} s; let go of the button, then press it again", file=sys.stderr)
         elif silent_s >= WARN_S and not self.warned:
             self.warned = True
-            print(f"no report of the gamepad for {WARN_S:g} s; move the stick, else the wheels stop", file=sys.stderr)
+            print(f"no report of the gamepad for {WARN_S:g} s; move the stick, or the wheels stop", file=sys.stderr)
         elif silent_s < WARN_S:
             self.warned = False
         return self.button in self.gamepad.buttons
@@ -92,7 +92,7 @@ def steer(options: argparse.Namespace) -> None:
     gamepad = Gamepad(options.device)
     gamepad.update(0.2)
     if options.button in gamepad.buttons | gamepad.at_start:
-        raise EOFError("the dead man's button is held already; let go of it, then start again")
+        raise EOFError("the dead man's button is already held; let go of it, then start again")
     with Gateway(options.socket) as gateway, gateway.arm("gamepad") as wheels:
         print(f"armed: hold button {options.button} and steer with the left stick; Ctrl-C ends")
         hold = Hold(gamepad, options.button)
@@ -106,7 +106,7 @@ def steer(options: argparse.Namespace) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Drives the wheels with a gamepad. MOVES THE WHEELS.")
-    parser.add_argument("--socket", help="of the gateway; else $IWHEEL_SOCKET, else the only one in /run/iwheel")
+    parser.add_argument("--socket", help="socket of the gateway ($IWHEEL_SOCKET, or the only one in /run/iwheel)")
     parser.add_argument("--device", default="/dev/input/js0", help="joystick device (/dev/input/js0)")
     parser.add_argument("--speed", type=int, default=400, help="mm/s with the stick fully forward (400)")
     parser.add_argument("--yaw", type=int, default=1000, help="mrad/s with the stick fully to the side (1000)")

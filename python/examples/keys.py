@@ -4,8 +4,8 @@
 
 usage: keys.py [--socket PATH] [--speed MM_S]
 
-A terminal tells that a key repeats, not that it was let go: a key holds for 0.6 s. The space bar and every other key stop at once. The repeats
-come from the computer: if the link of a wireless keyboard dies with a key held, they go on. Use a keyboard with a cable.
+A terminal reports repeats of a key, not its release: each key counts as held for 0.6 s. The space bar and every other key stop immediately. The
+computer makes the repeats: if the link of a wireless keyboard dies with a key held, they continue. Use a keyboard with a cable.
 """
 
 import argparse
@@ -19,7 +19,7 @@ import tty
 from iwheel import Gateway, IWheelError
 
 HOLD_S = 0.6
-"""Longer than the pause before a keyboard begins to repeat, else the wheels would stutter."""
+"""Longer than the pause before a keyboard begins to repeat; otherwise the wheels would stutter."""
 DIRECTIONS = {
     "w": (1, 1), "\x1b[A": (1, 1), "s": (-1, -1), "\x1b[B": (-1, -1),
     "a": (-1, 1), "\x1b[D": (-1, 1), "d": (1, -1), "\x1b[C": (1, -1),
@@ -27,7 +27,7 @@ DIRECTIONS = {
 
 
 def read_key(seconds: float) -> str:
-    """The last key that was typed; empty if none was. The end of the input reads as q."""
+    """Returns the last key; empty if none came. Returns q at the end of the input."""
     if not select.select([0], [], [], seconds)[0]:
         return ""
     text = os.read(0, 100).decode(errors="replace") or "q"
@@ -54,7 +54,7 @@ def steer(socket: str | None, speed: int) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description="Drives the wheels with the keys of a terminal. MOVES THE WHEELS.")
-    parser.add_argument("--socket", help="of the gateway; else $IWHEEL_SOCKET, else the only one in /run/iwheel")
+    parser.add_argument("--socket", help="socket of the gateway ($IWHEEL_SOCKET, or the only one in /run/iwheel)")
     parser.add_argument("--speed", type=int, default=200, help="mm/s at the start (200)")
     options = parser.parse_args()
     terminal = termios.tcgetattr(0) if os.isatty(0) else None

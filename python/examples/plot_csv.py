@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Draws what record_csv.py wrote: speed and force of both wheels over time, into a PNG. Needs matplotlib.
+"""Draws the file of record_csv.py as a PNG: speed and force of both wheels over time. Needs matplotlib.
 
 usage: plot_csv.py FILE.csv FILE.png
 """
@@ -18,7 +18,7 @@ COLOURS = {"left": "tab:blue", "right": "tab:orange"}
 
 
 def column(rows: list[dict[str, str]], name: str, scale: float = 1.0) -> list[float]:
-    """Unknown values are gaps."""
+    """Returns a column as numbers. An unknown value becomes NaN, a gap in the plot."""
     return [float(row[name]) * scale if row[name] else float("nan") for row in rows]
 
 
@@ -28,7 +28,7 @@ def draw(source: str, target: str) -> None:
     times = column(rows, "time_s")
     figure, (speed, force) = plt.subplots(2, 1, sharex=True, figsize=(8, 5), layout="constrained")
     for side, colour in COLOURS.items():
-        speed.step(times, column(rows, f"{side}_applied_mm_s"), where="post", color=colour, ls=":", label=f"{side}, told")
+        speed.step(times, column(rows, f"{side}_applied_mm_s"), where="post", color=colour, ls=":", label=f"{side}, applied")
         speed.plot(times, column(rows, f"{side}_speed_mm_s"), color=colour, label=f"{side}, measured")
         force.plot(times, column(rows, f"{side}_force_net_mN", 1e-3), color=colour, label=side)
     for before, row in itertools.pairwise(rows):

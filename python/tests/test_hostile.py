@@ -164,7 +164,7 @@ class Hostile(unittest.TestCase):
 
     def test_who_does_not_say_hello_is_no_answer_and_is_asked_nothing(self):
         impostor, told = self.both(b"", NoAnswer, hello=b"")
-        self.assertIn("did not say hello", told)
+        self.assertIn("sent no greeting", told)
         self.wait_for_two(impostor)
         self.assertEqual(impostor.heard, [b"", b""])
 
@@ -177,7 +177,7 @@ class Hostile(unittest.TestCase):
         for ask in ("status", "arm", "watch"):
             with self.subTest(ask):
                 impostor, told = self.both(b"", ProtocolError, hello=NEWER, ask=ask)
-                self.assertRegex(told, r"\(version 9\.1\.0\) speaks the northbound protocol 2, this .* knows it up to 1; install")
+                self.assertRegex(told, r"\(version 9\.1\.0\) has the northbound protocol 2, this .* supports it up to 1; install")
                 self.wait_for_two(impostor)
                 self.assertEqual(impostor.heard, [b"", b""])
 
@@ -280,7 +280,7 @@ class Hostile(unittest.TestCase):
         impostor = Impostor(b"")
         self.addCleanup(impostor.end)
         os.chmod(impostor.path, 0)
-        self.assertIn("you may not use it; join its group", as_nobody(Gateway(impostor.path).status))
+        self.assertIn("this user may not use it; join its group", as_nobody(Gateway(impostor.path).status))
 
     def test_the_socket_of_the_environment_is_taken(self):
         before = os.environ.get("IWHEEL_SOCKET")

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 # shellcheck shell=bash
-# Completion for iwheelctl, iwheel-gateway and iwheel-sim. It asks the program itself, so it knows what that program knows.
+# Completion for iwheelctl, iwheel-gateway and iwheel-sim. It asks the program itself, so it always matches the installed version.
 
-# CAN interfaces.
+# Lists the CAN interfaces.
 _iwheel_buses() {
     grep -lx 280 /sys/class/net/*/type 2>/dev/null | cut -d/ -f5
 }
 
-# Offers the words on standard input; FILE and BUS stand for the names of such.
+# Offers the words on standard input, with file names for FILE and CAN interfaces for BUS.
 _iwheel_offer() {
     local words
     words=$(cat)
@@ -20,7 +20,7 @@ _iwheel_offer() {
     fi
 }
 
-# What the word behind an option is; 1: not known.
+# Offers the values of the option before the cursor. Returns 1 if the option has no value, or an unknown one.
 _iwheel_value() {
     case $1 in
     --socket | --config | -c | --from | --learn | --gateway | --directory | --control | --script | --log | --output) echo FILE ;;

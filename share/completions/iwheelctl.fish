@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-# Completion for fish. It asks the program itself, so it knows what that program knows.
+# Completion for fish. It asks the program itself, so it always matches the installed version.
 
 function __iwheel_buses
     grep -lx 280 /sys/class/net/*/type 2>/dev/null | cut -d/ -f5
 end
 
-# The verb that stands there already.
+# Prints the verb on the command line.
 function __iwheelctl_verb
     set -l verbs (iwheelctl help --list 2>/dev/null | cut -f1)
     for word in (commandline -opc)[2..-1]
@@ -17,7 +17,7 @@ function __iwheelctl_verb
     return 1
 end
 
-# The words that may follow it; FILE and BUS stand for the names of such.
+# Prints the words that may follow, with file names for FILE and CAN interfaces for BUS.
 function __iwheelctl_words
     set -l verb (__iwheelctl_verb)
     for word in (iwheelctl help $verb --list 2>/dev/null)
@@ -32,7 +32,7 @@ function __iwheelctl_words
     end
 end
 
-# What the word behind an option is; fails where it is none.
+# Prints the values of the option before the cursor. Fails if the option has no value.
 function __iwheel_value
     set -l previous (commandline -opc)[-1]
     switch $previous

@@ -24,7 +24,7 @@ WAIT_S = 10.0
 
 
 class Refused(Exception):
-    """The reason, and the fix."""
+    """The bridge refused or stopped; the text is the reason, with the fix."""
 
 
 class Drive:
@@ -33,8 +33,8 @@ class Drive:
         self.type = TwistStamped if stamped else Twist
         self.publisher = self.node.create_publisher(self.type, "cmd_vel", 10)
         self.clients = {verb: self.node.create_client(Trigger, f"iwheel/{verb}") for verb in ("arm", "stop")}
-        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.node.create_subscription(String, "iwheel/state", self.on_state, kept)
+        retained = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.node.create_subscription(String, "iwheel/state", self.on_state, retained)
         self.state, self.was_armed = {}, False
 
     def on_state(self, message):
@@ -51,7 +51,7 @@ class Drive:
         self.publisher.publish(message)
 
     def stream(self, linear, angular, seconds, until=lambda: False):
-        """Sends at RATE_HZ for so long, or until the condition holds."""
+        """Publishes at RATE_HZ for this number of seconds, or until the condition is true."""
         due = time.monotonic()
         end = due + seconds
         while time.monotonic() < end and not until():
@@ -61,7 +61,7 @@ class Drive:
                 rclpy.spin_once(self.node, timeout_sec=left)
 
     def call(self, verb):
-        """Zeros go on meanwhile. The answer, or None."""
+        """Calls a service and publishes zeros until it replies. Returns the reply, or None after 3 s."""
         future = self.clients[verb].call_async(Trigger.Request())
         self.stream(0.0, 0.0, 3.0, future.done)
         return future.result() if future.done() else None
@@ -70,7 +70,7 @@ class Drive:
         end = time.monotonic() + WAIT_S
         while not (self.clients["arm"].service_is_ready() and self.publisher.get_subscription_count() > 0):
             if time.monotonic() > end:
-                raise Refused("no iwheel-ros2 in this domain: check ROS_DOMAIN_ID, the namespace, and the profile of Fast DDS (docs: On this machine only)")
+                raise Refused("no iwheel-ros2 in this domain: check ROS_DOMAIN_ID, the namespace, and the profile of Fast DDS (docs: This machine only)")
             rclpy.spin_once(self.node, timeout_sec=0.05)
 
     def has_stopped(self):
@@ -95,12 +95,12 @@ def main(arguments=None):
     parser.add_argument("linear", type=float, help="m/s, forward positive")
     parser.add_argument("angular", type=float, nargs="?", default=0.0, help="rad/s, to the left positive")
     parser.add_argument("--for", dest="seconds", type=float, default=2.0, help=f"seconds, at most {LONGEST_S:g} (2)")
-    parser.add_argument("--namespace", default="", help="of the bridge")
+    parser.add_argument("--namespace", default="", help="namespace of the bridge")
     parser.add_argument("--stamped", action="store_true", help="send TwistStamped")
     options = parser.parse_args(arguments)
     if not 0 < options.seconds <= LONGEST_S:
-        parser.error(f"--for is above 0 and at most {LONGEST_S:g} seconds")
-    # A signal ends the loop by KeyboardInterrupt, so that the stop is still sent.
+        parser.error(f"--for must be above 0 and at most {LONGEST_S:g} seconds")
+    # rclpy must not handle the signals: Ctrl-C then raises KeyboardInterrupt, and the stop is still sent.
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     drive = Drive(options.namespace, options.stamped)
     try:

@@ -128,4 +128,4 @@ class Example(RigCase):
         lost = self.start(1)
         _, err = lost.communicate(timeout=10)
         self.assertEqual(1, lost.returncode)
-        self.assertIn("nobody listens", err)
+        self.assertIn("no program listens", err)

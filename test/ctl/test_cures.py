@@ -555,7 +555,7 @@ class Check(unittest.TestCase):
         os.symlink("nowhere", self.rig.path("link"))
         with open(self.rig.path("file"), "w", encoding="utf-8"):
             pass
-        for name, about in (("link", "is a symbolic link"), ("file", "exists and is no socket")):
+        for name, about in (("link", "is a symbolic link"), ("file", "exists and is not a socket")):
             self.rig.socket_name = name
             self.assertEqual(1, self.only("fail", about)[0])
             done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, check=False)
@@ -577,7 +577,7 @@ class Check(unittest.TestCase):
         os.mkdir(self.rig.path("shared"))
         os.chmod(self.rig.path("shared"), 0o1777)
         self.rig.socket_name = "shared/gateway.sock"
-        self.assertEqual(0, self.only("warn", "anybody can put another socket there")[0])
+        self.assertEqual(0, self.only("warn", "any user can create another socket there")[0])
         os.symlink("nowhere", self.rig.path("shared/gateway.sock"))
         self.assertEqual(1, self.only("fail", "is a symbolic link")[0])
 
@@ -585,7 +585,7 @@ class Check(unittest.TestCase):
         os.mkdir(self.rig.path("open"))
         os.chmod(self.rig.path("open"), 0o777)
         self.rig.socket_name = "open/gateway.sock"
-        code, text = self.only("fail", "others than the directory's owner may write")
+        code, text = self.only("fail", "other users than the directory's owner may write")
         self.assertEqual(1, code)
         subprocess.run([*re.search(r"\((chmod go-w)\)", text).group(1).split(), self.rig.path("open")], check=True)
         self.assertEqual(0, self.gone("fail", "socket"))

@@ -112,7 +112,7 @@ class Doctor(unittest.TestCase):
         self.rig.sim.end()
         code, checks, _ = self.doctor(*self.button())
         self.assertEqual(1, code)
-        self.assertIn("nobody there", checks["interface"][0]["text"])
+        self.assertIn("no simulator there", checks["interface"][0]["text"])
         self.assertEqual(["fail"], self.verdict(checks, "estop"))
 
     def test_beside_a_driving_gateway_its_setpoints_are_no_second_master(self):

@@ -364,11 +364,13 @@ class Showing(WithGateway):
         process.communicate(timeout=10)
 
     def test_latched_names_cause_sentence_and_cure(self):
-        out = self.show(snapshot("latched", cause="wheel_lost"), why={"ok": True, "number": 1, "sentence": "left wheel not heard for 53 ms", "latched": True})
+        out = self.show(
+            snapshot("latched", cause="wheel_lost"), why={"ok": True, "number": 1, "sentence": "left wheel sent no telemetry for 53 ms", "latched": True}
+        )
         self.assertIn("latched (wheel_lost)", out)
         self.assertRegex(out, r"next +switch the wheels on")
         self.assertIn("iwheelctl reset", out)
-        self.assertIn("left wheel not heard for 53 ms", out)
+        self.assertIn("left wheel sent no telemetry for 53 ms", out)
 
     def test_held_zeros_are_told_and_what_ends_them(self):
         out = self.show(snapshot("stopping", cause="client_stop", holding=True))

@@ -497,7 +497,7 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     rig.start_bridge(small_files, stdout=subprocess.DEVNULL)
     time.sleep(0.4)
     last = make_stops(rig, 5)
-    until(lambda: "takes nothing" in rig.bridge.text(), what="said in the log")
+    until(lambda: "accepts no data" in rig.bridge.text(), what="said in the log")
     rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")

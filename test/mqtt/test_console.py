@@ -106,7 +106,7 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     cluster.servers[cluster.leader()].signal(9)
     until(lambda: console(rig, config, "history", "--last", "1h")[1].count(" stop   ") == 6, 30, "all of them")
     code, out, err = console(rig, config, "history", "w2", "--last", "1h")
-    assert code == 0 and "2 doubles left out" in out and "(stored " in out and ID not in out.split(), (code, out, err)
+    assert code == 0 and "2 duplicates left out" in out and "(stored " in out and ID not in out.split(), (code, out, err)
     assert re.search(
         r"-- 2 events before this one are not in the stream.*\n.*told as 3\n.*-- 2 stops before this one are not in the stream.*\n.*told as 6\n", out
     ), out
@@ -208,7 +208,7 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
         "info has it",
     )
     text = console(rig, config, "--for", "1")[1]
-    assert "last stops: of each machine's info" in text and "estop_line" in text, text
+    assert "last stops: from each machine's info" in text and "estop_line" in text, text
     page = Path(rig.path("fleet.json"))
     assert console(rig, config, "--for", "3", "--output", str(page))[:2] == (0, "")
     told = json.loads(page.read_text(encoding="utf-8"))
@@ -259,7 +259,7 @@ def test_recording_is_fetched_whole_never_over_a_file_and_read_by_iwheelctl(rig)
     code, out, err = console(rig, config, "recordings", ID)
     assert code == 0 and name in out and "1 recordings of w1" in out, (code, out, err)
     code, out, err = console(rig, config, "recording", ID, "-o", str(folder / "x.log"))
-    assert code == 0 and "0 asked for again" in out, (code, out, err)
+    assert code == 0 and "0 requested again" in out, (code, out, err)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {"x" + ending: Path(rig.path(name + ending)).read_bytes() for ending in FILES}
     for verb, word in (("why", "---- stop"), ("decode", "speed"), ("replay", "estop")):
         done = subprocess.run([rig.program("iwheelctl"), verb, str(folder / "x.log")], capture_output=True, text=True, timeout=30, check=False)
@@ -297,7 +297,7 @@ def test_recording_goes_on_after_the_bridge_was_killed_and_began_anew(rig):
     rig.bridge.wait(5)
     rig.start_bridge()
     assert process.wait(30) == 0, process.text()
-    assert int(re.search(r"(\d+) asked for again", process.text()).group(1)) > 0, process.text()
+    assert int(re.search(r"(\d+) requested again", process.text()).group(1)) > 0, process.text()
     assert all((folder / ("x" + ending)).read_bytes() == Path(rig.path(name + ending)).read_bytes() for ending in FILES)
     assert len(list(folder.iterdir())) == 3
 
@@ -315,7 +315,7 @@ def test_recording_of_a_machine_that_stays_away_leaves_no_file_behind(rig):
     rig.online()
     process = slow_console(rig, "-o", str(folder_of(rig) / "x"))
     process.signal(15)
-    assert process.wait(10) == 75 and "nothing is kept" in process.text(), process.text()
+    assert process.wait(10) == 75 and "no file was written" in process.text(), process.text()
     assert not list(folder_of(rig).iterdir())
 
 
@@ -333,7 +333,7 @@ class Played(Far):
     def answer(self, verb, asked):
         reply = {"boot": self.boot, "t_us": time.monotonic_ns() // 1000, "cmd": verb, "seq": asked["seq"], "ok": True}
         if verb != "hello" and asked["boot"] != self.boot:
-            reply.update(ok=False, error="other_boot", message="quote the boot and t_us that are here")
+            reply.update(ok=False, error="other_boot", message="send it again with boot and t_us of this reply")
         elif verb == "recordings":
             reply["recordings"] = [
                 {"name": "stop-000001-wheel_lost", "cause": "wheel_lost", "wall_us": 1, "log_bytes": len(self.data), "jsonl_bytes": None, "conf_bytes": None}
@@ -378,7 +378,7 @@ def test_recording_with_a_piece_lost_damaged_or_refused_once_is_whole_all_the_sa
 
     code, out, err = fetch_from(rig, "w5", data, trouble)
     assert code == 0 and (folder_of(rig) / "x.log").read_bytes() == data and [path.name for path in folder_of(rig).iterdir()] == ["x.log"], (code, out, err)
-    assert int(re.search(r"(\d+) asked for again", out).group(1)) >= 4, out
+    assert int(re.search(r"(\d+) requested again", out).group(1)) >= 4, out
 
 
 def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
@@ -396,7 +396,7 @@ def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
 
     for number, trouble in enumerate((each, whole, other)):
         code, out, err = fetch_from(rig, f"w{number}", data, trouble)
-        assert code == 65 and "is not as its checksum says" in err and out == "", (code, out, err)
+        assert code == 65 and "the checksum of" in err and "is wrong" in err and out == "", (code, out, err)
         assert not list(folder_of(rig).iterdir())
 
 
@@ -488,5 +488,5 @@ def test_mqtt5_at_a_broker_that_does_not_speak_it_names_the_cure(rig):
     rig.processes.append(Process(["nats-server", "-c", rig.path("one.conf")], rig.path("one.out")))
     until(lambda: socket.socket().connect_ex(("127.0.0.1", mqtt)) == 0, what="it listens")
     code, _, err = console(rig, write_config(rig, port=mqtt, protocol=5), "--for", "2")
-    assert code == 69 and "does not speak MQTT 5; set protocol = 3.1.1 under [broker]" in err, (code, err)
+    assert code == 69 and "does not support MQTT 5; set protocol = 3.1.1 under [broker]" in err, (code, err)
     assert console(rig, write_config(rig, port=mqtt), "--for", "1")[0] == 0

@@ -349,5 +349,5 @@ def test_home_assistant_sensors_that_are_refused_are_reported(rig):
     rig.broker_lines.append(f"acl_file {acl}")
     rig.start()
     far = rig.online()
-    until(lambda: "sensors that the broker passed on: 0 of 10" in rig.words(), 15, rig.words())
+    until(lambda: "sensors that the broker forwarded: 0 of 10" in rig.words(), 15, rig.words())
     until(lambda: far.messages("info")[-1]["home_assistant"] == {"sensors": 10, "passed_on": 0}, what="in info")

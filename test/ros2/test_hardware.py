@@ -107,7 +107,7 @@ def errors(t):
 
     for command in ("nan 1.0", "1.0 inf", "1.0 1e9"):
         active()
-        hardware.call(f"cycles 2 {command}", CLOSED, "no number")
+        hardware.call(f"cycles 2 {command}", CLOSED, "not a number")
     active()
     hardware.client.request("stop")
     hardware.call("cycles 20 1.0 1.0", CLOSED, "stopped: ")

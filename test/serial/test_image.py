@@ -267,7 +267,7 @@ def kept(t):
     t.check(status["lease"]["lease_ms"] == 300, "configured")
     command = [rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), "ledger"]
     told = " ".join(subprocess.run(command, capture_output=True, text=True, timeout=20, check=False).stdout.split())
-    t.check("wheel_radius: the operator says so" in told and "track: configured, not verified" in told, told)
+    t.check("wheel_radius: confirmed by the operator" in told and "track: configured, not verified" in told, told)
     t.judge(rig, moves=False)
 
 

@@ -519,7 +519,7 @@ class Strangers(unittest.TestCase):
         self.assertEqual(code, 69, text)
 
     def test_a_folder_that_is_not_safe_is_refused_with_the_cure(self):
-        for mode, owner, word in ((0o777, 0, "chmod go-w"), (0o775, 0, "chmod go-w"), (0o755, STRANGER, "give the directory")):
+        for mode, owner, word in ((0o777, 0, "chmod go-w"), (0o775, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
             folder = self.rig.path(f"folder-{mode:o}-{owner}")
             os.mkdir(folder)
             os.chmod(folder, mode)
@@ -547,7 +547,7 @@ class Strangers(unittest.TestCase):
             self.assertEqual(gateway.status()["state"], "listening")
 
     def test_a_record_directory_that_is_not_safe_is_told_and_nothing_is_put_there(self):
-        for mode, owner, word in ((0o1777, 0, "chmod go-w"), (0o755, STRANGER, "give the directory")):
+        for mode, owner, word in ((0o1777, 0, "chmod go-w"), (0o755, STRANGER, "make the gateway's user its owner")):
             folder = self.rig.path(f"records-{mode:o}")
             os.mkdir(folder)
             os.chmod(folder, mode)
@@ -559,7 +559,7 @@ class Strangers(unittest.TestCase):
                 self.wait_for(lambda: gateway.status()["memory"]["state"] != "loading")
                 memory = gateway.status()["memory"]
             self.assertEqual(memory["state"], "failed")
-            self.assertIn("put anything there", memory["reason"])
+            self.assertIn("put any file there", memory["reason"])
             self.rig.kill_gateway(signal.SIGTERM)
             self.assertIn(word, self.rig.gateway.text())
             self.assertIn("no recording can be written", self.rig.gateway.text())

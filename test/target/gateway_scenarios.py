@@ -65,7 +65,7 @@ def talks(rig):
     assert host.ask(1, {"cmd": "stop"}) == {"id": host.number, "ok": True, "state": "stopping"}
     stop_ns = rig.machine.now_ns
     assert_stops(rig, stop_ns, RAMP_NS)
-    assert "said stop" in host.ask(1, {"cmd": "why"})["sentence"]
+    assert "requested a stop" in host.ask(1, {"cmd": "why"})["sentence"]
     assert host.events("stop") and host.events("lease")[0]["change"] == "gained" and len(host.events("state")) >= 8
     assert longest_line(host) <= host.line_bytes
     rig.note(f"stack {rig.stack_used()} B, {rig.machine.busy_ns * 100 / rig.machine.now_ns:.1f} % busy, longest line {longest_line(host)} B")

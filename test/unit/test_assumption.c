@@ -173,7 +173,7 @@ static void assert_word(iw_assumption_state_t state, const char *found, const ch
 TEST(test_assumption_source_text_contains_the_operators_value) {
     assert_word(IW_CONTRADICTED, "181", "", "the operator found 181");
     assert_word(IW_CONTRADICTED, "", "", "the operator found something else");
-    assert_word(IW_CONFIRMED, "192", "", "the operator says so");
+    assert_word(IW_CONFIRMED, "192", "", "confirmed by the operator");
 }
 
 TEST(test_assumption_source_text_contains_the_operators_method) {

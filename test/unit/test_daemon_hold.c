@@ -175,5 +175,5 @@ TEST(test_release_during_the_ramp_is_refused) {
     daemon_rig_run(150);
     (void)daemon_rig_ask(client, "{\"cmd\":\"stop\"}");
     assert_reply("{\"cmd\":\"release\"}",
-                 "\"error\":\"not_at_rest\",\"message\":\"the wheels turn or are told to: left ");
+                 "\"error\":\"not_at_rest\",\"message\":\"the wheels turn or are commanded to: left ");
 }

@@ -71,8 +71,9 @@ TEST(test_arm_without_a_setpoint_type_names_the_section) {
 TEST(test_arm_without_a_track_names_key_section_and_command) {
     daemon_rig.daemon->wheels.core.config.track_mm = 0;
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"track_not_set\"");
-    assert_reply("{\"cmd\":\"arm\"}", "\"track_mm not configured, and every bound of turning rests on it; set it under "
-                                      "[wheels] in the configuration (iwheelctl bringup measures it)\"");
+    assert_reply("{\"cmd\":\"arm\"}",
+                 "\"track_mm not configured, and every limit of turning depends on it; set it under "
+                 "[wheels] in the configuration (iwheelctl bringup measures it)\"");
 }
 
 TEST(test_log_of_estop_is_warning_if_pressed_info_if_released) {

@@ -358,7 +358,7 @@ TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
     daemon_rig_run(20);
     TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[SOCK_WATCH]);
-    TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("refused a client"));
 }
 
 TEST(test_refused_watcher_is_logged_once_until_one_is_accepted) {
@@ -366,13 +366,13 @@ TEST(test_refused_watcher_is_logged_once_until_one_is_accepted) {
     daemon_rig.daemon->clients.most[SOCK_WATCH] = 2;
     connect_crowd(3);
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_EQUAL_UINT(1, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
+    TEST_ASSERT_EQUAL_UINT(1, daemon_rig_logged("refused a client: 2 watchers are connected"));
     (void)close(crowd[0]);
     crowd[0] = -1;
     daemon_rig_run(10);
     connect_crowd(2);
     daemon_rig_run(STOP_MS);
-    TEST_ASSERT_EQUAL_UINT(2, daemon_rig_logged("a client was turned away: 2 watchers are connected"));
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig_logged("refused a client: 2 watchers are connected"));
 }
 
 TEST(test_client_without_descriptor_is_accepted_later) {
@@ -396,7 +396,7 @@ TEST(test_client_without_descriptor_is_accepted_later) {
     daemon_rig.waits = 0;
     daemon_rig_run(SOCK_LISTENER_PAUSE_US / IW_US_PER_MS - 5U);
     const unsigned count = daemon_rig.daemon->clients.count[SOCK_DRIVE];
-    const unsigned lines = daemon_rig_logged("cannot accept clients for want of descriptors; trying again in 200 ms");
+    const unsigned lines = daemon_rig_logged("cannot accept clients: no free descriptor; trying again in 200 ms");
     const uint32_t waits = daemon_rig.waits;
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_UINT(1, count);

@@ -105,7 +105,7 @@ TEST(test_socket_folder_writable_by_others_is_refused_with_fix) {
     static const mode_t modes[] = {0777, 0775, 0757, 0770};
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
-        refused_to_prepare(EX_NOPERM, "others than the directory's owner may write to it", "chmod go-w");
+        refused_to_prepare(EX_NOPERM, "other users than the directory's owner may write to it", "chmod go-w");
     }
 }
 
@@ -125,7 +125,7 @@ TEST(test_socket_folder_of_another_user_is_refused_with_the_fix) {
     TEST_ASSERT_EQUAL_INT(0, chown(folder, STRANGER, STRANGER));
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
-        refused_to_prepare(EX_NOPERM, "belongs to another user", "give the directory to the gateway's user");
+        refused_to_prepare(EX_NOPERM, "belongs to another user", "make the gateway's user its owner");
     }
 }
 
@@ -226,7 +226,7 @@ TEST(test_socket_link_or_plain_file_at_its_path_is_refused) {
     (void)close(open(in_folder("gateway.sock"), O_WRONLY | O_CREAT, 0600));
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
-    assert_said("is no socket");
+    assert_said("is not a socket");
     TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
 }
 

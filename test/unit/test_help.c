@@ -34,7 +34,7 @@ TEST(test_help_names_the_configuration_that_is_read) {
     expect_said(help_doctor, "else " GATEWAY_CONFIG_PATH ", if it is there\n");
     expect_said(help_bringup, "else " GATEWAY_CONFIG_PATH ", if");
     expect_said(mqtt_help, "configuration (" MQTT_SETTINGS_PATH ", if it exists)\n");
-    expect_said(mqtt_fleet_help, "(" FLEET_SETTINGS_PATH ", if there)\n");
+    expect_said(mqtt_fleet_help, "(" FLEET_SETTINGS_PATH ", if it exists)\n");
     expect_said(help_fleet, FLEET_SETTINGS_PATH);
     expect_said(ros_help, "configuration (" ROS_SETTINGS_PATH ", if it exists)\n");
     expect_said(serial_help, "configuration (" SERIAL_SETTINGS_PATH ", if it exists)\n");

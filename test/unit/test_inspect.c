@@ -60,7 +60,7 @@ TEST(test_inspect_offline_wheel_fails_without_finding_of_rates) {
         heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
     }
     inspect_bus(&local, &heard, &config, &findings);
-    expect("right_wheel", INSPECT_FAIL, "right wheel: not heard for 2000 ms", "power, cable");
+    expect("right_wheel", INSPECT_FAIL, "right wheel: no telemetry for 2000 ms", "power, cable");
     TEST_ASSERT_NULL(find("rates"));
     expect("left_wheel", INSPECT_OK, "left wheel", "");
 }
@@ -88,7 +88,7 @@ TEST(test_inspect_missing_message_is_named) {
     hear_healthy();
     heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
     inspect_bus(&local, &heard, &config, &findings);
-    expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
+    expect("rates", INSPECT_WARN, "right pose 290 (0x122): none received", "firmware");
 }
 
 TEST(test_inspect_offsets_may_be_missing_after_a_minute) {
@@ -117,7 +117,7 @@ TEST(test_inspect_unknown_ids_are_listed_up_to_a_limit) {
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
     inspect_heard_take(&heard, &frame);
     inspect_bus(&local, &heard, &config, &findings);
-    expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0",
+    expect("unknown_ids", INSPECT_WARN, "3 frames do not belong to the wheels: 0x266 0x1ABCDEF0",
            "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
     for (uint32_t id = 1; id <= 20U; id++) {
         frame.id = id;
@@ -156,7 +156,7 @@ TEST(test_inspect_bus_that_was_never_up_does_not_judge_wheels) {
     TEST_ASSERT_NULL(find("left_wheel"));
     inspect_begin(&findings);
     inspect_bus(&local, &heard, &config, &findings);
-    expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
+    expect("interface", INSPECT_FAIL, "no simulator there", "iwheel-sim --can");
 }
 
 TEST(test_inspect_error_passive_bus_warns) {
@@ -239,7 +239,7 @@ TEST(test_inspect_granted_buffer_is_reported) {
 TEST(test_inspect_buffer_not_granted_names_its_command) {
     const iwl_bus_link_t link = {.presence = IWL_LINK_UP, .room_bytes = 425984U};
     inspect_room(&link, &findings);
-    expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; when others",
+    expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; if other",
            "sudo sysctl net.core.rmem_max=4194304");
 }
 

@@ -283,7 +283,7 @@ TEST(test_reply_quotes_time_seq_and_reply_of_the_gateway) {
     length = mqtt_tell_answer(BOOT, NOW_US, &order, NULL, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
                                  "\",\"t_us\":50000000,\"cmd\":\"why\",\"seq\":3,\"ok\":false,\"error\":\"doubled\","
-                                 "\"message\":\"seq must rise with each command of a sender\"}",
+                                 "\"message\":\"seq must increase with each command of a sender\"}",
                                  text, length);
 }
 

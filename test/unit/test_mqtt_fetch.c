@@ -124,7 +124,8 @@ TEST(test_fetch_continues_after_a_restart_of_the_bridge) {
     (void)answer("\"ok\":true,\"offset\":0,\"size\":18," DATA ",\"file_crc32\":null");
     must_ask("recording");
     boot = "bb";
-    (void)answer("\"ok\":false,\"error\":\"other_boot\",\"message\":\"quote the boot and t_us that are here\"");
+    (void)answer(
+        "\"ok\":false,\"error\":\"other_boot\",\"message\":\"send it again with boot and t_us of this reply\"");
     must_ask("recording");
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"boot\":\"bb\""));
     TEST_ASSERT_NOT_NULL(strstr(asked, "\"offset\":9}"));
@@ -160,7 +161,7 @@ TEST(test_fetch_unknown_machine_fails_after_6_s) {
     now_us += 6U * SECOND_US;
     TEST_ASSERT_FALSE(step());
     TEST_ASSERT_EQUAL_INT(69, fetch.code);
-    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "no machine w1 is known"));
+    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "this broker has no machine w1"));
 }
 
 TEST(test_fetch_damaged_piece_is_retried_then_fails) {
@@ -174,7 +175,7 @@ TEST(test_fetch_damaged_piece_is_retried_then_fails) {
     }
     TEST_ASSERT_EQUAL(FETCH_FAILED, fetch.stage);
     TEST_ASSERT_EQUAL_INT(65, fetch.code);
-    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "stop-000017-wheel_lost.jsonl of w1 is not as its checksum says"));
+    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "the checksum of stop-000017-wheel_lost.jsonl of w1 is wrong"));
 }
 
 TEST(test_fetch_incomplete_file_is_never_done) {
@@ -216,12 +217,12 @@ TEST(test_fetch_always_late_fails_with_the_last_reason) {
             sent++;
             (void)answer((strcmp(verb, "hello") == 0)
                              ? "\"ok\":true"
-                             : "\"ok\":false,\"error\":\"late\",\"message\":\"too long under way\"");
+                             : "\"ok\":false,\"error\":\"late\",\"message\":\"too long on the way\"");
         }
         now_us += 50000U;
     }
     TEST_ASSERT_EQUAL_INT(75, fetch.code);
-    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "it said last: too long under way"));
+    TEST_ASSERT_NOT_NULL(strstr(fetch.why, "its last message: too long on the way"));
     TEST_ASSERT_LESS_THAN_UINT(300, sent);
 }
 

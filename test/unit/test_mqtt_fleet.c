@@ -102,9 +102,9 @@ TEST(test_fleet_last_stop_is_the_latest_received_one_first) {
 }
 
 TEST(test_fleet_table_names_the_source_of_the_last_stops) {
-    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of each machine's info"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: from each machine's info"));
     fleet.stream = "n1";
-    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of the stream at n1"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: from the stream at n1"));
 }
 
 TEST(test_fleet_garbage_is_ignored_and_counted) {

@@ -204,7 +204,7 @@ TEST(test_history_all_has_other_events_and_bridge_restarts) {
     stop("a", 1, 1, 1, 1);
     other("fault",
           "{\"id\":\"b-2\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
-    TEST_ASSERT_NOT_NULL(strstr(text(), "w1           -- its bridge began anew: boot b\n"));
+    TEST_ASSERT_NOT_NULL(strstr(text(), "w1           -- its bridge restarted: boot b\n"));
     TEST_ASSERT_NOT_NULL(strstr(told, "w1           fault  cause bus, present true\n"));
 }
 
@@ -227,7 +227,7 @@ TEST(test_history_missed_stop_has_its_own_time_and_a_late_mark) {
     other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
                   "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
     TEST_ASSERT_NOT_NULL(
-        strstr(text(), "2026-11-21 22:01:00 w1           stop   gone (told late: its bridge did not run)"));
+        strstr(text(), "2026-11-21 22:01:00 w1           stop   gone (reported late: its bridge did not run)"));
 }
 
 TEST(test_history_json_nests_the_message_and_ends_with_the_sum) {

@@ -31,10 +31,11 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
 
 TEST(test_why_names_cause_numbers_time_and_fix) {
     TEST_ASSERT_EQUAL_STRING(
-        "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
+        "left wheel sent no telemetry for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
         "check the wheel's power and cable, then: iwheelctl reset",
         sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never heard"));
+    TEST_ASSERT_NOT_NULL(
+        strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never sent telemetry"));
     TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_SECOND_MASTER, 0, 266), "id 266 (0x10A)"));
     TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_SOFTWARE, 0, 3), "\"joystick\" (client 3, pid 9) (\"kerb\")"));
     TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 1), "e-stop unix:/e pressed"));
@@ -197,7 +198,7 @@ static const char *not_at_rest(void) {
 }
 
 TEST(test_refusal_at_standstill_names_the_time_and_no_speeds) {
-    static const char turning[] = "the wheels turn or are told to: left ";
+    static const char turning[] = "the wheels turn or are commanded to: left ";
     TEST_ASSERT_EQUAL_STRING("the wheels are not at standstill for 200 ms yet; wait, then try again", not_at_rest());
     for (unsigned side = 0; side < IW_SIDES; side++) {
         static const int16_t still[] = {-2, 2};

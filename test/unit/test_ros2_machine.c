@@ -267,8 +267,8 @@ TEST(test_diagnosis_without_a_fault_is_ok) {
 
 TEST(test_diagnosis_gateway_offline_is_an_error_others_stale) {
     facts.link = ROS_LINK_GONE;
-    (void)snprintf(facts.trouble, sizeof facts.trouble, "nobody listens");
-    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "nobody listens");
+    (void)snprintf(facts.trouble, sizeof facts.trouble, "no program listens");
+    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "no program listens");
     expect(ROS_TELLS_LEFT, ROS_STALE, "gone");
     facts.link = ROS_LINK_SILENT;
     expect(ROS_TELLS_GATEWAY, ROS_ERROR, "does not answer");
@@ -289,7 +289,7 @@ TEST(test_diagnosis_each_stop_has_its_sentence_and_fix) {
     facts.machine.now.machine = IWC_LISTENING;
     facts.machine.rolling = true;
     expect(ROS_TELLS_GATEWAY, ROS_WARN,
-           "a wheel turns although nothing is sent to it: hold the machine, or use its parking brake");
+           "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake");
     facts.machine.rolling = false;
     (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "pressed");
     expect(ROS_TELLS_ESTOP, ROS_ERROR, "release the button");
@@ -324,7 +324,7 @@ TEST(test_diagnosis_commands_report_why_they_do_not_drive) {
     expect(ROS_TELLS_COMMANDS, ROS_WARN,
            "no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, 7 so far");
     facts.commands.coming = false;
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late, 7 were no usable numbers");
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late, 7 had no usable numbers");
     facts.commands.coming = true;
     facts.commands.unusable = false;
     facts.commands.publishers = 2;
@@ -344,7 +344,8 @@ TEST(test_diagnosis_unmatched_publisher_is_named_with_the_fix) {
            "1 publishers of /w1/cmd_vel are not received: one sends ackermann_msgs/msg/AckermannDrive; publish "
            "geometry_msgs/msg/Twist, or set [drive] command = both");
     unmatched->policy = "partition";
-    expect(ROS_TELLS_COMMANDS, ROS_WARN, "the QoS policy partition of one of type ackermann_msgs/msg/AckermannDrive");
+    expect(ROS_TELLS_COMMANDS, ROS_WARN,
+           "the QoS policy partition of a publisher of ackermann_msgs/msg/AckermannDrive");
     *unmatched = (ros_unmatched_t){.topic = "/cmd_vel", .elsewhere = "/diff_drive/cmd_vel"};
     expect(ROS_TELLS_COMMANDS, ROS_OK, "no publisher of /cmd_vel, but /diff_drive/cmd_vel has one: remap it");
     facts.commands.publishers = 1;

@@ -62,9 +62,9 @@ TEST(test_settings_each_error_names_line_and_fix) {
         {"[drive]\nauto_arm = maybe\n", "no or yes"},
         {"[drive]\nautoarm = yes\n", "did you mean auto_arm"},
         {"[ros]\nauto_arm = yes\n", "move it to [drive]"},
-        {"[ros]\nnamespace = 9w\n", "no name for ROS"},
-        {"[ros]\nnamespace = /w\n", "no name for ROS"},
-        {"[ros]\nnode = a b\n", "no name for ROS"},
+        {"[ros]\nnamespace = 9w\n", "is not a valid name for ROS"},
+        {"[ros]\nnamespace = /w\n", "is not a valid name for ROS"},
+        {"[ros]\nnode = a b\n", "is not a valid name for ROS"},
         {"[ros]\ndomain = 233\n", "0..232"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

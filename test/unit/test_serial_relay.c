@@ -543,7 +543,7 @@ static bool noise_after_nothing(void) {
         device_sends("login: \n");
     }
     assert_told_at(2600, "nothing comes");
-    assert_told_at(5100, "baud rate is another");
+    assert_told_at(5100, "baud rate is not");
     assert_told_at(7600, "another protocol");
     return step == 9000U;
 }
@@ -576,7 +576,7 @@ static bool board_restarts_late(void) {
     if (step == 5000U) {
         board_writes(1, 5, "{\"event\":\"state\"}");
     }
-    assert_told_at(7400, "started anew");
+    assert_told_at(7400, "has restarted");
     return step == 7600U;
 }
 

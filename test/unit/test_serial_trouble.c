@@ -40,8 +40,8 @@ static void explains(const serial_noise_t *noise, const char *words) {
 
 TEST(test_trouble_reason_follows_from_the_noise) {
     explains(&nothing, "nothing comes from /dev/x: ");
-    explains(&binary, "80 bytes came from /dev/x that are no text: the baud rate is another than 115200");
-    explains(&text, "another protocol is spoken on /dev/x (such as \"login:\")");
+    explains(&binary, "80 bytes came from /dev/x that are not text: the baud rate is not 115200");
+    explains(&text, "/dev/x uses another protocol (such as \"login:\")");
     explains(&(serial_noise_t){.bytes = 9, .lines = {[IWN_LINE_MISFORMED] = 1}}, "another protocol");
     explains(&(serial_noise_t){.bytes = 9, .lines = {[IWN_LINE_CORRUPT] = 3, [IWN_LINE_UNCHECKED] = 1}},
              "damaged from /dev/x (3 with a wrong CRC)");

@@ -210,7 +210,7 @@ TEST(test_settings_errors_have_line_and_fix) {
         {"[web]\ncertificate = /a\n", "f:2: certificate is given without key"},
         {"[drive]\nallow_reset = yes\n", "f:2: allow_reset = yes needs the right to drive"},
         {"[drive]\nenabled = true\n", "f:2: "},
-        {"[drive]\nport = 1\n", "f:2: port is no key of [drive]; move it to [web]"},
+        {"[drive]\nport = 1\n", "f:2: port is not a key of [drive]; move it to [web]"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         web_settings_t settings;

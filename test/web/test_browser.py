@@ -398,7 +398,7 @@ def fleet_row(name, **other):
 
 def write_fleet(rig, age_s=0.0):
     now_us = int((time.time() - age_s) * 1e6)
-    sentence = "left wheel not heard for 204 ms while driving 300/300 mm/s; zero at once, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
+    sentence = "left wheel sent no telemetry for 204 ms while driving 300/300 mm/s; zero at once, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
     rows = [
         fleet_row("walker-1"),
         fleet_row(
@@ -443,7 +443,9 @@ def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
             links = page.evaluate("[...document.querySelectorAll('#machines th a')].map((one) => one.href)")
             assert links[0] == "https://walker-1.local:8470/" and len(links) == 4, links
             assert cells[0][1:] == ["listening", "none known", "24.8 V / 24.7 V", "operator / operator", "0.2.0"], cells[0]
-            assert cells[1][1] == "latched" and "wheel_lost. left wheel not heard for 204 ms" in cells[1][2] and cells[1][4] == "operator / doubted", cells[1]
+            assert cells[1][1] == "latched" and "wheel_lost. left wheel sent no telemetry for 204 ms" in cells[1][2] and cells[1][4] == "operator / doubted", (
+                cells[1]
+            )
             assert cells[2][1:] == ["offline", "none known", "unknown", "unknown", "unknown"], cells[2]
             assert "<img src=x onerror=alert(1)>" in cells[3][2] and cells[3][3] == "24.8 V / unknown" and not page.query_selector("#machines img"), cells[3]
             facts = page.evaluate("['count', 'online', 'latched', 'contradicted'].map((id) => document.getElementById(id).textContent)")

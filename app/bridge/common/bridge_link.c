@@ -90,15 +90,14 @@ static int judge_rights(bridge_link_t *self) {
         self->denied_us = self->now_us;
     }
     if (self->terms.drives && self->line.state == BRIDGE_HERE && iwc_watches_only(self->line.gateway)) {
-        (void)fprintf(
-            stderr,
-            "%s: %s is for watching only; let socket under [gateway] name the one to drive by, or set enabled = no "
-            "under [drive]\n",
-            self->terms.program, self->terms.socket);
+        (void)fprintf(stderr,
+                      "%s: %s is for watching only; set socket under [gateway] to the drive socket, or enabled = no "
+                      "under [drive]\n",
+                      self->terms.program, self->terms.socket);
         return EX_NOPERM;
     }
     if (self->denied_us != 0U && self->now_us - self->denied_us >= DENIED_US) {
-        (void)fprintf(stderr, "%s: %s may not be used by this user; put it into group %s\n", self->terms.program,
+        (void)fprintf(stderr, "%s: this user may not use %s; add the user to group %s\n", self->terms.program,
                       self->terms.socket,
                       self->terms.drives ? "iwheel (a drop-in for that is among the examples in /usr/share/doc)"
                                          : "iwheel-watch");

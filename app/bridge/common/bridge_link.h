@@ -67,7 +67,7 @@ typedef struct {
 bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, const bridge_listener_t *listener);
 void bridge_link_close(bridge_link_t *self);
 
-/// Connects, reads, sends waiting questions, and gives up questions without an answer. Returns 0, or 77 with a line on
+/// Connects, reads, sends waiting requests, and drops requests whose reply is overdue. Returns 0, or 77 with a line on
 /// stderr if rights are missing.
 int bridge_link_step(bridge_link_t *self, uint64_t now_us);
 

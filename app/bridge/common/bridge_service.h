@@ -24,7 +24,7 @@ int64_t bridge_wall_us(void);
 /// because threads inherit the mask.
 void bridge_service_take_signals(void);
 
-/// Waits like poll. Returns false if a signal asked for the end, before or during the call.
+/// Waits like poll. Returns false if a signal requested the end, before or during the call.
 bool bridge_service_wait(struct pollfd *fds, unsigned count, int wait_ms);
 
 /// Reads NOTIFY_SOCKET and WATCHDOG_USEC from the environment.

@@ -38,7 +38,7 @@ struct bridge_stop {
     uint64_t wait_us; ///< Delay between two tries.
     uint64_t random;
     uint64_t since_us;                           ///< Time at which the line came up.
-    bool in_flight[BRIDGE_STOP_KINDS];           ///< Sent without a reply; a new request may be wanted before.
+    bool in_flight[BRIDGE_STOP_KINDS];           ///< Sent without a reply; a new request may come before it.
     uint64_t wanted_until_us[BRIDGE_STOP_KINDS]; ///< Deadline of a request that is not sent yet; 0: none.
     char request[BRIDGE_STOP_KINDS][BRIDGE_REQUEST_SIZE];
     bridge_stop_tag_t tag[BRIDGE_STOP_KINDS];
@@ -50,7 +50,7 @@ struct bridge_stop {
 bool bridge_stop_open(bridge_stop_t *self, const char *socket, int epoll_fd);
 void bridge_stop_close(bridge_stop_t *self);
 
-/// Connects, sends, reads, and gives up requests without an answer.
+/// Connects, sends, reads, and drops requests whose reply is overdue.
 void bridge_stop_step(bridge_stop_t *self, uint64_t now_us);
 uint64_t bridge_stop_next_us(const bridge_stop_t *self, uint64_t now_us);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The drive connections of a bridge: one per person, and the key that gives this person the right to drive.
+/// The drive connections of a bridge: one per person, with the key that proves this person's right to drive.
 ///
 ///     FREE --arm--> ASKING --granted--> HELD --end--> ENDING --0.4 s, or needed again--> FREE
 ///                     |                   |
@@ -72,7 +72,7 @@ struct bridge_lease {
 bool bridge_lease_open(bridge_lease_t *self, const char *socket, int epoll_fd);
 void bridge_lease_close(bridge_lease_t *self);
 
-/// Connects, reads, and gives up requests without an answer.
+/// Connects, reads, and drops requests whose reply is overdue.
 void bridge_lease_step(bridge_lease_t *self, uint64_t now_us);
 uint64_t bridge_lease_next_us(const bridge_lease_t *self, uint64_t now_us);
 

@@ -60,7 +60,7 @@ static int parse(const bridge_program_t *self, int count, char **arguments, want
         }
         if (option == '?' || option == ':') {
             return misuse(self, arguments[optind - 1],
-                          (option == ':') ? "needs a value" : "is no option of this program");
+                          (option == ':') ? "needs a value" : "is not an option of this program");
         }
         if (!begin_is_value(self->form->program, optarg)) {
             return EX_USAGE;
@@ -75,7 +75,8 @@ static int parse(const bridge_program_t *self, int count, char **arguments, want
             out_wanted->action = option - TO_DO;
         }
     }
-    return (optind < count) ? misuse(self, arguments[optind], "means nothing: there are options only") : BRIDGE_GO;
+    return (optind < count) ? misuse(self, arguments[optind], "is not valid: this program has options only")
+                            : BRIDGE_GO;
 }
 
 /// Returns 0, or the error of reading.

@@ -144,7 +144,8 @@ bool bridge_reach_is_local(const char *program, const int *except, size_t count)
     const unsigned found = bridge_reach_count(except, count, text);
     if (found > 0U) {
         (void)fprintf(
-            stderr, "%s: other machines can reach %u of its sockets against its configuration: %s; please report it\n",
+            stderr,
+            "%s: other machines can reach %u of its sockets against its configuration: %s; report this defect\n",
             program, found, text);
     }
     return found == 0U;

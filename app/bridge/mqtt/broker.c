@@ -145,9 +145,9 @@ static void judge_end(mqtt_broker_t *self) {
         (void)fprintf(
             stderr,
             "%s: the broker at %s ended the connection %s; the name %s or the user is used by another client: "
-            "give each machine and each console its own%s\n",
+            "configure a separate name for each machine and each console%s\n",
             self->listener.program, self->host,
-            taken ? "because another client took it over" : "again and again just after it accepted it",
+            taken ? "because another client used its name" : "repeatedly, shortly after accepting it",
             self->listener.name, taken ? "" : ", or see the broker's log for a message that it does not accept");
         self->short_us = self->now_us + SHORT_TOLD_US;
     }
@@ -157,8 +157,8 @@ static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
     judge_end(self);
     if (!self->told_away) {
-        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); trying for ever\n", self->listener.program,
-                      self->host, self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
+        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); retrying\n", self->listener.program, self->host,
+                      self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
     }
     self->told_away = true;
     mosquitto_destroy(self->client);
@@ -240,7 +240,7 @@ static void begin_connecting(mqtt_broker_t *self) {
     self->lost = false;
     self->refusal = 0;
     if (!set_up(self)) {
-        lose(self, "its client cannot be made: certificate or key, or no memory");
+        lose(self, "cannot create its client: check certificate and key, or the memory is full");
         return;
     }
     self->caller.client = self->client;

@@ -113,13 +113,12 @@ static void write_command(fetch_t *self, const char **out_verb, char out_payload
 
 static void give_up(fetch_t *self) {
     if (!self->seen) {
-        fail(self, EX_UNAVAILABLE, "no machine %s is known at this broker; which there are: iwheel-fleet --for 5",
-             self->id);
+        fail(self, EX_UNAVAILABLE, "this broker has no machine %s; list the machines: iwheel-fleet --for 5", self->id);
     } else if (self->words[0] != '\0') {
-        fail(self, EX_TEMPFAIL, "%s has not sent what was asked for %" PRIu64 " s; it said last: %s", self->id,
+        fail(self, EX_TEMPFAIL, "%s has not sent the recording for %" PRIu64 " s; its last message: %s", self->id,
              self->patience_us / 1000000U, self->words);
     } else {
-        fail(self, EX_TEMPFAIL, "%s has not answered for %" PRIu64 " s%s; ask again when iwheel-fleet shows it online",
+        fail(self, EX_TEMPFAIL, "%s has not answered for %" PRIu64 " s%s; try again when iwheel-fleet shows it online",
              self->id, self->patience_us / 1000000U,
              self->online ? "" : " and is offline: its bridge, gateway or network is away");
     }
@@ -196,12 +195,12 @@ static fetch_news_t take_piece(fetch_t *self, const iwc_message_t *reply, uint64
     if (!iwc_piece_take(reply, self->bytes, &piece)) {
         self->again++;
         self->refused++;
-        (void)snprintf(self->words, sizeof self->words, "a piece that is not as its checksum says");
+        (void)snprintf(self->words, sizeof self->words, "the checksum of a piece is wrong");
         if (self->refused >= REFUSED_MAX) {
             fail(
                 self, EX_DATAERR,
-                "%s%s of %s is not as its checksum says: damaged on the way, or on that machine's disk; ask again, and "
-                "if it stays so, copy it from there",
+                "the checksum of %s%s of %s is wrong: damaged on the way, or on that machine's disk; try again, and if "
+                "the error stays, copy the file from that machine",
                 self->list[self->chosen].name, fetch_endings[self->file], self->id);
         }
         return FETCH_NOTHING;

@@ -255,9 +255,11 @@ void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out) {
     (void)fputs("\n", out);
     show_contradictions(self, out);
     if (self->stream != NULL) {
-        (void)fprintf(out, "last stops: of the stream at %s, of each machine's info, and as heard\n", self->stream);
+        (void)fprintf(out, "last stops: from the stream at %s, from each machine's info, and from received events\n",
+                      self->stream);
     } else {
-        (void)fputs("last stops: of each machine's info, which knows none from before its bridge began, and as heard\n",
+        (void)fputs("last stops: from each machine's info, which has none from before its bridge started, and from "
+                    "received events\n",
                     out);
     }
 }

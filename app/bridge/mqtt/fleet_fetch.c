@@ -65,7 +65,7 @@ static int name_files(asking_t *self) {
             return complain(EX_USAGE, "-o", "the path is too long");
         }
         if (access(part->path, F_OK) == 0) {
-            return complain(EX_CANTCREAT, part->path, "is there already, and is not touched; name another: -o FILE");
+            return complain(EX_CANTCREAT, part->path, "exists already and is not changed; name another: -o FILE");
         }
     }
     return 0;
@@ -181,10 +181,11 @@ static int run_to(asking_t *self, fetch_stage_t stage) {
         wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
         (void)poll(&wait, 1, 50);
         if (*self->wanted->end_asked != 0) {
-            return complain(EX_TEMPFAIL, self->fetch.id, "ended before it was whole; nothing is kept");
+            return complain(EX_TEMPFAIL, self->fetch.id,
+                            "ended before the recording was complete; no file was written");
         }
         if (self->broker.state != MQTT_UP && bridge_now_us() >= no_broker_us) {
-            return complain(EX_UNAVAILABLE, self->fetch.id, "no broker; see host and port under [broker]");
+            return complain(EX_UNAVAILABLE, self->fetch.id, "no broker; check host and port under [broker]");
         }
     }
     if (self->fetch.stage == FETCH_FAILED) {
@@ -288,7 +289,7 @@ static void show_fetched(const asking_t *self) {
     const fetch_t *fetch = &self->fetch;
     const char *path = self->parts[FETCH_FILES - 1U].path;
     (void)printf("%s: %s, %" PRIu64 " bytes in %" PRIu64 " pieces, %" PRIu64
-                 " asked for again; whole, as the machine's checksums say\n",
+                 " requested again; the checksums are correct\n",
                  fetch->id, fetch->list[fetch->chosen].name, self->bytes, fetch->pieces, fetch->again);
     (void)printf("why it stopped: iwheelctl why %s\nits frames:     iwheelctl decode %s\n", path, path);
 }

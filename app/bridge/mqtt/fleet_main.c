@@ -52,7 +52,7 @@ __attribute__((format(printf, 1, 2))) static int misuse(const char *format, ...)
 static int take_number(const char *option, uint64_t *out_number) {
     uint32_t number = 0;
     if (!settings_digits(optarg, strlen(optarg), &number) || number == 0U) {
-        return misuse("%s wants a number of seconds, not \"%.40s\"", option, optarg);
+        return misuse("%s needs a number of seconds, not \"%.40s\"", option, optarg);
     }
     *out_number = number;
     return -1;
@@ -61,13 +61,13 @@ static int take_number(const char *option, uint64_t *out_number) {
 static int take_when(const char *option, int64_t *out_us) {
     return history_when(optarg, out_us)
                ? -1
-               : misuse("%s wants a time such as 2026-11-21T22:00, not \"%.40s\"", option, optarg);
+               : misuse("%s needs a time such as 2026-11-21T22:00, not \"%.40s\"", option, optarg);
 }
 
 static int take_last(history_config_t *span) {
     int64_t last_us = 0;
     if (!history_span(optarg, &last_us)) {
-        return misuse("--last wants a span such as 90min, 12h or 7d, not \"%.40s\"", optarg);
+        return misuse("--last needs a span such as 90min, 12h or 7d, not \"%.40s\"", optarg);
     }
     span->since_us = bridge_wall_us() - last_us;
     return -1;
@@ -135,7 +135,7 @@ static int take_words(words_t *self, int count, char **words) {
         }
     }
     if (count > 0 && self->verb == TABLE) {
-        return misuse("\"%.40s\" is no verb; there are history, recordings and recording", words[0]);
+        return misuse("\"%.40s\" is not a verb; the verbs are history, recordings and recording", words[0]);
     }
     if (count > most[self->verb]) {
         return misuse("\"%.40s\" is one word too many", words[most[self->verb]]);
@@ -143,10 +143,10 @@ static int take_words(words_t *self, int count, char **words) {
     self->wanted.id = (count > 1) ? words[1] : NULL;
     self->wanted.name = (count > 2) ? words[2] : NULL;
     if (self->wanted.id != NULL && !mqtt_settings_is_name(self->wanted.id)) {
-        return misuse("\"%.40s\" is no machine's id: letters, digits, _ and -", self->wanted.id);
+        return misuse("\"%.40s\" is not the id of a machine: use letters, digits, _ and -", self->wanted.id);
     }
     if (self->wanted.id == NULL && (self->verb == RECORDINGS || self->verb == RECORDING)) {
-        return misuse("%s wants the id of a machine", verbs[self->verb]);
+        return misuse("%s needs the id of a machine", verbs[self->verb]);
     }
     return -1;
 }
@@ -155,7 +155,7 @@ static int take_words(words_t *self, int count, char **words) {
 static int judge(words_t *self) {
     history_config_t *span = &self->wanted.span;
     if ((self->used & IN(self->verb)) == 0U) {
-        return misuse("one of the options is of another verb");
+        return misuse("one of the options belongs to another verb");
     }
     if (self->verb == TABLE && self->wanted.json && self->wanted.seconds == 0U) {
         return misuse("--json needs --for SECONDS");
@@ -168,7 +168,7 @@ static int judge(words_t *self) {
     if (span->since_us <= 0) {
         span->since_us = span->until_us - DAY_US;
     }
-    return (span->since_us < span->until_us) ? -1 : misuse("--since must lie before --until");
+    return (span->since_us < span->until_us) ? -1 : misuse("--since must be before --until");
 }
 
 /// Returns -1 to continue, otherwise the exit code.

@@ -244,7 +244,7 @@ static void show(const history_t *self, const history_machine_t *machine, const 
         write_fields(event, name, text, sizeof text);
     }
     if (self->config.all && machine->began) {
-        (void)fprintf(self->out, "%-19s %-12s -- its bridge began anew: boot %s\n", "", machine->id,
+        (void)fprintf(self->out, "%-19s %-12s -- its bridge restarted: boot %s\n", "", machine->id,
                       machine->runs[machine->run].boot);
     }
     if (machine->missing > 0U) {
@@ -259,7 +259,7 @@ static void show(const history_t *self, const history_machine_t *machine, const 
                      "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
     }
     (void)fprintf(self->out, "%-19s %-12s %-6s %s%s", when, machine->id, name, text,
-                  (iwc_truth(event, "missed").value == 1) ? " (told late: its bridge did not run)" : "");
+                  (iwc_truth(event, "missed").value == 1) ? " (reported late: its bridge did not run)" : "");
     if (late_us > MINUTE_US) {
         (void)fprintf(self->out, " (stored %s)", stored);
     } else if (late_us < -MINUTE_US) {
@@ -365,10 +365,10 @@ void history_sum(const history_t *self, const char *host) {
                   self->config.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
                   (machines == 1U) ? "" : "s", since, until, host);
     if (self->doubled > 0U) {
-        (void)fprintf(self->out, "; %" PRIu64 " doubles left out", self->doubled);
+        (void)fprintf(self->out, "; %" PRIu64 " duplicates left out", self->doubled);
     }
     if (self->garbled > 0U) {
-        (void)fprintf(self->out, "; %" PRIu64 " that cannot be read", self->garbled);
+        (void)fprintf(self->out, "; %" PRIu64 " unreadable", self->garbled);
     }
     if (self->missing + self->unheard > 0U) {
         (void)fprintf(self->out, "; MISSING: %" PRIu64 " stops, %" PRIu64 " events of any kind", self->unheard,

@@ -250,7 +250,7 @@ static int no_spool(const mqtt_settings_t *settings) {
     } else if (errno == EPERM) {
         why = "others may write to the directory, or it or its file " MQTT_SPOOL_FILE " belongs to another user";
     } else if (errno == ELOOP || errno == ENOTDIR) {
-        why = "a symbolic link, or no directory";
+        why = "it is a symbolic link, or not a directory";
     }
     (void)fprintf(stderr,
                   "iwheel-mqtt: %s: %s; make it, for this bridge alone, or name another one as directory under "
@@ -272,8 +272,8 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
     }
     if (unwritten != 0) {
         (void)fprintf(stderr,
-                      "iwheel-mqtt: warning: %s: %s: it starts, and its end loses every event that the broker does not "
-                      "have yet; let the bridge write there, or name another one as directory under [spool]\n",
+                      "iwheel-mqtt: warning: %s: %s: the bridge starts, but at its end it loses every event that the "
+                      "broker does not have yet; let it write there, or set another directory under [spool]\n",
                       settings->spool.directory, strerror(unwritten));
     }
     const int code = mqtt_broker_open(&broker, settings, &nobody);
@@ -321,7 +321,7 @@ static void poll_events(mqtt_bridge_t *self) {
         self->told_behind = self->spool.behind;
         (void)fprintf(stderr, "iwheel-mqtt: %s\n",
                       self->spool.behind
-                          ? "the spool's disk takes nothing; events are kept in memory only. See df, dmesg"
+                          ? "the spool's disk accepts no data; events are stored in memory only; see df, dmesg"
                           : "the spool is on its disk again");
         self->info_due = true;
     }

@@ -197,16 +197,19 @@ static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_u
     int64_t told_us = -1;
     const int64_t ttl_ms = ttl_of(rules, root, order->verb);
     if (!text_of(root, "boot", boot, sizeof boot) || !number_of(root, "t_us", &told_us) || told_us < 0 || ttl_ms == 0) {
-        return drop(order, MQTT_GARBLED, "it needs boot and t_us of a message of this machine's; ttl_ms is 1 to 1000");
+        return drop(order, MQTT_GARBLED,
+                    "the command needs boot and t_us of a message of this machine; ttl_ms is 1 to 1000");
     }
     if (strcmp(boot, rules->boot) != 0) {
-        return drop(order, MQTT_OTHER_BOOT, "quote the boot and t_us that are here");
+        return drop(order, MQTT_OTHER_BOOT, "send it again with boot and t_us of this reply");
     }
     if ((uint64_t)told_us > now_us) {
-        return drop(order, MQTT_EARLY, "quote the t_us that is here; add nothing");
+        return drop(order, MQTT_EARLY,
+                    "t_us is ahead of this machine; send it again with t_us of this reply, unchanged");
     }
     if (now_us - (uint64_t)told_us > (uint64_t)ttl_ms * 1000U) {
-        return drop(order, MQTT_LATE, "too long under way, or an old message was quoted; again with the t_us here");
+        return drop(order, MQTT_LATE,
+                    "too long on the way, or t_us of an old message; send it again with t_us of this reply");
     }
     return true;
 }
@@ -221,7 +224,7 @@ static bool judge_count(mqtt_judge_t *self, uint64_t now_us, mqtt_order_t *order
     }
     if (strcmp(self->senders[place].name, order->from) == 0 && order->seq <= self->senders[place].seq &&
         now_us - self->senders[place].received_us <= FORGET_US) {
-        return drop(order, MQTT_DOUBLED, "seq must rise with each command of a sender");
+        return drop(order, MQTT_DOUBLED, "seq must increase with each command of a sender");
     }
     memcpy(self->senders[place].name, order->from, sizeof order->from);
     self->senders[place].seq = order->seq;
@@ -269,14 +272,14 @@ static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_
         iwn_json_kind(*out_root) != IWN_JSON_OBJECT || !text_of(*out_root, "from", order->from, sizeof order->from) ||
         !mqtt_settings_is_name(order->from)) {
         order->from[0] = '\0';
-        return drop(order, MQTT_GARBLED, "no JSON object with a name as from");
+        return drop(order, MQTT_GARBLED, "not a JSON object with a name in from");
     }
     if (!find_verb(command->verb, &order->verb)) {
         return drop(order, MQTT_GARBLED, "there is no such command");
     }
     if (!number_of(*out_root, "seq", &order->seq) || order->seq < 1) {
         order->seq = 0;
-        return drop(order, MQTT_GARBLED, "it needs seq, a number from 1 on that rises with each command");
+        return drop(order, MQTT_GARBLED, "the command needs seq, a number from 1 on that increases with each command");
     }
     return true;
 }
@@ -296,14 +299,14 @@ static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const m
         return false;
     }
     if (!write_request(root, order)) {
-        return drop(order, MQTT_GARBLED, "it has a field that this command has not, or a value that is none");
+        return drop(order, MQTT_GARBLED, "it has a field that this command does not have, or an invalid value");
     }
     if (command->retained) {
         return drop(order, MQTT_RETAINED, "a command must not be retained");
     }
     int64_t stop = 0;
     if (order->verb == MQTT_RESET && (!number_of(root, "stop", &stop) || stop < 0)) {
-        return drop(order, MQTT_GARBLED, "reset needs stop, the number of the stop that it means: see info or why");
+        return drop(order, MQTT_GARBLED, "reset needs stop, the number of the stop to reset: see info or why");
     }
     if (order->verb == MQTT_HELLO) {
         return true;

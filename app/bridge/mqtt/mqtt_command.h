@@ -86,7 +86,7 @@ typedef struct {
     int64_t seq;             ///< 0: unknown.
     bool moves;              ///< A well-formed command with a value that is not zero, dropped or not.
     char key[MQTT_KEY_SIZE]; ///< Key of a command that drives; empty: none.
-    char why[160];           ///< Cause and fix, unless it is taken.
+    char why[160];           ///< Cause and fix, unless it is accepted.
     char request[1024];      ///< Request to the gateway, unless the command is dropped or MQTT_HELLO.
 } mqtt_order_t;
 

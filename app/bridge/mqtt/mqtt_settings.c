@@ -27,7 +27,8 @@ bool mqtt_settings_is_name(const char *text) {
 }
 
 static const char *wrong_name(const char *text) {
-    return mqtt_settings_is_name(text) ? NULL : "is no name in topics; use letters, digits, _ and -, 32 at most";
+    return mqtt_settings_is_name(text) ? NULL
+                                       : "is not a valid name in topics; use letters, digits, _ and -, 32 at most";
 }
 
 static const settings_key_t keys[] = {
@@ -120,20 +121,20 @@ static void relate(settings_report_t *report, const void *values, const unsigned
     const bool certificate = mqtt_settings_given(settings->broker.certificate);
     if (certificate != mqtt_settings_given(settings->broker.key)) {
         settings_complain(report, line_of("broker", certificate ? "certificate" : "key", lines),
-                          "%s is given without %s; give both files, or none", certificate ? "certificate" : "key",
+                          "%s is set without %s; set both files, or none", certificate ? "certificate" : "key",
                           certificate ? "key" : "certificate");
     }
     if (certificate && !tls) {
-        settings_complain(report, line_of("broker", "certificate", lines), "certificate needs TLS; give ca, too");
+        settings_complain(report, line_of("broker", "certificate", lines), "certificate needs TLS; also set ca");
     }
     if (!tls && settings->drive.enabled && !stays_on_this_machine(settings)) {
         settings_complain(report, line_of("drive", "enabled", lines),
-                          "enabled = yes needs TLS to a broker on another machine; give ca under [broker], or set "
+                          "enabled = yes needs TLS to a broker on another machine; set ca under [broker], or "
                           "enabled = no");
     } else if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings)) {
         settings_complain(report, line_of("broker", "host", lines),
-                          "host = %s is another machine, and without TLS whoever is between reads all and may send "
-                          "commands; give ca, or say allow_plain = yes",
+                          "host = %s is another machine, and without TLS anybody on the network between them can read "
+                          "everything and send commands; set ca, or allow_plain = yes",
                           settings->broker.host);
     }
     if (settings->drive.allow_reset && !settings->drive.enabled) {

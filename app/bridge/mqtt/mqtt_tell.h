@@ -40,8 +40,8 @@ size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us,
                              mqtt_buffer_t out);
 
 /// Writes the answer to a command: the command, `boot`, the current `t_us`, and the reply of the gateway. Without a
-/// reply (NULL) it states whether the command was taken, and otherwise why not. `order->key` of an `arm`, unless empty,
-/// is added if the reply has no key.
+/// reply (NULL) it states whether the command was accepted, and otherwise why not. `order->key` of an `arm`, unless
+/// empty, is added if the reply has no key.
 size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
                         mqtt_buffer_t out);
 

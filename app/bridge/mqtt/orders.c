@@ -70,7 +70,7 @@ static void decline(mqtt_bridge_t *self, const mqtt_order_t *order, const char *
 
 static void not_delivered(mqtt_bridge_t *self, const mqtt_order_t *order) {
     decline(self, order, "not_delivered",
-            "NOT DELIVERED: the gateway does not answer; see that it runs: systemctl status iwheel-gateway");
+            "NOT DELIVERED: the gateway does not answer; check that it runs: systemctl status iwheel-gateway");
 }
 
 static void take_answer(void *context, const iwc_message_t *reply) {
@@ -97,7 +97,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
 static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
     waiting_t *place = place_for(self, order);
     if (place == NULL && kind_of(order->verb) != STOP) {
-        decline(self, order, "busy", "too many questions wait for the gateway; ask again later");
+        decline(self, order, "busy", "too many requests wait for the gateway; send it again later");
         return;
     }
     // A stop without a place gets no answer, but is delivered.
@@ -146,7 +146,7 @@ static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
     if (result == BRIDGE_LEASE_AWAY) {
         not_delivered(self, order);
     } else {
-        decline(self, order, "busy", "another person asks for the lease at this moment; arm again");
+        decline(self, order, "busy", "another person requests the lease at this moment; arm again");
     }
 }
 

@@ -11,7 +11,7 @@ const char *mqtt_reason_of(int code, bool is_5) {
         return mosquitto_connack_string(code);
     }
     return (code == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION)
-               ? "it does not speak MQTT 5; set protocol = 3.1.1 under [broker]"
+               ? "it does not support MQTT 5; set protocol = 3.1.1 under [broker]"
                : mosquitto_reason_string(code);
 }
 

@@ -98,10 +98,11 @@ static int find_server(reader_t *self, const mqtt_settings_t *settings, char out
                        natsStatus_GetText(status));
         end(self);
     }
-    return fail(out_why, EX_UNAVAILABLE,
-                "no nats-server answers on port %u (%s); see that one runs, and stream_port, ca and certificate under "
-                "[broker]",
-                (unsigned)settings->broker.stream_port, told);
+    return fail(
+        out_why, EX_UNAVAILABLE,
+        "no nats-server answers on port %u (%s); check that one runs, and stream_port, ca and certificate under "
+        "[broker]",
+        (unsigned)settings->broker.stream_port, told);
 }
 
 /// Subscribes with an ephemeral consumer: the servers store nothing for it, and messages are not confirmed.
@@ -201,9 +202,10 @@ int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, 
     jsErrCode trouble = 0;
     natsStatus status = NATS_ERR;
     if (settings->broker.stream_port == 0U) {
-        return fail(out_why, EX_CONFIG,
-                    "this broker keeps no history: stream_port is 0; a cluster of nats-servers does (share/fleet), and "
-                    "each machine its recordings: iwheel-fleet recordings ID");
+        return fail(
+            out_why, EX_CONFIG,
+            "this broker stores no history: stream_port is 0; a cluster of nats-servers stores it (share/fleet), "
+            "and each machine stores its recordings: iwheel-fleet recordings ID");
     }
     for (unsigned i = 0; i < TRIES && may_pass(status, trouble) && counted.events == 0U; i++) {
         const int code = find_server(&reader, settings, out_host, out_why);
@@ -218,10 +220,11 @@ int stream_read(const mqtt_settings_t *settings, const stream_config_t *config, 
     }
     return (trouble == JSStreamNotFoundErr)
                ? fail(out_why, EX_UNAVAILABLE,
-                      "%s has no stream " STREAM_NAME "; make it: share/fleet/stream %s:%u FOLDER create", out_host,
+                      "%s has no stream " STREAM_NAME "; create it: share/fleet/stream %s:%u FOLDER create", out_host,
                       out_host, (unsigned)settings->broker.stream_port)
-               : fail(out_why, EX_UNAVAILABLE,
-                      "the stream at %s cannot be read (%s); see whether two of its three servers run, and what "
-                      "users.conf allows the console",
-                      out_host, natsStatus_GetText(status));
+               : fail(
+                     out_why, EX_UNAVAILABLE,
+                     "the stream at %s cannot be read (%s); check that two of its three servers run, and the rights of "
+                     "the console in users.conf",
+                     out_host, natsStatus_GetText(status));
 }

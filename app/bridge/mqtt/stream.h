@@ -3,7 +3,7 @@
 /// nothing there.
 ///
 /// Reading waits for the network, so it is for programs without other work. Each host is tried for 2 s. Servers that
-/// have just lost one of them are asked up to ten times. A stream without a message for 5 s is given up. With TLS the
+/// have just lost one of them are asked up to ten times. The read ends after 5 s without a message. With TLS the
 /// name of the server is checked against its certificate.
 #ifndef MQTT_STREAM_H
 #define MQTT_STREAM_H

@@ -68,7 +68,7 @@ static void learn(ros_source_t *entry, int64_t sent_us, int64_t now_us) {
     const int64_t heard_span_us = now_us - entry->first_received_us;
     const int64_t sent_span_us = sent_us - entry->first_sent_us;
     if (sent_span_us - heard_span_us > ROS_LEARN_US / TENTH) {
-        begin_anew(entry, sent_us, now_us); // The first was held back for longer than this one.
+        begin_anew(entry, sent_us, now_us); // The network held the first sample back for longer than this one.
         return;
     }
     entry->known = heard_span_us >= ROS_LEARN_US && sent_span_us >= ROS_LEARN_US &&

@@ -10,16 +10,16 @@
 #define DATA_COUNTS_FROM 8U
 #define DATA_WRITER_AT   12U
 #define DATA_HEADER      24U
-#define FRAG_FIRST_AT    24U ///< Of DATA_FRAG: the number of its first fragment, from 1.
+#define FRAG_FIRST_AT    24U ///< Position in DATA_FRAG of the number of its first fragment, which counts from 1.
 #define FRAG_HEADER      36U
 #define ENCAPSULATION    4U
-#define PARAMETER        4U ///< Its id and its length.
+#define PARAMETER        4U ///< Size of a parameter's id and length.
 #define PID_PAD          0x0000U
 #define PID_SENTINEL     0x0001U
 #define PID_USER_DATA    0x002CU
-#define PID_TOPIC_DATA   0x002EU ///< Group data is between them.
+#define PID_TOPIC_DATA   0x002EU ///< The id of group data lies between the two.
 
-/// Of a sample in fragments the first, in which its list of parameters begins.
+/// Returns true for a whole sample and for the first fragment of a sample: the list of parameters begins there.
 static bool begins_a_sample(const rtps_part_t *part) {
     if (part->bytes[0] == DATA_FRAG) {
         return part->size >= FRAG_HEADER && rtps_read(part->bytes + FRAG_FIRST_AT, 4, part->little) == 1U;
@@ -27,7 +27,7 @@ static bool begins_a_sample(const rtps_part_t *part) {
     return part->bytes[0] == DATA && part->size >= DATA_HEADER;
 }
 
-/// RTPS 2.2, table 9.2: the writers that announce participants, writers and readers.
+/// Returns true if a writer sent it that announces participants, writers or readers (RTPS 2.2, table 9.2).
 static bool is_announcement(const rtps_part_t *part) {
     static const uint8_t writers[3][4] = {{0, 1, 0, 0xC2}, {0, 0, 3, 0xC2}, {0, 0, 4, 0xC2}};
     bool found = false;
@@ -37,7 +37,8 @@ static bool is_announcement(const rtps_part_t *part) {
     return found;
 }
 
-/// Walks a list of parameters from `at`. Behind it; 0: it does not end within `size`. `change`: large free data becomes padding.
+/// Walks a list of parameters from `at`. Returns the position behind the list; 0: the list does not end within `size`.
+/// `change`: large free data becomes padding.
 static size_t walk(uint8_t *bytes, size_t size, size_t at, bool little, bool change) {
     while (at + PARAMETER <= size) {
         const uint32_t id = rtps_read(bytes + at, 2, little);
@@ -48,7 +49,7 @@ static size_t walk(uint8_t *bytes, size_t size, size_t at, bool little, bool cha
         if (change && id >= PID_USER_DATA && id <= PID_TOPIC_DATA && length > ANNOUNCED_DATA_MAX) {
             rtps_write(PID_PAD, 2, little, bytes + at);
         }
-        if (length > size - at - PARAMETER) { // Damaged, or it goes on in the next fragment.
+        if (length > size - at - PARAMETER) { // The message is damaged, or the list continues in the next fragment.
             return 0;
         }
         at += PARAMETER + length;
@@ -61,7 +62,7 @@ static void drop_of(uint8_t *bytes, const rtps_part_t *part) {
     if ((bytes[1] & HAS_QOS) != 0U) {
         at = walk(bytes, part->size, at, part->little, false);
     }
-    // A list of parameters of one order of bytes or the other.
+    // Only a list of parameters, in either byte order.
     if (at < DATA_HEADER || at + ENCAPSULATION > part->size || bytes[at] != 0U || (bytes[at + 1U] & ~1U) != 2U) {
         return;
     }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// What other programs of the domain announce of themselves, as it comes in. Pure: no DDS, no I/O.
+/// Limits the data that other programs of the domain announce about themselves. Pure: no DDS, no I/O.
 ///
-/// DDS stores the announcement of every participant, writer and reader of a domain, with the free data in it (user, group and topic data), up to
-/// 64 kB each. ROS puts less than 200 bytes there. More than ANNOUNCED_DATA_MAX becomes padding before CycloneDDS reads it, so that what a
-/// stranger announces costs little memory. Of an announcement in fragments only what
-/// begins in the first one; the unit's MemoryMax bounds the process.
+/// DDS stores the announcement of every participant, writer and reader of a domain, with its free data (user, group and
+/// topic data) of up to 64 kB each. ROS uses less than 200 bytes of it. Data longer than ANNOUNCED_DATA_MAX becomes
+/// padding before CycloneDDS reads it, so that the announcement of an unknown program costs little memory. In an
+/// announcement in fragments only data that begins in the first fragment is limited; the unit's MemoryMax bounds the
+/// process.
 #ifndef ROS2_ANNOUNCED_H
 #define ROS2_ANNOUNCED_H
 
@@ -12,7 +13,8 @@
 
 #define ANNOUNCED_DATA_MAX 512U
 
-/// In place; the length stays. A message that is damaged or none changes nothing behind the damage.
+/// Changes the message in place; its length stays. Behind damage, and in other data than an RTPS message, nothing
+/// changes.
 void rtps_drop_large_data(uint8_t *message, size_t length);
 
 #endif

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The gateway's side: there and gone, and what it says.
+// The connection to the gateway: it connects, reads messages, and handles the loss of the connection.
 #include "bridge_parts.h"
 
 #define CONNECT_MS     200
 #define BACKOFF_MAX_US 2000000
-/// A snapshot that came so long after the lease was granted was made after it.
+/// The gateway made a snapshot after the grant of the lease if the bridge received it this much later than the grant.
 #define GRANTED_US 200000
 
 int64_t bridge_monotonic_us(void) {
@@ -26,17 +26,17 @@ void bridge_lose(bridge_t *self, const char *why) {
     machine->now.ours = false;
     bridge_end_lease(self);
     (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
-    // Not all at once, where several wait for the same gateway.
+    // The share that varies prevents several bridges from connecting to the same gateway at the same moment.
     self->retry_us = bridge_monotonic_us() + self->backoff_us * 3 / 4 + bridge_monotonic_us() % (self->backoff_us / 2);
     self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
     if (!self->told_gone) {
-        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
-                      self->settings.gateway.socket, why);
+        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; retrying\n", self->settings.gateway.socket,
+                      why);
     }
     self->told_gone = true;
 }
 
-/// What a stop before our time says of the wheels: the bridge has not caused it.
+/// Reads the last stop that the gateway reports. This bridge did not cause it: it happened before the connection.
 static void read_last_stop(bridge_t *self) {
     iwc_message_t why;
     if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", BRIDGE_ASK_MS, &why) == IWC_OK &&
@@ -50,7 +50,8 @@ static void read_last_stop(bridge_t *self) {
     }
 }
 
-/// A board's ledger has no values. Without its configuration the document's approximate measures would stand for them.
+/// Reads the values that the assumption store of a board does not have. Without them the bridge would compute with the
+/// approximate measures of the wheels' document.
 static void read_values(bridge_t *self) {
     iwc_message_t config;
     if (iwc_ask(self->gateway, "{\"cmd\":\"config\"}", BRIDGE_ASK_MS, &config) == IWC_OK) {
@@ -99,7 +100,7 @@ iwc_result_t bridge_call(bridge_t *self) {
     if (result == IWC_OK) {
         self->assumptions_due = true;
         take_snapshot(self, &status);
-        // Seen within 0.2 s: so often at least.
+        // 20 Hz is the least rate with which the bridge detects a change within 0.2 s.
         const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
         result = iwc_watch(self->gateway, topics, rate_hz, BRIDGE_ASK_MS);
     }
@@ -111,7 +112,7 @@ iwc_result_t bridge_call(bridge_t *self) {
     self->told_gone = false;
     (void)fprintf(
         stderr, "iwheel-ros2: info: connected to %s%s\n", self->settings.gateway.socket,
-        newer ? ", whose protocol is newer: only watching and stopping; install the iwheel-ros2 that belongs to it"
+        newer ? ", whose protocol is newer: this bridge only watches and stops; install the iwheel-ros2 of its version"
               : "");
     if (self->facts.drive && self->facts.machine.setpoint_current) {
         (void)fputs("iwheel-ros2: warning: current_role = setpoint: a twist carries no current, so driving is refused; "
@@ -133,7 +134,7 @@ static void take_stop(bridge_t *self, const iwc_message_t *event) {
     bridge_end_lease(self);
 }
 
-/// Replies are those to commands: all else is waited for.
+/// Handles a reply to a drive command. The replies to all other requests are read where the request is sent.
 static void take_reply(bridge_t *self, const iwc_message_t *reply) {
     ros_commands_t *commands = &self->facts.commands;
     commands->refusal[0] = '\0';
@@ -147,7 +148,7 @@ void bridge_listen(bridge_t *self) {
     iwc_message_t message;
     bool fresh = false;
     iwc_result_t result = iwc_next(self->gateway, 0, &message);
-    // Read once: the descriptor stays readable if there is more.
+    // iwc_next reads the descriptor once only; the descriptor stays readable if there is more.
     for (; result == IWC_OK; result = iwc_pending(self->gateway) ? iwc_next(self->gateway, 0, &message) : IWC_TIMEOUT) {
         if (!message.is_event) {
             take_reply(self, &message);

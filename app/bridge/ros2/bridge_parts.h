@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: MIT
-/// Private to the bridge: its gateway's side, for the one that decides. Who calls holds the lock.
+/// Private to the bridge: the interface between its files. The caller of each function holds the lock of the bridge.
 #ifndef ROS2_BRIDGE_PARTS_H
 #define ROS2_BRIDGE_PARTS_H
 
 #include "common/bridge_service.h"
 #include "ros2_bridge.h"
 
-/// For an answer of the gateway's; none in this time, and it hangs.
+/// Longest wait for a reply of the gateway. A gateway that takes longer counts as hung.
 #define BRIDGE_ASK_MS 150
-/// Between the first two tries to find the gateway again; it doubles.
+/// Interval between the first two attempts to connect again; it doubles with each attempt.
 #define BRIDGE_BACKOFF_US 100000
 
-/// Calls the gateway and watches it; if that fails, it is lost.
+/// Connects to the gateway and subscribes to its events. On failure it ends the connection by `bridge_lose`.
 iwc_result_t bridge_call(bridge_t *self);
 
-/// The connection ends here, and the lease with it; `why` is told in /diagnostics.
+/// Ends the connection, and with it the lease. /diagnostics reports `why`.
 void bridge_lose(bridge_t *self, const char *why);
 
-/// Nobody has the wheels by this bridge any more.
+/// Records that this bridge has no lease and no driver any more. Sends nothing.
 void bridge_end_lease(bridge_t *self);
 
-/// Takes what the gateway has said, and publishes what is new of it.
+/// Reads all messages of the gateway that are waiting, and publishes motion and wrench if there was a new snapshot.
 void bridge_listen(bridge_t *self);
 
-/// As `bridge_now_us`, with a sign.
+/// Returns `bridge_now_us` as a signed number.
 int64_t bridge_monotonic_us(void);
 
-/// Executes a request, or refuses it with the reason, and answers it.
+/// Executes a request, or refuses it with the reason. Sends the reply in both cases.
 void bridge_take_request(bridge_t *self, const ros_request_t *request);
 
-/// Asks for the lease; `age_us` ago somebody wanted it. Without an answer the gateway is lost.
+/// Requests the lease; the person asked for it `age_us` ago. If the gateway does not reply, ends the connection.
 iwc_result_t bridge_arm(bridge_t *self, int64_t age_us, iwc_terms_t *out_terms);
 
-/// Empty: may drive.
+/// Returns why this bridge cannot drive, with the fix; empty: it can.
 const char *bridge_why_not_drive(const bridge_t *self);
 
-/// By both clocks.
+/// Returns the present time on both clocks.
 ros_moment_t bridge_moment(void);
 
 #endif

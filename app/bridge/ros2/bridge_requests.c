@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What somebody asks for by a service or by iwheel/ask: arm, stop, estop, reset.
+// Requests through the services and iwheel/ask: arm, stop, estop, reset.
 #include "bridge_parts.h"
 
-#define ARM_MS 400 ///< echo_ms is 200 at most.
-/// A stop was shown for so long before a reset can mean it.
+#define ARM_MS 400 ///< The gateway replies after at most echo_ms, which is at most 200.
+/// iwheel/state must have shown a stop for this time before a reset request can refer to it.
 #define SHOWN_US 1000000
 
 ros_moment_t bridge_moment(void) {
@@ -23,7 +23,8 @@ const char *bridge_why_not_drive(const bridge_t *self) {
     return "";
 }
 
-/// `age_us` ago by the clock of the gateway's events. A snapshot that came late makes it older, never younger.
+/// Returns the time `age_us` ago by the gateway's clock. If the last snapshot was late, the result is too old, never
+/// too young.
 static iwc_value_t since(const bridge_t *self, int64_t age_us) {
     const int64_t gateway_us = self->facts.machine.now.t_us + bridge_monotonic_us() - self->received_us;
     return (iwc_value_t){.known = true, .value = gateway_us - age_us};
@@ -37,7 +38,7 @@ iwc_result_t bridge_arm(bridge_t *self, int64_t age_us, iwc_terms_t *out_terms) 
     bridge_end_lease(self);
     self->leased_us = (result == IWC_OK) ? bridge_monotonic_us() : 0;
     if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
-        bridge_lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
+        bridge_lose(self, iwc_words(result)); // The bridge may hold the lease: closing the connection ends it.
     }
     return result;
 }
@@ -55,7 +56,7 @@ static void answer_result(bridge_t *self, const ros_request_t *request, iwc_resu
     }
 }
 
-/// Empty: somebody wants it now.
+/// Returns why the request may not be executed now, with the fix; empty: it may. Writes its age to `*out_age_us`.
 static const char *why_not_meant(bridge_t *self, const ros_request_t *request, int64_t *out_age_us) {
     const ros_moment_t now = bridge_moment();
     const int64_t lease_us = self->facts.machine.lease_ms * 1000;
@@ -64,21 +65,22 @@ static const char *why_not_meant(bridge_t *self, const ros_request_t *request, i
     case ROS_AGE_FRESH:
         break;
     case ROS_AGE_UNKNOWN:
-        return "it may come from another machine, whose clock nobody knows: ask on the machine itself, or set [ros] "
-               "clocks = "
-               "synchronised in ros2.conf, if NTP or PTP keeps the clocks equal";
+        return "the request may come from another machine, whose clock is not known: send it on the machine itself, or "
+               "set [ros] clocks = synchronised in ros2.conf, if NTP or PTP synchronises the clocks";
     case ROS_AGE_AHEAD:
-        return "it was sent in the future: set the clock of its machine right; ask again";
+        return "the request was sent in the future: correct the clock of its machine; send it again";
     case ROS_AGE_DOUBTED:
-        return "the clock of this machine was set back: ask again when it has caught up, or restart iwheel-ros2";
+        return "the clock of this machine was set back: wait until it has caught up, or restart iwheel-ros2; then send "
+               "the request again";
     default:
-        return "it came too late to be meant now; ask again";
+        return "the request came too late; send it again";
     }
     if (self->facts.link != ROS_LINK_UP) {
         return "the gateway does not answer; see /diagnostics";
     }
     if (self->moved_us != 0 && now.mono_us - self->moved_us < quiet_us) {
-        return "somebody sends a drive command that is not zero: let go of the stick, wait half a second, ask again";
+        return "a publisher sends a drive command that is not zero: let go of the stick, wait half a second, send the "
+               "request again";
     }
     return "";
 }
@@ -99,12 +101,12 @@ static void take_arm(bridge_t *self, const ros_request_t *request, int64_t age_u
     ros_answer(self->ros, request, true, words);
 }
 
-/// Who asks means the stop that iwheel/state shows, and has had time to see it.
+/// Resets the stop that iwheel/state shows. The caller must have had time to read it there.
 static void take_reset(bridge_t *self, const ros_request_t *request, int64_t age_us) {
     const int64_t asked_us = bridge_monotonic_us() - age_us;
     if (self->shown.known && asked_us - self->shown_us < SHOWN_US) {
         ros_answer(self->ros, request, false,
-                   "the last stop is younger than a second: read iwheel/state, then ask again");
+                   "the last stop is younger than a second: read iwheel/state, then send the request again");
         return;
     }
     const iwc_reset_t wanted = {.stop = self->shown, .t_us = since(self, age_us)};
@@ -115,14 +117,14 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
     int64_t age_us = 0;
     const char *reason = why_not_meant(self, request, &age_us);
     if (!request->by_topic && request->caller.form == ROS_FORM_UNREADABLE) {
-        reason = "this is no request of std_srvs/srv/Trigger: call the service with that type";
+        reason = "this is not a request of std_srvs/srv/Trigger: call the service with that type";
     } else if (request->verb == ROS_ARM && bridge_why_not_drive(self)[0] != '\0') {
         reason = bridge_why_not_drive(self);
     } else if (request->verb == ROS_ARM && self->driver != 0) {
         reason = "busy: a publisher of cmd_vel has the wheels until they are stopped; call iwheel/stop, then arm again";
     } else if (request->verb == ROS_RESET && !self->settings.drive.allow_reset) {
-        reason = "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes in "
-                 "ros2.conf";
+        reason = "not over the network: go to the machine, check it, then call iwheelctl reset; or set [drive] "
+                 "allow_reset = yes in ros2.conf";
     }
     if (reason[0] != '\0') {
         ros_answer(self->ros, request, false, reason);

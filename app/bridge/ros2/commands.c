@@ -41,7 +41,7 @@ bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
     if (moves) {
         self->moved_us = now_us;
     }
-    // One attempt in that time too: a gateway that refuses is not asked with each command.
+    // One attempt per ROS_QUIET_US: a gateway that refuses does not receive a request with each command.
     if (self->state != ROS_AUTO_TRUSTED || !quiet || now_us - self->tried_us < ROS_QUIET_US) {
         return false;
     }

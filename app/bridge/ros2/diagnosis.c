@@ -36,7 +36,7 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
     add(status, "holding", true, machine->holding ? 1 : 0);
     add(status, "rolling", true, machine->rolling ? 1 : 0);
     if (facts->link == ROS_LINK_GONE) {
-        say(status, ROS_ERROR, "gateway gone: %s; wheels that it drove stop by themselves, afterwards arm again",
+        say(status, ROS_ERROR, "gateway gone: %s; the wheels that it drove stop on their own; then arm again",
             facts->trouble);
     } else if (facts->link == ROS_LINK_SILENT) {
         say(status, ROS_ERROR, "the gateway does not answer; see its log (journalctl -u iwheel-gateway)");
@@ -52,7 +52,7 @@ static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
         say(status, ROS_OK, "armed by %s", machine->now.ours ? "this bridge" : machine->holder);
     } else if (machine->rolling) {
         say(status, ROS_WARN,
-            "a wheel turns although nothing is sent to it: hold the machine, or use its parking brake");
+            "a wheel turns although the gateway sends nothing to it: hold the machine, or use its parking brake");
     } else if (machine->stop[0] != '\0') {
         say(status, ROS_OK, "listening, call iwheel/arm to drive; the last stop: %s", machine->stop);
     } else {
@@ -65,15 +65,14 @@ static void tell_estop(const ros_facts_t *facts, ros_status_t *status) {
     const bool untried = !facts->machine.estop_tried && !facts->machine.estop_simulated;
     if (strcmp(state, "released") == 0) {
         say(status, untried ? ROS_WARN : ROS_OK, "released%s",
-            untried ? ", but its button was never seen to work on this wiring: press it, then release it" : "");
+            untried ? ", but the button was never tried on this wiring: press it, then release it" : "");
     } else if (strcmp(state, "none") == 0) {
         say(status, ROS_WARN,
             "there is no e-stop line: no button of this machine stops the wheels; see [estop] line in gateway.conf");
     } else if (strcmp(state, "disagrees") == 0) {
         say(status, ROS_ERROR,
-            "the e-stop's two contacts disagree, pressed at %s: mend contact or wire, press and release the button, "
-            "then "
-            "reset and arm again",
+            "the e-stop's two contacts disagree, pressed at %s: fix contact or wire, press and release the button, "
+            "then reset and arm again",
             facts->machine.pressed_at);
     } else if (strcmp(state, "pressed") == 0 && strncmp(facts->machine.pressed_at, "line", 4U) == 0) {
         say(status, ROS_ERROR, "the e-stop is pressed at its contact %s: release the button, reset, then arm again",
@@ -91,7 +90,7 @@ static void tell_bus(const ros_facts_t *facts, ros_status_t *status) {
     if (strcmp(state, "active") == 0) {
         say(status, ROS_OK, "active");
     } else if (strcmp(state, "passive") == 0) {
-        say(status, ROS_WARN, "error passive: frames meet errors; check cable and termination");
+        say(status, ROS_WARN, "error passive: there are errors on the bus; check cable and termination");
     } else if (strcmp(state, "bus_off") == 0) {
         say(status, ROS_ERROR,
             "bus off: the controller has left the bus; check cable and bit rate, restart the link, reset, arm again");
@@ -104,9 +103,9 @@ static void tell_timing(const ros_facts_t *facts, ros_status_t *status) {
     const char *timing = facts->machine.timing;
     if (strcmp(timing, "contradicted") == 0) {
         say(status, ROS_ERROR,
-            "bit rate or sample point are not the wheels': set 1 Mbit/s, 62.5 %%; see iwheelctl doctor");
+            "bit rate or sample point differ from the wheels': set 1 Mbit/s, 62.5 %%; see iwheelctl doctor");
     } else if (strcmp(timing, "near") == 0) {
-        say(status, ROS_WARN, "the sample point is a little off 62.5 %%; see iwheelctl doctor");
+        say(status, ROS_WARN, "the sample point differs slightly from 62.5 %%; see iwheelctl doctor");
     } else {
         say(status, ROS_OK, "bit timing %s", timing);
     }
@@ -120,11 +119,11 @@ static void tell_wheel(const iwc_wheel_t *wheel, ros_status_t *status) {
     add(status, "battery_dV", wheel->battery_dV.known, wheel->battery_dV.value);
     add(status, "temperature_degC", wheel->temperature_degC.known, wheel->temperature_degC.value);
     if (!wheel->heard) {
-        say(status, ROS_ERROR, "not heard: check its power and cable, then reset and arm again");
+        say(status, ROS_ERROR, "no telemetry: check power and cable of the wheel, then reset and arm again");
     } else if (wheel->at_rest.value != 0) {
-        say(status, ROS_OK, "heard, at rest");
+        say(status, ROS_OK, "online, at standstill");
     } else {
-        say(status, ROS_OK, "heard, turning");
+        say(status, ROS_OK, "online, turning");
     }
 }
 
@@ -140,11 +139,11 @@ static void tell_assumptions(const ros_facts_t *facts, ros_status_t *status) {
     }
 }
 
-/// A publisher that DDS does not connect to cmd_vel: nothing that it sends arrives.
+/// Reports publishers that DDS does not connect to the reader of cmd_vel.
 static void tell_unmatched(const ros_unmatched_t *unmatched, ros_status_t *status) {
     if (unmatched->policy[0] != '\0') {
         say(status, ROS_WARN,
-            "%u publishers of %s are not received: the QoS policy %s of one of type %s does not match; publish with "
+            "%u publishers of %s are not received: the QoS policy %s of a publisher of %s does not match; publish with "
             "ROS's default QoS",
             unmatched->count, unmatched->topic, unmatched->policy, unmatched->type);
     } else {
@@ -155,12 +154,12 @@ static void tell_unmatched(const ros_unmatched_t *unmatched, ros_status_t *statu
     }
 }
 
-/// What came, or why nothing comes.
+/// Reports the commands that came, or why none come.
 static void tell_flow(const ros_commands_t *commands, int64_t lease_ms, ros_status_t *status) {
     if (commands->coming && commands->unusable) {
         say(status, ROS_WARN,
-            "the commands that come are no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, "
-            "%" PRIu64 " so far; fix what publishes them",
+            "the commands have no usable numbers (NaN, infinity, or 32 m/s or rad/s and more): dropped, "
+            "%" PRIu64 " so far; fix the program that publishes them",
             commands->bad);
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
@@ -176,7 +175,7 @@ static void tell_flow(const ros_commands_t *commands, int64_t lease_ms, ros_stat
     } else if (commands->late > 0 || commands->bad > 0) {
         say(status, ROS_WARN,
             "%" PRIu64 " commands came too late, %" PRIu64
-            " were no usable numbers: dropped; see the network, and what publishes them",
+            " had no usable numbers: dropped; check the network and the program that publishes them",
             commands->late, commands->bad);
     } else {
         say(status, ROS_OK,
@@ -254,7 +253,7 @@ void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out
     }
 }
 
-/// `text` as JSON has it; \uXXXX, as the client leaves it in texts, stays what it is.
+/// Escapes `text` for JSON. The client leaves \uXXXX in its texts; these escapes stay unchanged.
 static void quote(const char *text, char *out, size_t size) {
     size_t used = 0;
     for (; *text != '\0' && used + 3U < size; text++) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// /diagnostics and iwheel/state: what is wrong, in a sentence with its cure. Pure.
+/// Contents of /diagnostics and iwheel/state: each problem as one sentence with its fix. Pure.
 #ifndef ROS2_DIAGNOSIS_H
 #define ROS2_DIAGNOSIS_H
 
 #include "facts.h"
 
-/// As diagnostic_msgs/DiagnosticStatus has them.
+/// Levels, with the values of diagnostic_msgs/DiagnosticStatus.
 typedef enum { ROS_OK = 0, ROS_WARN, ROS_ERROR, ROS_STALE } ros_level_t;
 
 typedef enum {
@@ -23,21 +23,22 @@ typedef enum {
 #define ROS_VALUES_MAX 12U
 
 typedef struct {
-    const char *key; ///< With its unit.
-    char text[24];   ///< Empty: not known.
+    const char *key; ///< Name with unit.
+    char text[24];   ///< Value; empty: not known.
 } ros_value_t;
 
 typedef struct {
     ros_level_t level;
     unsigned value_count;
-    const char *name; ///< Of the part; the name of the node comes before it.
+    const char *name; ///< Name of the part. `ros_publish_diagnostics` puts the name of the node before it.
     ros_value_t values[ROS_VALUES_MAX];
     char message[ROS_SENTENCE_SIZE + 100U];
 } ros_status_t;
 
+/// Writes level, sentence and values of one part to `*out_status`.
 void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status);
 
-/// What changes without words: two equal texts need not be told twice. One JSON object, for the topic iwheel/state.
+/// Writes the JSON object of the topic iwheel/state. Equal texts mean that nothing has changed.
 void ros_state_json(const ros_facts_t *facts, char *out, size_t size);
 
 #endif

@@ -57,7 +57,7 @@ void ros_facts_type_name(const char *dds, char *out, size_t size) {
     out[used] = '\0';
 }
 
-/// Items of the ledger, and where a configuration has their values.
+/// Assumptions with a value that the bridge uses, and the configuration keys of these values.
 typedef enum { RADIUS, TRACK, GEAR, ROLE } valued_t;
 static const struct {
     const char *item;
@@ -76,7 +76,7 @@ void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine) {
     size_t left = 0;
     const char *at = iwc_json(reply, "keys", &left);
     const char *end = (at != NULL) ? at + left : NULL;
-    // Objects of two texts: none has a brace in it.
+    // The list has objects of two strings. No string has a brace in it.
     while (at != NULL && (at = memchr(at, '{', (size_t)(end - at))) != NULL) {
         const char *close = memchr(at, '}', (size_t)(end - at));
         if (close == NULL) {
@@ -92,7 +92,7 @@ void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine) {
     }
 }
 
-/// The value of a ledger's entry, or what is configured; empty: neither is known.
+/// Writes the value of an assumption to `out`, or the configured value; empty: neither is known.
 static void text_of(const iwc_message_t *assumptions, valued_t which, const ros_machine_t *machine, char out[48]) {
     char path[48];
     (void)snprintf(path, sizeof path, "%s.value", valued[which].item);
@@ -101,7 +101,7 @@ static void text_of(const iwc_message_t *assumptions, valued_t which, const ros_
     }
 }
 
-/// A number at the beginning of it; `otherwise` if there is none above 0.
+/// Returns the number at the beginning of the value; `otherwise` if there is none above 0.
 static long value_of(const iwc_message_t *assumptions, valued_t which, const ros_machine_t *machine, long otherwise) {
     char text[48];
     text_of(assumptions, which, machine, text);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the bridge knows of the machine and of itself: all that its topics, its diagnostics and its decisions rest on.
+/// State of the machine and of the bridge: the input of its topics, its diagnostics and its decisions.
 #ifndef ROS2_FACTS_H
 #define ROS2_FACTS_H
 
@@ -21,69 +21,71 @@ typedef enum {
 #define ROS_TYPE_SIZE  96U
 #define ROS_TOPIC_SIZE 160U
 
-/// Publishers that send to cmd_vel and are not received, as DDS announces them. All texts are of the characters that ROS allows in names.
+/// Publishers of cmd_vel that the bridge does not receive, as DDS announces them. All texts consist of the characters
+/// that ROS allows in names.
 typedef struct {
     unsigned count;
-    char topic[ROS_TOPIC_SIZE]; ///< The whole name of cmd_vel.
-    char type[ROS_TYPE_SIZE];   ///< Of one of them, as ROS writes it.
-    const char *policy;         ///< Its QoS policy that does not match; empty: its type does not.
-    const char *wanted;         ///< The types that are received.
+    char topic[ROS_TOPIC_SIZE]; ///< Full name of cmd_vel.
+    char type[ROS_TYPE_SIZE];   ///< Type of one of these publishers, as ROS writes it.
+    const char *policy;         ///< QoS policy of this publisher that does not match; empty: the type does not match.
+    const char *wanted;         ///< Types that the bridge receives.
     /// Another topic whose name ends with cmd_vel and that has a publisher of Twist or TwistStamped; empty: none.
     char elsewhere[ROS_TOPIC_SIZE];
 } ros_unmatched_t;
 
 /// Commands since the start.
 typedef struct {
-    unsigned publishers;             ///< Of cmd_vel, now.
-    uint64_t passed;                 ///< Handed to the gateway, each once.
-    uint64_t late;                   ///< Too old, from the future, or overtaken.
-    uint64_t unknown;                ///< Of a writer whose clock is not known yet, and not zero.
-    uint64_t others;                 ///< Of another publisher than the one that has the wheels, and not zero.
-    uint64_t bad;                    ///< No numbers, or out of any range.
-    uint64_t unsent;                 ///< The gateway was gone or did not read.
-    uint64_t refused;                ///< By the gateway.
-    char refusal[ROS_SENTENCE_SIZE]; ///< Why the last one was refused, and the cure; empty since one was accepted.
-    bool coming;                     ///< One came within the last second.
-    bool unusable;                   ///< The last one was no usable numbers.
+    unsigned publishers;             ///< Present number of publishers of cmd_vel.
+    uint64_t passed;                 ///< Forwarded to the gateway, each once.
+    uint64_t late;                   ///< Dropped: too old, from the future, or overtaken.
+    uint64_t unknown;                ///< Dropped: not zero, from a writer whose clock is not known yet.
+    uint64_t others;                 ///< Dropped: not zero, from another publisher than the driver.
+    uint64_t bad;                    ///< Dropped: not a number, or out of range.
+    uint64_t unsent;                 ///< Not sent: the gateway was gone or did not read.
+    uint64_t refused;                ///< Refused by the gateway.
+    char refusal[ROS_SENTENCE_SIZE]; ///< Reason and fix of the last refusal; empty since a command was accepted.
+    bool coming;                     ///< A command came within the last second.
+    bool unusable;                   ///< The last command had no usable numbers.
     ros_unmatched_t unmatched;
 } ros_commands_t;
 
-/// Of a snapshot; and of the last stop the sentence.
+/// Contents of the newest snapshot, and the sentence of the last stop.
 typedef struct {
     iwc_state_t now;
     int64_t wall_us;
     char estop[16];
-    char pressed_at[16];  ///< Of two contacts: neither, line, line2, both; empty: it has one.
-    bool estop_tried;     ///< Its button was seen to work on this wiring.
-    bool estop_simulated; ///< It is the button of a simulator.
-    bool holding;         ///< Zeros are held until release or arm.
-    bool rolling;         ///< A wheel turns although nothing is sent to it.
+    char pressed_at[16];  ///< With two contacts: neither, line, line2 or both; empty: one contact.
+    bool estop_tried;     ///< The gateway has seen the button work on this wiring.
+    bool estop_simulated; ///< The button belongs to a simulator.
+    bool holding;         ///< The gateway sends zeros until release or arm.
+    bool rolling;         ///< A wheel turns although the gateway sends nothing to it.
     char bus[16];
     char timing[16];
-    char holder[65]; ///< Name of who has the lease.
+    char holder[65]; ///< Name of the client that holds the lease.
     int64_t lease_ms;
-    /// What a gateway without a file has in its configuration, by ros_facts_read_config: a board's ledger has no values.
+    /// Values from the reply to `config`, see `ros_facts_read_config`: the assumption store of a board has no values.
     char configured[ROS_CONFIGURED][24];
     int64_t radius_mm;
-    int64_t track_mm; ///< 0: not configured, so no turn is known.
+    int64_t track_mm; ///< 0: not configured, so the bridge cannot compute turns.
     ros_measures_t measures;
-    bool setpoint_current;                ///< A twist has no current, but the configuration wants one.
-    char contradicted[ROS_SENTENCE_SIZE]; ///< Of the assumption ledger, with the cure; empty: nothing.
-    unsigned assumed;                     ///< Entries that nothing has verified yet.
-    char stop[ROS_SENTENCE_SIZE];
-    iwc_value_t stop_number; ///< As the gateway counts; not known: there was none.
+    bool setpoint_current;                ///< The configuration requires a current, which a twist does not have.
+    char contradicted[ROS_SENTENCE_SIZE]; ///< Contradicted assumptions, with the fix; empty: none.
+    unsigned assumed;                     ///< Assumptions that nothing has verified yet.
+    char stop[ROS_SENTENCE_SIZE];         ///< Sentence of the last stop.
+    iwc_value_t stop_number;              ///< Number of the last stop, as the gateway counts; not known: no stop yet.
 } ros_machine_t;
 
 typedef struct {
     ros_link_t link;
     char trouble[256]; ///< Why there is no connection.
-    bool drive;        ///< Configured to drive.
+    bool drive;        ///< The configuration permits driving.
     ros_machine_t machine;
     ros_commands_t commands;
     unsigned odometry_restarts;
 } ros_facts_t;
 
-/// The e-stop as iwheel/emergency_stop publishes it. A line that cannot be read, or whose gateway is gone, counts as pressed.
+/// The e-stop as iwheel/emergency_stop publishes it. A line that cannot be read, or whose gateway is gone, counts as
+/// pressed.
 typedef enum {
     ROS_ESTOP_NO_LINE = 0, ///< None is configured, or the gateway was never connected.
     ROS_ESTOP_RELEASED,
@@ -92,17 +94,22 @@ typedef enum {
 
 ros_estop_t ros_facts_estop(const ros_facts_t *facts);
 
-/// `geometry_msgs/msg/Twist` of `geometry_msgs::msg::dds_::Twist_`, cut to `size`; a character that ROS does not allow becomes `?`.
+/// Converts a DDS type name (`geometry_msgs::msg::dds_::Twist_`) to that of ROS (`geometry_msgs/msg/Twist`), cut to
+/// `size`. A character that ROS does not allow becomes `?`.
 void ros_facts_type_name(const char *dds, char *out, size_t size);
 
-/// Takes in a snapshot (event `state`, reply to `status`). False, with `*out_machine` untouched, if it is none.
+/// Reads a snapshot (event `state`, reply to `status`). Returns false for any other message, with `*out_machine`
+/// unchanged.
 bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_machine_t *out_machine);
 
-/// Takes in the reply to `config`, if it is one. Whether the ledger lacks values, so that it has to be asked for: `ros_facts_lack_values`.
+/// Reads the values in the reply to `config`; ignores other messages.
 void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine);
+
+/// Returns true if the assumptions of this snapshot have no values, so that the caller must request `config`.
 bool ros_facts_lack_values(const iwc_message_t *snapshot);
 
-/// Takes in what the ledger of a snapshot says: measures, contradictions. Dearer, and seldom new.
+/// Reads measures and contradictions from the assumptions of a snapshot. Slower than `ros_facts_read`, and the contents
+/// seldom change.
 void ros_facts_read_assumptions(const iwc_message_t *message, ros_machine_t *machine);
 
 #endif

@@ -18,19 +18,20 @@
 #define SET_AT           24U
 #define BITS_MAX         256U
 
-/// eProsima: so the vendor of a message says, and the first bytes of its GUIDs.
+/// Vendor id of eProsima in the header of a message; also the first bytes of Fast DDS's GUIDs.
 static const uint8_t FAST_DDS[2] = {1, 15};
 
 static bool is_message(const uint8_t *message, size_t length) {
     return length >= RTPS_HEADER && memcmp(message, "RTPS", 4) == 0;
 }
 
-/// A writer of the user, not one of discovery.
+/// Returns true for a writer of the application, false for a writer of discovery.
 static bool is_users(const uint8_t *writer) {
     return writer[3] == 2U || writer[3] == 3U;
 }
 
-/// It was heard for the first time a moment ago, or is now.
+/// Returns true if the first heartbeat of the writer is this one, or came less than FIRSTS_NEW_US ago. Stores the
+/// writer.
 static bool is_new(rtps_firsts_t *self, int64_t now_us, const uint8_t *message, const uint8_t *writer) {
     uint8_t guid[sizeof self->writers[0].guid];
     memcpy(guid, message + RTPS_PREFIX_AT, ROS_PREFIX_SIZE);
@@ -46,7 +47,7 @@ static bool is_new(rtps_firsts_t *self, int64_t now_us, const uint8_t *message, 
     return true;
 }
 
-/// Only if it has samples.
+/// Returns true for a heartbeat of a writer that has samples.
 static bool is_heartbeat(const rtps_part_t *part) {
     if (part->bytes[0] != HEARTBEAT || part->size < HEARTBEAT_SIZE || !is_users(part->bytes + WRITER_AT)) {
         return false;
@@ -55,7 +56,7 @@ static bool is_heartbeat(const rtps_part_t *part) {
     return first > 0 && first <= rtps_read_sequence(part->bytes + LAST_AT, part->little);
 }
 
-/// Makes a heartbeat that has samples one of the same writer to the same reader that has nothing yet.
+/// Changes a heartbeat so that the same writer reports to the same reader that it has no samples yet.
 static void empty(uint8_t *bytes, bool little) {
     bytes[1] = (uint8_t)((little ? RTPS_LITTLE : 0U) | FINAL);
     rtps_write(HEARTBEAT_SIZE - RTPS_SUBMESSAGE, 2, little, bytes + 2);
@@ -63,7 +64,7 @@ static void empty(uint8_t *bytes, bool little) {
     rtps_write(rtps_read(bytes + COUNT_AT, 4, little) - 1U, 4, little, bytes + COUNT_AT);
 }
 
-/// All its submessages are there.
+/// Returns true if the message ends where its last submessage ends.
 static bool is_whole(const uint8_t *message, size_t length) {
     rtps_part_t part;
     size_t at = RTPS_HEADER;
@@ -91,7 +92,7 @@ size_t rtps_await_firsts(rtps_firsts_t *self, int64_t now_us, uint8_t *message, 
     return length;
 }
 
-/// False: it is none.
+/// Changes an ACKNACK. Returns false for any other or damaged submessage.
 static bool make_request(uint8_t *bytes, const rtps_part_t *part) {
     if (bytes[0] != ACKNACK || part->size < SET_AT + 4U) {
         return false;

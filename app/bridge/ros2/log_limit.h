@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Bounds a log that others can fill: LOG_LIMIT_LINES in a minute, then a count of what was left out. Pure: no clock, no I/O.
+/// Limits a log that other programs can fill to LOG_LIMIT_LINES per minute, and counts the dropped lines. Pure: no
+/// clock, no I/O.
 #ifndef ROS2_LOG_LIMIT_H
 #define ROS2_LOG_LIMIT_H
 
@@ -10,12 +11,13 @@
 #define LOG_LIMIT_US    60000000U
 
 typedef struct {
-    uint64_t since_us; ///< Beginning of this minute; 0: none yet.
-    unsigned lines;
-    uint64_t dropped;
+    uint64_t since_us; ///< Beginning of this minute; 0: no line yet.
+    unsigned lines;    ///< Lines written in this minute.
+    uint64_t dropped;  ///< Lines dropped in this minute.
 } log_limit_t;
 
-/// True: write this line. `*out_dropped`: so many were left out in the minute that has ended; write that first. 0: none.
+/// Returns true if the caller shall write this line. Writes to `*out_dropped` the number of lines that were dropped in
+/// the minute that has ended; if it is not 0, the caller reports it first.
 bool log_limit_pass(log_limit_t *self, uint64_t now_us, uint64_t *out_dropped);
 
 #endif

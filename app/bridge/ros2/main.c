@@ -25,7 +25,8 @@ static void loop(bridge_t *bridge) {
     bridge_service_tell(&service, "STOPPING=1");
 }
 
-/// With another configuration than the unit's a network would only be silent.
+/// Reports that the bridge listens to a network. If the unit does not permit that, other machines receive nothing,
+/// without an error.
 static void tell_reach(const ros_settings_t *settings) {
     char text[BRIDGE_REACH_TEXT];
     if (!settings->ros.loopback) {
@@ -37,7 +38,7 @@ static void tell_reach(const ros_settings_t *settings) {
     }
 }
 
-/// The signals are taken before DDS makes its threads, which inherit that.
+/// Blocks the signals before DDS creates its threads, because the threads inherit the signal mask.
 static int run(const ros_settings_t *settings) {
     bridge_service_take_signals();
     bridge_t *bridge = calloc(1, sizeof *bridge);
@@ -67,7 +68,7 @@ static int check_gateway(const ros_settings_t *settings) {
         return 1;
     }
     (void)printf("ok    gateway %s\n", settings->gateway.socket);
-    if (iwc_ask(gateway, "{\"cmd\":\"config\"}", 1000, &status) == IWC_OK) { // A board; others refuse it.
+    if (iwc_ask(gateway, "{\"cmd\":\"config\"}", 1000, &status) == IWC_OK) { // Only a board accepts it.
         ros_facts_read_config(&status, &machine);
     }
     if (iwc_ask(gateway, "{\"cmd\":\"status\"}", 1000, &status) == IWC_OK) {
@@ -95,7 +96,7 @@ static void check_reach(const ros_settings_t *settings) {
     }
     if (settings->drive.enabled) {
         (void)printf("warn  %s may arm and drive; see SECURITY.md\n",
-                     (count == 0U) ? "every program on this machine" : "whoever reaches this DDS domain");
+                     (count == 0U) ? "every program on this machine" : "every program that reaches this DDS domain");
     }
 }
 

@@ -6,14 +6,15 @@
 #define CONFIRMED 0.01
 #define ASSUMED   0.04
 #define SLIP      0.02
-/// Of a wheel's whole ticks, spread evenly, and of the difference of two wheels.
+/// Standard deviation, in ticks, of one wheel's distance in whole ticks (spread evenly), and of the difference of two.
 #define TICK_SPREAD  0.29
 #define TICKS_SPREAD 0.41
-/// By which the heading drifts on a straight way of 1 m, and by its root on a longer one: the sum of many small slips.
+/// Drift of the heading on a straight path of 1 m. It grows with the square root of the path: a sum of many small
+/// slips.
 #define DRIFT_RAD 0.005
-/// Speeds are whole rpm: of a wheel of 192 mm 20 mm/s, spread evenly.
+/// Standard deviation of a speed in whole rpm: with a radius of 192 mm one rpm is 20 mm/s, spread evenly.
 #define SPEED_STEP_M_S 0.0058
-/// Room for what is read late and for wheels that a hand spins.
+/// Tolerance for messages that are read late and for wheels that a hand spins.
 #define JUMP_MM 200
 
 static bool has_jumped(const ros_ways_t *last, const ros_ways_t *now) {
@@ -24,8 +25,8 @@ static bool has_jumped(const ros_ways_t *last, const ros_ways_t *now) {
     return left_mm > most_mm || left_mm < -most_mm || right_mm > most_mm || right_mm < -most_mm;
 }
 
-/// Adds to the sum of turning. Ticks of the two wheels come one after the other, so that a straight way shows a heading
-/// that swings by up to one tick to either side: that is not turning.
+/// Adds to the sum of turning. Ticks of the two wheels come one after the other, so on a straight path the heading
+/// swings by up to one tick to either side. That is not turning.
 static void count_turning(ros_odometry_t *self, double yaw_rad, double tick_rad) {
     const double away_rad = yaw_rad - self->settled_rad;
     const double beyond_rad = fabs(away_rad) - tick_rad;
@@ -57,13 +58,14 @@ void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, const ros_m
 
 ros_doubt_t ros_odometry_doubt(const ros_odometry_t *self, const ros_measures_t *measures, double v_m_s,
                                double yaw_rad_s) {
-    // Independent of each other: their squares add up.
+    // The parts are independent of each other, so their squares add up.
     const double of_way = hypot(measures->radius_confirmed ? CONFIRMED : ASSUMED, SLIP);
     const double of_turn = hypot(of_way, measures->track_confirmed ? CONFIRMED : ASSUMED);
     const double step_rad = TICKS_SPREAD * measures->tick_m / measures->track_m;
     const double drift_rad = DRIFT_RAD * sqrt(self->path_m);
     const double turn_rad = of_turn * self->turned_rad;
-    // A wrong heading leads aside by as much of the way. What drifts on that way was less before; whole ticks average out.
+    // A wrong heading leads sideways by that share of the path. The drift was smaller earlier on the path, hence the
+    // root of 3. Errors by whole ticks average out.
     const double aside_m = self->path_m * fmin(hypot(turn_rad, drift_rad / sqrt(3.0)), 1.0);
     const double along_m = of_way * self->path_m;
     const double place_m = hypot(TICK_SPREAD * measures->tick_m, hypot(along_m, aside_m));

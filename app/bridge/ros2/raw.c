@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The functions by which CycloneDDS handles a type: its own name for a type is sertype, for a sample serdata.
+// The functions by which CycloneDDS handles a type. CycloneDDS calls a type sertype and a sample serdata.
 #include "raw.h"
 
 #include <dds/ddsi/ddsi_serdata.h>
@@ -28,7 +28,7 @@ static const data_t *data_of(const struct ddsi_serdata *base) {
 static bool data_equals(const struct ddsi_serdata *one, const struct ddsi_serdata *other) {
     (void)one;
     (void)other;
-    return true; // There is no key: all are of one instance.
+    return true; // The type has no key, so all samples belong to one instance.
 }
 
 static size_t stored(const ros_raw_t *raw) {
@@ -39,7 +39,7 @@ static uint32_t data_size(const struct ddsi_serdata *base) {
     return (uint32_t)stored(&data_of(base)->raw);
 }
 
-/// The part of one fragment that is still missing.
+/// Copies the part of one fragment that is still missing at `*at`, and moves `*at` behind it.
 static void copy_fragment(ros_raw_t *raw, size_t *at, const struct nn_rdata *fragment) {
     const size_t end = (fragment->maxp1 < ROS_RAW_MAX) ? fragment->maxp1 : ROS_RAW_MAX;
     if (fragment->min <= *at && end > *at) {
@@ -57,7 +57,7 @@ static struct ddsi_serdata *data_from_network(const struct ddsi_sertype *type, e
         return NULL;
     }
     data->raw.size = size;
-    // The size of its chunk is that of the message and of what CycloneDDS keeps behind it.
+    // The size of the chunk is that of the message plus the data that CycloneDDS stores behind it.
     (void)ros_service_identify(NN_RMSG_PAYLOAD(fragments->rmsg), fragments->rmsg->chunk.u.size,
                                NN_RDATA_SUBMSG_OFF(fragments), &data->raw.caller);
     for (; fragments != NULL; fragments = fragments->nextfrag) {
@@ -130,7 +130,7 @@ static struct ddsi_serdata *data_to_key(const struct ddsi_serdata *base) {
     if (data == NULL) {
         return NULL;
     }
-    data->base.type = NULL; // As CycloneDDS wants it of what belongs to no type.
+    data->base.type = NULL; // CycloneDDS requires this of an untyped sample.
     return &data->base;
 }
 
@@ -189,7 +189,7 @@ static void type_zero(const struct ddsi_sertype *type, void *samples, size_t cou
     memset(samples, 0, count * sizeof(ros_raw_t));
 }
 
-/// Never called: every sample is taken into one of ours.
+/// CycloneDDS requires this function, but never calls it: the bridge passes its own sample to every dds_take.
 static void type_allocate(void **out, const struct ddsi_sertype *type, void *before, size_t before_count,
                           size_t count) {
     (void)type;
@@ -208,7 +208,7 @@ static void type_release(const struct ddsi_sertype *type, void **samples, size_t
     }
 }
 
-/// Type names are compared before.
+/// CycloneDDS compares the type names before it calls this function.
 static bool type_equals(const struct ddsi_sertype *one, const struct ddsi_sertype *other) {
     (void)one;
     (void)other;

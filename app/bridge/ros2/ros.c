@@ -10,11 +10,12 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-/// Endpoints of a node, at most.
+/// Most endpoints of a node.
 #define ENDPOINTS_MAX 24U
 #define HASH(hex)     "typehash=RIHS01_" hex ";"
 
-/// The interface lo does not do multicast where machines have no network.
+/// Configuration of CycloneDDS for this machine only. It disables multicast, because lo has none on a machine without a
+/// network.
 static const char LOOPBACK[] =
     "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" "
     "multicast=\"false\"/></Interfaces>"
@@ -83,7 +84,7 @@ void ros_wake(dds_entity_t reader, void *context) {
     (void)!write(self->fd, &one, sizeof one);
 }
 
-/// A command does not wait for another thread to be woken, if it need not.
+/// Forwards a command in this thread of DDS if possible, because waking the other thread takes longer.
 static void take_or_wake(dds_entity_t reader, void *context) {
     const ros_t *self = context;
     if (self->came == NULL || !self->came(self->context)) {
@@ -120,7 +121,7 @@ static bool open_topics(ros_t *self) {
     for (unsigned i = 0; i < ROS_COMMAND_READERS && self->settings.drive.enabled; i++) {
         const ros_topic_t *topic = &commanded[i];
         if ((self->settings.drive.command & (1U << i)) != 0U) {
-            // Best effort matches every publisher, and what was lost never comes later.
+            // Best effort matches every publisher, and DDS does not deliver a lost command later.
             self->commands[i] =
                 ros_reader(self, topic_of(self, topic), ros_qos(topic->hash, 1, false, false), take_or_wake);
             good = good && self->commands[i] > 0;
@@ -150,7 +151,7 @@ static uint32_t gids_of(const dds_entity_t *entities, size_t count, size_t size,
     return used;
 }
 
-/// Without this `ros2 node list` has no name for us. Kept for who comes later.
+/// Announces the name of the node for `ros2 node list`. DDS stores the announcement for programs that start later.
 static bool announce(ros_t *self) {
     const bool old = self->settings.ros.humble;
     const size_t size = old ? sizeof(old_gid_bytes_t) : sizeof(gid_bytes_t);
@@ -170,7 +171,7 @@ static bool announce(ros_t *self) {
     const dds_entity_t topic = dds_create_topic(self->participant, &type, "ros_discovery_info", NULL, NULL);
     self->graph = ros_writer(self, topic, ros_qos(old ? "" : HASH_GRAPH, 1, true, true));
 
-    // Both kinds of node differ in the size of what the buffers hold only.
+    // The two types of node differ only in the size of the entries of these buffers.
     rmw_dds_common_msg_dds__NodeEntitiesInfo_ node = {
         .node_namespace = space,
         .node_name = self->settings.ros.node,
@@ -186,8 +187,9 @@ static bool announce(ros_t *self) {
            dds_write(self->graph, old ? (const void *)&old_info : (const void *)&info) == DDS_RETCODE_OK;
 }
 
-/// CycloneDDS sends from the interface of its configuration, but its receiving sockets have the address 0.0.0.0. It opens them with the
-/// domain; no reader is there yet, so what came before they are bound to `lo` is passed to nobody.
+/// Creates the domain and binds its sockets to `lo`. CycloneDDS sends from the interface of its configuration, but its
+/// receiving sockets have the address 0.0.0.0. It opens them with the domain. There is no reader yet, so DDS discards
+/// everything that came before the sockets are bound.
 static bool keep_local(ros_t *self, FILE *err) {
     self->domain = dds_create_domain(self->settings.ros.domain, LOOPBACK);
     if (self->domain > 0 && !bridge_reach_bind_lo()) {
@@ -226,7 +228,8 @@ static bool join(ros_t *self, FILE *err) {
     return true;
 }
 
-/// Namespace and node, and the frames of the handles: with the prefix of the base's frame, as in w1/base_link.
+/// Writes namespace and node, and the frames of the handles, which have the prefix of the base's frame, as in
+/// w1/base_link.
 static void name_robot(ros_t *self) {
     static const char *const handles[2] = {"left_handle", "right_handle"};
     const char *space = ros_settings_space(&self->settings);
@@ -262,7 +265,7 @@ ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, 
 void ros_close(ros_t *self) {
     ros_close_services(self);
     if (self->participant > 0) {
-        (void)dds_delete(self->participant); // And all that belongs to it: afterwards nobody calls us.
+        (void)dds_delete(self->participant); // With all its entities. Afterwards DDS calls no function of ours.
     }
     if (self->domain > 0) {
         (void)dds_delete(self->domain);

@@ -5,16 +5,17 @@
 #include <sysexits.h>
 
 #define SECOND_US 1000000
-/// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
+/// Time without a snapshot after which the gateway counts as silent. Two snapshots may be late, and a silent gateway is
+/// still reported within 0.2 s.
 #define SILENT_US 150000
 
-/// What a command is, besides what it wants.
+/// Result of the judgement of a command.
 typedef struct {
     ros_twist_t twist;
     ros_age_t age;
     int64_t age_us;
-    bool good;  ///< Of numbers.
-    bool moves; ///< Not zero, or not readable.
+    bool good;  ///< The command has usable numbers.
+    bool moves; ///< The command is not zero, or not readable.
 } judged_t;
 
 static judged_t judge_age(bridge_t *self, const ros_command_t *command) {
@@ -35,7 +36,7 @@ static judged_t judge_age(bridge_t *self, const ros_command_t *command) {
     return judged;
 }
 
-/// Counts what may not be carried out.
+/// Judges a command, and counts one that may not be executed.
 static judged_t judge_command(bridge_t *self, const ros_command_t *command) {
     judged_t judged = judge_age(self, command);
     judged.good = ros_twist_read(command->linear, command->angular, &judged.twist) == ROS_TWIST_GOOD;
@@ -56,7 +57,7 @@ static judged_t judge_command(bridge_t *self, const ros_command_t *command) {
     return judged;
 }
 
-/// The command itself moves nothing; the next one drives.
+/// Requests the lease for a command. The command itself moves nothing; the next one drives.
 static void arm_for_command(bridge_t *self, int64_t age_us) {
     ros_commands_t *commands = &self->facts.commands;
     iwc_terms_t terms;
@@ -64,7 +65,7 @@ static void arm_for_command(bridge_t *self, int64_t age_us) {
     (void)snprintf(commands->refusal, sizeof commands->refusal, "%s", refused ? iwc_reason(self->gateway) : "");
 }
 
-/// Counts what is another publisher's than the one that has the wheels.
+/// Returns true if another publisher is the driver, and counts the command unless it is zero.
 static bool is_of_another(bridge_t *self, const ros_command_t *command, const judged_t *judged) {
     const bool another = self->driver != 0 && self->driver != command->source;
     self->facts.commands.others += (another && judged->moves) ? 1U : 0U;
@@ -91,7 +92,7 @@ static void take_command(bridge_t *self, const ros_command_t *command) {
     if (!judged.good || (judged.age != ROS_AGE_FRESH && !zero_of_unknown) || is_of_another(self, command, &judged)) {
         return;
     }
-    self->facts.commands.unsent++; // Until it is.
+    self->facts.commands.unsent++; // pass_on subtracts it again after sending.
     if (bridge_why_not_drive(self)[0] != '\0') {
         return;
     }
@@ -115,7 +116,7 @@ static void take_commands(bridge_t *self) {
 static void take_from_ros(bridge_t *self) {
     ros_request_t request;
     ros_woken(self->ros);
-    // A command first: it is soonest on the bus so, and a stop that came with it has the last word.
+    // Commands first: a command then reaches the bus soonest, and a stop that came with it still acts after it.
     take_commands(self);
     while (ros_take_request(self->ros, &request)) {
         bridge_take_request(self, &request);
@@ -137,7 +138,7 @@ static void judge_silence(bridge_t *self, int64_t now) {
     }
 }
 
-/// Since when somebody can know of the last stop.
+/// Stores the number of the last stop and the time since which iwheel/state shows it.
 static void show_stop(bridge_t *self, int64_t now) {
     const iwc_value_t stop =
         (self->facts.link == ROS_LINK_UP) ? self->facts.machine.stop_number : (iwc_value_t){.known = false};
@@ -147,7 +148,8 @@ static void show_stop(bridge_t *self, int64_t now) {
     self->shown = stop;
 }
 
-/// Once a false was published, a line that is gone is one that cannot be read.
+/// Publishes the e-stop on a change. A line that was published before and is gone now counts as one that cannot be
+/// read.
 static void show_estop(bridge_t *self) {
     ros_estop_t estop = ros_facts_estop(&self->facts);
     if (estop == ROS_ESTOP_NO_LINE && self->estop != ROS_ESTOP_NO_LINE) {
@@ -235,7 +237,8 @@ int bridge_wait_ms(bridge_t *self, int *out_fd) {
     return result;
 }
 
-/// In a thread of DDS. With auto_arm a command may have to wait for the gateway, which is the loop's to do.
+/// Forwards the commands in a thread of DDS. Not with auto_arm: such a command may have to wait for the gateway, and
+/// only the loop may wait.
 static bool take_now(void *context) {
     bridge_t *self = context;
     if (pthread_mutex_trylock(&self->lock) != 0) {
@@ -257,8 +260,8 @@ static int open_both(bridge_t *self) {
     }
     if (bridge_call(self) == IWC_DENIED && self->settings.drive.enabled) {
         (void)fprintf(stderr,
-                      "iwheel-ros2: %s is not for this user: add it to the group iwheel (to drive), or set [drive] "
-                      "enabled = no\n",
+                      "iwheel-ros2: this user may not use %s: add the user to the group iwheel (to drive), or set "
+                      "[drive] enabled = no\n",
                       self->settings.gateway.socket);
         return EX_NOPERM;
     }
@@ -284,7 +287,7 @@ int bridge_open(bridge_t *self, const ros_settings_t *settings) {
 }
 
 void bridge_close(bridge_t *self) {
-    (void)pthread_mutex_lock(&self->lock); // For ever: what DDS still receives is nobody's.
+    (void)pthread_mutex_lock(&self->lock); // Never unlocked: commands that DDS still receives must not be forwarded.
     if (self->facts.machine.now.ours && self->facts.link != ROS_LINK_GONE) {
         (void)iwc_stop(self->gateway, BRIDGE_ASK_MS);
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The log lines of CycloneDDS. It writes one for each sample that it cannot read, as often as a stranger sends one.
+// Limits the log lines of CycloneDDS. CycloneDDS writes one for each sample that it cannot read, so another program
+// could fill the log.
 #include "common/bridge_service.h"
 #include "log_limit.h"
 #include "ros_parts.h"
@@ -12,7 +13,7 @@ static struct {
     log_limit_t limit;
 } sink = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/// In any thread of DDS.
+/// DDS calls it in any of its threads.
 static void write_line(void *context, const dds_log_data_t *line) {
     uint64_t dropped = 0;
     (void)context;
@@ -20,7 +21,7 @@ static void write_line(void *context, const dds_log_data_t *line) {
     const bool passes = log_limit_pass(&sink.limit, bridge_now_us(), &dropped);
     (void)pthread_mutex_unlock(&sink.lock);
     if (dropped > 0U) {
-        (void)fprintf(stderr, "iwheel-ros2: warning: DDS: %llu more lines in a minute were left out\n",
+        (void)fprintf(stderr, "iwheel-ros2: warning: DDS: %llu more lines in a minute were dropped\n",
                       (unsigned long long)dropped);
     }
     if (passes) {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
-// What the machine says, as ROS messages: metres, radians, newtons and volts.
+// Publishes the state of the machine as ROS messages, in metres, radians, newtons and volts.
 #include "ros_parts.h"
 
 #include "ros_types.h"
 
 #include <math.h>
 
-// Not const, because samples want it so.
+// Not const, because the members of samples are not const.
 static char left_wheel[] = "left_wheel_joint";
 static char right_wheel[] = "right_wheel_joint";
 static char nothing[] = "";
 
-/// Samples point to what they hold as if it were theirs; nobody writes to it.
+/// Removes const, because the members of samples are not const. DDS does not write to these strings.
 static char *writable(const char *text) {
     const union {
         const char *ours;
@@ -30,8 +30,9 @@ static double in_thousands(iwc_value_t value) {
     return (double)value.value / 1000.0;
 }
 
-/// Whether the wheel's way is that of now: of a wheel without telemetry the last distance stays known, its speed does not. ROS has no place for an
-/// unknown part of a motion (a NaN spreads through TF and filters), so such a motion is left out.
+/// Returns true if distance and speed of the wheel are up to date. Without telemetry the last distance stays known, the
+/// speed does not. ROS has no value for an unknown part of a motion (a NaN spreads through TF and filters), so the
+/// bridge omits such a motion.
 static bool is_moving_known(const iwc_wheel_t *wheel) {
     return wheel->distance_mm.known && wheel->speed_mm_s.known;
 }
@@ -40,7 +41,7 @@ static geometry_msgs_msg_dds__Quaternion_ heading(double yaw_rad) {
     return (geometry_msgs_msg_dds__Quaternion_){.z = sin(yaw_rad / 2.0), .w = cos(yaw_rad / 2.0)};
 }
 
-/// Squares on the diagonal; what nobody measures is told by a huge one.
+/// Writes the squares to the diagonal. A huge value marks a component that is not measured.
 static void spread(double *covariance, double x, double y, double yaw) {
     const double unknown = 1e6;
     const double squares[6] = {x * x, y * y, unknown, unknown, unknown, yaw * yaw};
@@ -109,8 +110,9 @@ void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odo
     }
 }
 
-/// The wrench of one force, the measured one along x at the frame's origin: the other parts of that force are zero by definition, whatever else
-/// acts on the handle. RViz drops a message in which any part is NaN. Without a known force there is no message.
+/// Publishes the wrench of the measured force, along x at the frame's origin. The other parts of that force are zero by
+/// definition, whatever else acts on the handle. RViz drops a message in which any part is NaN. Without a known force
+/// there is no message.
 void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
     const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
     for (unsigned i = 0; i < 2U; i++) {

@@ -15,28 +15,29 @@
 
 /// The longest UDP datagram.
 #define MESSAGE_MAX 65536U
-/// Readers of replies among which the caller's is looked for.
+/// Most readers of replies among which the bridge searches the caller's reader.
 #define READERS_MAX     256U
 #define CLIENT_ID_SIZE  120U
 #define READER_NO_KEY   0x04U
 #define READER_WITH_KEY 0x07U
-/// So long a reply waits for its reader.
+/// Longest time for which a reply waits for its reader.
 #define WAIT_US 1000000
 
 static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
 
 _Static_assert((int)ROS_VERBS == (int)ROS_MARK_WRITERS, "a writer of replies for each service");
 
-/// CycloneDDS calls `sendmsg` below in each of its threads, also to repeat a reply, and without a context: one node at a time.
+/// State of `sendmsg` below. CycloneDDS calls it in each of its threads, also to repeat a reply, and without a context,
+/// so there can be only one node at a time.
 static struct {
     pthread_mutex_t lock;
-    bool used; ///< A reply had to be marked.
+    bool used; ///< There was a reply that must be marked.
     ros_marks_t marks;
     uint8_t message[MESSAGE_MAX];
     uint8_t marked[MESSAGE_MAX];
 } out = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/// The message in one piece; 0: it is longer than any.
+/// Copies the parts of a message to `out.message`. Returns the length; 0: the message does not fit.
 static size_t join_parts(const struct msghdr *message) {
     size_t length = 0;
     for (size_t i = 0; i < message->msg_iovlen; i++) {
@@ -54,7 +55,7 @@ static ssize_t send_as_it_is(int fd, const struct msghdr *message, int flags) {
     return (ssize_t)syscall(SYS_sendmsg, fd, message, flags);
 }
 
-/// What leaves in the place of `out.message`. False: nothing else.
+/// Writes the message that replaces `out.message` to `*whole`. Returns false if nothing changes.
 static bool change_message(size_t length, struct iovec *whole) {
     const bool asked = rtps_ask_firsts(out.message, length);
     const size_t marked =
@@ -64,8 +65,8 @@ static bool change_message(size_t length, struct iovec *whole) {
     return asked || marked > 0U;
 }
 
-/// In the place of libc's, for the whole process: a reply to a client of Fast DDS gets the identity of its request, and Fast DDS is asked in
-/// its own way for what it wrote first.
+/// Replaces libc's function for the whole process. It adds the identity of the request to a reply to a Fast DDS client,
+/// and changes requests for first samples to the form of Fast DDS.
 ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
     struct iovec whole;
     ssize_t sent = 0;
@@ -78,7 +79,7 @@ ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
         copy.msg_iovlen = 1;
         sent = send_as_it_is(fd, &copy, flags);
         if (sent == (ssize_t)whole.iov_len) {
-            sent = (ssize_t)length; // CycloneDDS compares it with what it gave.
+            sent = (ssize_t)length; // CycloneDDS compares it with the length of its own message.
         }
     }
     const int error = errno;
@@ -87,14 +88,14 @@ ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
     return changed ? sent : send_as_it_is(fd, message, flags);
 }
 
-/// Of `recvmsg` below, also in each of its threads.
+/// State of `recvmsg` below, which CycloneDDS also calls in each of its threads.
 static struct {
     pthread_mutex_t lock;
     rtps_firsts_t firsts;
 } in = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/// In the place of libc's, for the whole process: CycloneDDS asks for what a new writer of Fast DDS wrote before it was known,
-/// and stores little of what strangers announce.
+/// Replaces libc's function for the whole process. It makes CycloneDDS request the samples that a new writer of Fast
+/// DDS wrote before CycloneDDS knew it, and limits the data that other programs announce.
 ssize_t recvmsg(int fd, struct msghdr *message, int flags) {
     const ssize_t came = (ssize_t)syscall(SYS_recvmsg, fd, message, flags);
     if (came <= 0 || message->msg_iovlen != 1 || (message->msg_flags & MSG_TRUNC) != 0) {
@@ -116,7 +117,7 @@ static void note_reply(ros_verb_t verb, const ros_caller_t *caller) {
     (void)pthread_mutex_unlock(&out.lock);
 }
 
-/// It was not written: the next one gets its number.
+/// Undoes `note_reply` for a reply that DDS did not write: the next reply gets its sequence number.
 static void forget_reply(ros_verb_t verb) {
     (void)pthread_mutex_lock(&out.lock);
     out.marks.writers[verb].number--;
@@ -154,7 +155,7 @@ static void reader_came(dds_entity_t writer, const dds_publication_matched_statu
     ros_wake(writer, context);
 }
 
-/// Request and reply know each other by an id in their user data, as rmw_cyclonedds does it.
+/// Opens the reader and writer of a service. Both have the same id in their user data, as in rmw_cyclonedds.
 bool ros_open_service(ros_t *self, ros_verb_t verb) {
     char user_data[80];
     dds_guid_t guid;
@@ -211,7 +212,7 @@ static bool take_ask(ros_t *self, ros_request_t *out_request) {
 }
 
 bool ros_take_request(ros_t *self, ros_request_t *out_request) {
-    // What stops goes first.
+    // Requests that stop the wheels come first.
     static const ros_verb_t order[ROS_VERBS] = {ROS_ESTOP, ROS_STOP, ROS_RESET, ROS_ARM};
     for (size_t i = 0; i < ROS_VERBS; i++) {
         if (take_service(self, order[i], out_request)) {
@@ -221,13 +222,14 @@ bool ros_take_request(ros_t *self, ros_request_t *out_request) {
     return take_ask(self, out_request);
 }
 
-/// By this rmw_cyclonedds says which reader and writer are of one client: "clientid=...;" in their user data. Empty: it says nothing.
+/// Reads "clientid=...;" from the user data, by which rmw_cyclonedds marks the reader and writer of one client. Empty:
+/// there is none.
 static void client_id(const dds_builtintopic_endpoint_t *endpoint, char id[CLIENT_ID_SIZE]) {
     void *data = NULL;
     size_t size = 0;
     id[0] = '\0';
     if (dds_qget_userdata(endpoint->qos, &data, &size) && data != NULL) {
-        char *text = data; // CycloneDDS ends it with a zero of its own.
+        char *text = data; // CycloneDDS adds a terminating zero.
         char *begin = strstr(text, "clientid=");
         if (begin != NULL) {
             (void)snprintf(id, CLIENT_ID_SIZE, "%.*s", (int)strcspn(begin, ";"), begin);
@@ -236,7 +238,8 @@ static void client_id(const dds_builtintopic_endpoint_t *endpoint, char id[CLIEN
     }
 }
 
-/// Fast DDS names the reader in the request (RTPS 2.2, 9.3.1.2: which kinds of entity are readers).
+/// Returns true if the request names the caller's reader, as Fast DDS does (RTPS 2.2, 9.3.1.2 lists the kinds of
+/// entity).
 static bool names_reader(const ros_caller_t *caller) {
     const uint8_t kind = caller->guid[ROS_GUID_SIZE - 1U];
     return caller->form == ROS_FORM_IDENTITY && (kind == READER_NO_KEY || kind == READER_WITH_KEY);
@@ -254,7 +257,8 @@ static bool is_reader_of(const dds_builtintopic_endpoint_t *reader, const ros_ca
            strcmp(ids[0], ids[1]) == 0;
 }
 
-/// DDS finds the two ends of a client one after the other. A caller that is gone need not be waited for.
+/// Returns true if the caller's reader is known, because DDS finds the two ends of a client one after the other. Also
+/// true if the caller is gone, so that the reply does not wait.
 static bool can_read(const ros_t *self, const ros_reply_t *reply) {
     dds_instance_handle_t handles[READERS_MAX];
     const dds_entity_t replies = self->replies[reply->verb];
@@ -263,7 +267,7 @@ static bool can_read(const ros_t *self, const ros_reply_t *reply) {
         return true;
     }
     const dds_return_t matched = dds_get_matched_subscriptions(replies, handles, READERS_MAX);
-    bool found = matched > (dds_return_t)READERS_MAX; // Too many to look for it.
+    bool found = matched > (dds_return_t)READERS_MAX; // Too many readers to search.
     for (size_t i = 0; !found && (dds_return_t)i < matched; i++) {
         dds_builtintopic_endpoint_t *reader = dds_get_matched_subscription_data(replies, handles[i]);
         if (reader != NULL) {

@@ -17,13 +17,13 @@ static const settings_word_t releases[] = {{"jazzy", 0}, {"humble", 1}, {NULL, 0
 static const settings_word_t twists[] = {
     {"both", ROS_COMMAND_BOTH}, {"twist", ROS_COMMAND_TWIST}, {"twist_stamped", ROS_COMMAND_STAMPED}, {NULL, 0}};
 
-/// As ROS wants names: letters, digits, _ and between names /, not beginning with a digit.
+/// Returns NULL for a name that ROS accepts: letters, digits and _, with / between names, and no digit first.
 static const char *wrong_name(const char *text) {
     bool first = true;
     for (; *text != '\0'; text++) {
         const unsigned char c = (unsigned char)*text;
         if ((first && isdigit(c)) || (!isalnum(c) && c != '_' && (c != '/' || first || text[1] == '\0'))) {
-            return "no name for ROS; use letters, digits and _, no digit or / first";
+            return "is not a valid name for ROS; use letters, digits and _, no digit or / first";
         }
         first = c == '/';
     }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// The bridge's configuration file, read as the gateway's (config/settings.h): every error with file, line and cure.
+/// The bridge's configuration file. config/settings.h reads it and reports every error with file, line and fix.
 #ifndef ROS2_ROS_SETTINGS_H
 #define ROS2_ROS_SETTINGS_H
 
 #include "config/settings.h"
 
-/// Read when no `-c FILE` is given. Its absence is no error then.
+/// The bridge reads this file if the command line has no `-c FILE`. It may be absent.
 #define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"
 
-/// Types of cmd_vel. ROS 2 programs send one or the other: Jazzy's controllers TwistStamped, most others Twist.
+/// Types of cmd_vel. Controllers of Jazzy send TwistStamped, most other programs send Twist.
 typedef enum { ROS_COMMAND_TWIST = 1, ROS_COMMAND_STAMPED = 2, ROS_COMMAND_BOTH = 3 } ros_command_types_t;
 
 typedef struct {
@@ -17,9 +17,9 @@ typedef struct {
     } gateway;
     struct {
         uint32_t domain;   ///< 0..232.
-        bool loopback;     ///< This machine only, without multicast; else as CYCLONEDDS_URI says.
-        bool synchronised; ///< Other machines have this one's clock.
-        bool humble;       ///< Ids of 24 bytes in ros_discovery_info, as before Iron.
+        bool loopback;     ///< True: this machine only, without multicast. False: as CYCLONEDDS_URI configures it.
+        bool synchronised; ///< NTP or PTP synchronises the clocks of the other machines with this one.
+        bool humble;       ///< ros_discovery_info has ids of 24 bytes, as before ROS Iron.
         char ns[65];       ///< Namespace, or `none`.
         char node[65];
     } ros;
@@ -43,7 +43,7 @@ extern const ros_settings_t ros_settings_standard;
 
 extern const settings_form_t ros_settings_form;
 
-/// The namespace before a relative name; empty: there is none.
+/// Returns the namespace; empty: none.
 const char *ros_settings_space(const ros_settings_t *settings);
 
 #endif

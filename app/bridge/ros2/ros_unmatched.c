@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Publishers of cmd_vel that DDS does not connect to the bridge. ROS connects equal types and compatible QoS only, and reports nothing.
+// Finds publishers of cmd_vel that DDS does not connect to the bridge. ROS connects only equal types and compatible
+// QoS, and reports no error.
 #include "ros_parts.h"
 #include "ros_types.h"
 
@@ -35,7 +36,8 @@ static bool is_matched(const ros_t *self, dds_instance_handle_t writer) {
     return found;
 }
 
-/// The reader asks for less than every ROS program offers: what is left are policies that ROS does not set.
+/// Returns the policy that does not match. The reader requests less than every ROS program offers, so it can only be a
+/// policy that ROS does not set.
 static const char *policy_of(const dds_qos_t *qos) {
     uint32_t count = 0;
     char **partitions = NULL;

@@ -34,7 +34,7 @@ bool rtps_part_at(const uint8_t *message, size_t length, size_t at, rtps_part_t 
     }
     out->little = (out->bytes[1] & RTPS_LITTLE) != 0U;
     const size_t rest = rtps_read(out->bytes + 2, 2, out->little);
-    const bool is_last = rest == 0U && out->bytes[0] != PAD && out->bytes[0] != INFO_TS; // It may have no length.
+    const bool is_last = rest == 0U && out->bytes[0] != PAD && out->bytes[0] != INFO_TS; // Only these may be empty.
     out->size = is_last ? length - at : RTPS_SUBMESSAGE + rest;
     if (out->size > length - at) {
         out->size = 0;

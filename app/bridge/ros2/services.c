@@ -3,15 +3,15 @@
 
 #include <string.h>
 
-#define DATA_HEADER      24U ///< With the submessage's.
-#define DATA_TO_QOS_AT   6U  ///< octetsToInlineQos, and from where it counts.
-#define DATA_COUNTS_FROM 8U
+#define DATA_HEADER      24U ///< Size with the submessage's header.
+#define DATA_TO_QOS_AT   6U  ///< Position of octetsToInlineQos.
+#define DATA_COUNTS_FROM 8U  ///< Position from which octetsToInlineQos counts.
 #define DATA_WRITER_AT   12U
 #define DATA_NUMBER_AT   16U
 #define DATA             0x15U
 #define HAS_QOS          0x02U
 #define PID_SENTINEL     0x0001U
-/// Of RTPS 2.4, and the one that Fast DDS used before; it reads both.
+/// Parameter of RTPS 2.4, and the parameter that older Fast DDS used. Fast DDS reads both.
 #define PID_RELATED        0x0083U
 #define PID_RELATED_CUSTOM 0x800FU
 #define IDENTITY_SIZE      24U
@@ -20,7 +20,7 @@
 #define REQUEST_SIZE       1U ///< structure_needs_at_least_one_member
 #define ALIGNED            4U
 
-/// As CDR has a number of 64 bits.
+/// Reads a number of 64 bits in CDR's form.
 static int64_t read_long(const uint8_t *bytes, bool little) {
     const uint64_t first = rtps_read(bytes, 4, little);
     const uint64_t second = rtps_read(bytes + 4, 4, little);
@@ -31,7 +31,7 @@ void ros_service_read(const uint8_t *payload, size_t size, ros_caller_t *caller)
     const size_t body = (size > ENCAPSULATION) ? size - ENCAPSULATION : 0U;
     const size_t header = HEADER_GUID + sizeof caller->number;
     caller->form = ROS_FORM_UNREADABLE;
-    if (body < REQUEST_SIZE || payload[0] != 0U || payload[1] > 1U) { // CDR of one order or the other.
+    if (body < REQUEST_SIZE || payload[0] != 0U || payload[1] > 1U) { // Only CDR, in either byte order.
         return;
     }
     if (body <= ALIGNED) {
@@ -40,7 +40,7 @@ void ros_service_read(const uint8_t *payload, size_t size, ros_caller_t *caller)
         const uint8_t *bytes = payload + ENCAPSULATION;
         caller->form = ROS_FORM_HEADER;
         memset(caller->guid, 0, sizeof caller->guid);
-        for (size_t i = 0; i < HEADER_GUID; i++) { // Kept as little endian has it, in which the reply is written.
+        for (size_t i = 0; i < HEADER_GUID; i++) { // Stored as little endian, the byte order of the reply.
             caller->guid[i] = bytes[(payload[1] == 1U) ? i : HEADER_GUID - 1U - i];
         }
         caller->number = read_long(bytes + HEADER_GUID, payload[1] == 1U);
@@ -75,10 +75,11 @@ typedef struct {
     const uint8_t *bytes;
     size_t size;
     bool little;
-    size_t qos; ///< Where its inline QoS is, or would be.
+    size_t qos; ///< Position of its inline QoS, whether present or not.
 } data_t;
 
-/// The submessage at `at`; false: the message ends before its end, or it is none of DATA (`out->size` is its size; 0: none at all).
+/// Writes the submessage at `at` to `*out`. Returns false if it is not a whole DATA submessage. `out->size` is the size
+/// of any whole submessage; 0: there is none.
 static bool data_at(const uint8_t *message, size_t length, size_t at, data_t *out) {
     rtps_part_t part;
     const bool is_whole = rtps_part_at(message, length, at, &part);
@@ -100,7 +101,7 @@ static void read_related(const data_t *data, ros_caller_t *caller) {
             return;
         }
         if ((kind == PID_RELATED || kind == PID_RELATED_CUSTOM) && size >= IDENTITY_SIZE) {
-            memcpy(caller->guid, data->bytes + at, ROS_GUID_SIZE); // Its number is that of the sample.
+            memcpy(caller->guid, data->bytes + at, ROS_GUID_SIZE); // The sequence number is that of the sample.
         }
         at += size;
     }
@@ -129,7 +130,7 @@ void ros_service_note(ros_marks_t *marks, unsigned which, const ros_caller_t *ca
     marks->writers[which].callers[number % ROS_MARKS] = *caller;
 }
 
-/// Whose reply it is; NULL: nobody's that has to be named.
+/// Returns the caller whose reply this sample is; NULL: no caller has to be named.
 static const ros_caller_t *caller_of(const ros_marks_t *marks, const data_t *data) {
     const int64_t number = rtps_read_sequence(data->bytes + DATA_NUMBER_AT, data->little);
     for (unsigned i = 0; i < ROS_MARK_WRITERS; i++) {

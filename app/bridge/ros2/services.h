@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// Services as the vendors of ROS 2 send them. Pure: no DDS, no I/O.
+/// Reads requests and writes replies of services in the forms of both vendors of ROS 2. Pure: no DDS, no I/O.
 ///
-/// ROS has two forms of a request and its reply. CycloneDDS (rmw_cyclonedds) begins the payload with a header of 16 bytes, by which the client
-/// knows its reply. Fast DDS (rmw_fastrtps, the default of ROS) sends none: a request is known by its sample identity, which is the GUID of its
-/// writer, or the one that its inline QoS names, and its sequence number; the reply names it in its inline QoS. CycloneDDS cannot write
-/// that, so `ros_service_mark` adds it to the RTPS message on its way to the socket.
+/// CycloneDDS (rmw_cyclonedds) begins the payload with a header of 16 bytes, which identifies the reply for its client.
+/// Fast DDS (rmw_fastrtps, the default of ROS) sends no header. It identifies a request by its sample identity: the
+/// sequence number, with the GUID of its writer or the GUID that its inline QoS names. The reply names this identity in
+/// its inline QoS. CycloneDDS cannot write it, so `ros_service_mark` adds it to the outgoing RTPS message.
 #ifndef ROS2_SERVICES_H
 #define ROS2_SERVICES_H
 
@@ -15,50 +15,52 @@
 #include <stdint.h>
 
 #define ROS_GUID_SIZE 16U
-/// Bytes that `ros_service_mark` adds to a message, at most.
+/// Most bytes that `ros_service_mark` adds to a reply.
 #define ROS_MARK_SIZE 60U
-/// Replies of one writer that a late reader may still ask for: those that DDS keeps.
+/// Replies of one writer that DDS stores, and that a late reader may still request.
 #define ROS_MARKS 10U
-/// Writers of replies.
+/// Number of writers of replies.
 #define ROS_MARK_WRITERS 4U
 
 typedef enum {
-    ROS_FORM_UNREADABLE = 0, ///< No request of this type. The reply has the form of Fast DDS.
+    ROS_FORM_UNREADABLE = 0, ///< Not a request of this type. The reply has the form of Fast DDS.
     ROS_FORM_HEADER,         ///< CycloneDDS.
     ROS_FORM_IDENTITY        ///< Fast DDS.
 } ros_form_t;
 
-/// Whose reply it is.
+/// Identifies the caller of a service and its request.
 typedef struct {
     ros_form_t form;
-    uint8_t guid[ROS_GUID_SIZE]; ///< ROS_FORM_HEADER: the first 8 bytes are the header's.
-    int64_t number;
+    uint8_t guid[ROS_GUID_SIZE]; ///< ROS_FORM_HEADER: only the first 8 bytes, those of the header.
+    int64_t number;              ///< Sequence number of the request.
 } ros_caller_t;
 
-/// Reads the payload of a std_srvs/Trigger request, with the encapsulation before it. Leaves the identity as it is unless the payload has one.
+/// Reads the payload of a std_srvs/Trigger request, with its encapsulation. Writes form, and the identity if the
+/// payload has one; otherwise the identity is unchanged.
 void ros_service_read(const uint8_t *payload, size_t size, ros_caller_t *caller);
 
-/// The sample identity of the DATA submessage at `at` in an RTPS message. False, with `*out_caller` of zeros: there is none.
+/// Reads the sample identity of the DATA submessage at `at` in an RTPS message. Returns false, and writes zeros to
+/// `*out_caller`, if there is no such submessage.
 bool ros_service_identify(const uint8_t *message, size_t size, size_t at, ros_caller_t *out_caller);
 
-/// Writes the payload of a reply, with its encapsulation. Returns its size; a text that does not fit is cut.
+/// Writes the payload of a reply, with its encapsulation. Returns its size. Cuts a text that does not fit.
 size_t ros_service_write(const ros_caller_t *caller, bool success, const char *text, uint8_t *out, size_t size);
 
-/// Which sample of our writers is the reply to whom.
+/// Maps the newest samples of our writers to the callers whose replies they are.
 typedef struct {
-    uint8_t prefix[ROS_PREFIX_SIZE]; ///< Of the GUIDs of our participant.
+    uint8_t prefix[ROS_PREFIX_SIZE]; ///< GUID prefix of our participant.
     struct {
-        uint8_t id[4];                   ///< Of the writer, the last bytes of its GUID; zeros: unused.
-        int64_t number;                  ///< Sequence number of its newest sample.
-        ros_caller_t callers[ROS_MARKS]; ///< That of sample N is at N % ROS_MARKS.
+        uint8_t id[4];                   ///< Last bytes of the writer's GUID; zeros: unused.
+        int64_t number;                  ///< Sequence number of the writer's newest sample.
+        ros_caller_t callers[ROS_MARKS]; ///< The caller of sample N is at N % ROS_MARKS.
     } writers[ROS_MARK_WRITERS];
 } ros_marks_t;
 
-/// The next sample of writer `which` is the reply to this caller.
+/// Stores that the next sample of writer `which` is the reply to this caller.
 void ros_service_note(ros_marks_t *marks, unsigned which, const ros_caller_t *caller);
 
-/// Copies an RTPS message to `out` and names the callers of ROS_FORM_IDENTITY in the inline QoS of their replies. Returns the new length; 0:
-/// the message has no such reply, or does not fit.
+/// Copies an RTPS message to `out`, and names each caller that is not of ROS_FORM_HEADER in the inline QoS of its
+/// reply. Returns the new length; 0: the message has no such reply, or does not fit.
 size_t ros_service_mark(const ros_marks_t *marks, const uint8_t *message, size_t length, uint8_t *out, size_t size);
 
 #endif

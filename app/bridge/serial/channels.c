@@ -106,13 +106,13 @@ static const char *too_late(const relay_t *self, const relay_channel_t *channel,
         return NULL;
     }
     if (came_us < self->gap_us) {
-        return "the relay was stopped or starved while this waited, so it was not sent; ask again";
+        return "the relay was delayed while this request waited, so it was not sent; send it again";
     }
     if (kind == SERIAL_MOVES && came_us < channel->armed_us) {
-        return "this command was sent before arm was answered; wait for that answer, then command anew";
+        return "this command was sent before the reply to arm; wait for that reply, then send a new command";
     }
     if (kind == SERIAL_MOVES && self->now_us - came_us >= SERIAL_FRESH_US) {
-        return "this command waited too long behind earlier ones; send no faster than they are answered";
+        return "this command waited too long behind earlier ones; send no faster than the replies come";
     }
     return NULL;
 }
@@ -305,7 +305,7 @@ static void poll_channel(relay_t *self, relay_channel_t *channel) {
     serial_queue_age(&channel->queue, self->now_us);
     if (channel->queue.unanswered >= RELAY_UNANSWERED) {
         release(channel);
-        turn_away(self, client, "the board answered none of the last requests; connect again");
+        turn_away(self, client, "the board replied to none of the last requests; connect again");
         return;
     }
     tell_answered(self, channel, client);

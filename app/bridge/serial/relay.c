@@ -88,7 +88,7 @@ static void take_news(relay_t *self, serial_news_t news, const iwn_line_t *line)
         greet(self);
         break;
     case SERIAL_NEWS_LOST:
-        set_trouble(self, "the board has started anew");
+        set_trouble(self, "the board has restarted");
         relay_drop_clients(self);
         serial_trouble_begin(&self->judged, self->now_us);
         self->asked_us = 0;
@@ -184,7 +184,7 @@ static void poll_port(relay_t *self) {
     } else if (self->port.fd >= 0 && self->out_length > 0U && self->now_us >= self->said_us + RELAY_STUCK_US &&
                self->now_us >= self->free_us + RELAY_STUCK_US) {
         serial_port_discard(&self->port);
-        lose_port(self, "the port takes nothing any more: does the board hang, or hold the line?");
+        lose_port(self, "the port accepts no data any more: does the board hang, or block the line?");
     }
 }
 
@@ -205,7 +205,7 @@ static int open_loop(relay_t *self) {
     if (self->signal_fd < 0 || error != 0 || watch(self, self->signal_fd, SOCK_TAG_SIGNAL) != 0 ||
         watch(self, self->clients.listener[SOCK_DRIVE].fd, SOCK_TAG_LISTENER) != 0 ||
         watch(self, self->clients.listener[SOCK_WATCH].fd, SOCK_TAG_WATCH_LISTENER) != 0) {
-        (void)fputs("iwheel-serial: cannot make the descriptors for the event loop; raise the limit of open files\n",
+        (void)fputs("iwheel-serial: cannot create the descriptors for the event loop; raise the limit of open files\n",
                     stderr);
         return EX_UNAVAILABLE;
     }
@@ -242,7 +242,7 @@ static void judge_gap(relay_t *self) {
     if (sock_clients_count(&self->clients) == 0U) {
         return;
     }
-    sock_log(&self->log, SOCK_LOG_WARNING, "the relay was stopped or starved for %llu ms: what waited is not sent",
+    sock_log(&self->log, SOCK_LOG_WARNING, "the relay was delayed for %llu ms: it does not send waiting requests",
              (unsigned long long)(away_us / 1000U));
     if (away_us >= RELAY_LEFT_US) {
         relay_drop_clients(self); // The board has closed their channels.

@@ -33,7 +33,7 @@
 /// Request for the identity of the board, which begins the link.
 #define RELAY_ASK    "{\"cmd\":\"link\"}"
 #define RELAY_ASK_US 300000U
-/// An open without an answer is sent again after this time, and given up later.
+/// An open without an answer is sent again after this time, and dropped later.
 #define RELAY_OPEN_US    200000U
 #define RELAY_WELCOME_US 1500000U
 /// A client is closed after this number of requests in a row without an answer, because the board may have closed its

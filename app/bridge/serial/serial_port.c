@@ -75,9 +75,8 @@ static int complain(const char *path, int error, char *out_why, size_t size) {
         if (pid > 0) {
             (void)snprintf(name, sizeof name, "process %ld", pid);
         }
-        (void)snprintf(out_why, size,
-                       "%s has %s already, and two relays on one port would obey nobody; end that one, or %s", name,
-                       path, cure);
+        (void)snprintf(out_why, size, "%s already uses %s, and two relays cannot share a port; end that one, or %s",
+                       name, path, cure);
         return EBUSY;
     }
     if (error == EACCES || error == EPERM) {
@@ -85,7 +84,7 @@ static int complain(const char *path, int error, char *out_why, size_t size) {
     } else if (error == ENOENT || error == ENXIO || error == ENODEV) {
         cure = "plug the board in, or name its port with [board] port (ls /dev/serial/by-id)";
     } else if (error == ENOTTY) {
-        cure = "it is no serial port; name one with [board] port (ls /dev/serial/by-id)";
+        cure = "it is not a serial port; name one with [board] port (ls /dev/serial/by-id)";
     }
     (void)snprintf(out_why, size, "port %s: %s; %s", path, strerror(error), cure);
     return error;

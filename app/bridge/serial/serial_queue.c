@@ -50,10 +50,11 @@ static void overtake(serial_queue_t *self, const serial_request_t *newer) {
         }
         if (request->kind == SERIAL_MOVES && newer->kind == SERIAL_MOVES) {
             refuse(request, IWN_STALE_COMMAND,
-                   "a newer command of yours replaced this one before the serial line had room for it; command no "
-                   "faster than it answers");
+                   "a newer command of this client replaced this one before the serial line was free; send no faster "
+                   "than the replies come");
         } else if (newer->kind == SERIAL_STOPS && (request->kind == SERIAL_MOVES || request->kind == SERIAL_GRANTS)) {
-            refuse(request, IWN_STALE_COMMAND, "your stop came before this was sent to the board; ask again");
+            refuse(request, IWN_STALE_COMMAND,
+                   "a stop of this client came before this request was sent to the board; send it again");
         }
     }
 }
@@ -81,14 +82,14 @@ static uint64_t since_us(const serial_request_t *request) {
 static void give_up(serial_request_t *request) {
     if (request->state == SERIAL_WAITING) {
         refuse(request, IWN_STALE_COMMAND,
-               "this waited too long for room on the serial line and was not sent; a faster line has more: baud");
+               "this request waited too long for the serial line and was not sent; use a higher baud rate");
     } else if (request->kind == SERIAL_MOVES) {
-        refuse(
-            request, IWN_STALE_COMMAND,
-            "the board did not answer in time: this command or its answer was lost on the serial line; command anew");
+        refuse(request, IWN_STALE_COMMAND,
+               "the board did not answer in time: this command or its reply was lost on the serial line; send a new "
+               "command");
     } else {
         refuse(request, IWN_INTERNAL,
-               "the board did not answer: this request or its answer was lost on the serial line; ask again");
+               "the board did not answer: this request or its reply was lost on the serial line; send it again");
     }
 }
 
@@ -191,7 +192,8 @@ bool serial_queue_take(serial_queue_t *self, uint64_t number, bool ok, const cha
         request->length = length;
         memcpy(request->json, rest, length);
     } else if (index > 0U) {
-        refuse(request, IWN_INTERNAL, "the board answered out of turn with more than the relay keeps; ask again");
+        refuse(request, IWN_INTERNAL,
+               "the board replied out of order with more data than the relay stores; send the request again");
     }
     return true;
 }

@@ -13,7 +13,8 @@
 #define MODE(member)              .kind = SETTINGS_MODE, FIELD(member)
 
 static const char *wrong_port(const char *text) {
-    return (text[0] == '/') ? NULL : "no path of a port; write it from / on, as ls /dev/serial/by-id/* tells it";
+    return (text[0] == '/') ? NULL
+                            : "is not the path of a port; write an absolute path, as ls /dev/serial/by-id/* shows it";
 }
 
 static const settings_key_t keys[] = {
@@ -50,7 +51,7 @@ static void relate(settings_report_t *report, const void *values, const unsigned
     if (!serial_port_has_baud(settings->board.baud)) {
         settings_complain(
             report, line_of("baud", lines),
-            "baud = %u is no rate that ports have; write 115200, 921600, 1000000 or 2000000, as the image "
+            "baud = %u is not a rate of serial ports; write 115200, 921600, 1000000 or 2000000, as the image "
             "was built",
             (unsigned)settings->board.baud);
     }

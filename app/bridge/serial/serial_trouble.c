@@ -59,8 +59,8 @@ void serial_trouble_write(const serial_noise_t *noise, const serial_place_t *pla
     switch (kind_of(noise)) {
     case SERIAL_TROUBLE_BAUD:
         (void)snprintf(out, size,
-                       "%llu bytes came from %s that are no text: the baud rate is another than %u; set baud to "
-                       "that of the image, or the lines are disturbed",
+                       "%llu bytes came from %s that are not text: the baud rate is not %u (set baud to that of the "
+                       "image), or the lines are disturbed",
                        bytes, place->port, place->baud);
         break;
     case SERIAL_TROUBLE_DAMAGED:
@@ -71,7 +71,7 @@ void serial_trouble_write(const serial_noise_t *noise, const serial_place_t *pla
         break;
     case SERIAL_TROUBLE_PROTOCOL:
         (void)snprintf(out, size,
-                       "another protocol is spoken on %s (such as \"%s\"): it is another device, or the board runs "
+                       "%s uses another protocol (such as \"%s\"): it is another device, or the board runs "
                        "another image than `gateway`",
                        place->port, noise->sample);
         break;

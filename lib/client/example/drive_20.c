@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Drives both wheels forward for some seconds and stops. However it dies, they stop: nobody but this loop sends commands.
+// Drives both wheels forward for some seconds and stops. Only this loop sends commands, so the wheels also stop if the
+// program dies.
 #include <iwheel_client/client.h>
 
 #include <stdio.h>

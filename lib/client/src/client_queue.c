@@ -3,15 +3,15 @@
 
 #include <string.h>
 
-/// So many different things are kept when lines are left out.
+/// Most messages that iwc_queue_thin retains.
 #define KINDS_MAX 128U
-/// In the place of a line's first byte: nobody will ask for it.
+/// First byte of a line that no call will read.
 #define STRUCK '\0'
 static const char EVENT[] = "{\"event\":"; // Beginning of every event of the gateway.
-/// A `lost` event is only a number, which is added up.
+/// Kind of the `lost` events, whose counts are added up.
 #define KIND_LOST UINT64_C(0)
 
-/// What makes two events of one name different things.
+/// Fields that must be equal for one event to supersede another of the same name.
 static const struct {
     const char *event;
     const char *fields[2];
@@ -26,7 +26,7 @@ static bool is_odd(int64_t id) {
     return id % 2 != 0;
 }
 
-/// The gateway has taken this drive command from its socket.
+/// Records that the gateway has replied to this drive command.
 static void note_driven(iwc_t *self, int64_t id) {
     for (size_t i = 0; i < IWC_DRIVES_MAX; i++) {
         if (self->driven[i] == id) {
@@ -35,8 +35,8 @@ static void note_driven(iwc_t *self, int64_t id) {
     }
 }
 
-/// Whether a reply is still wanted by iwc_next. The one that a call waits for goes to it at once; a refusal without id, which is
-/// meant for the whole connection, to whoever waits.
+/// Returns true if iwc_next shall return this reply. Passes the reply for which a call waits to this call, and also a
+/// refusal without id, which concerns the whole connection.
 static bool admit_reply(iwc_t *self, iwc_span_t line) {
     int64_t id = 0;
     const bool has_id = iwc_json_integer(iwc_json_find(line, "id"), &id);
@@ -50,7 +50,8 @@ static bool admit_reply(iwc_t *self, iwc_span_t line) {
     return !has_id || is_odd(id);
 }
 
-/// Returns false if the line is no message. Names are not compared in a line that begins like an event of the gateway.
+/// Returns false if the line is not a message. Does not search for equal names in a line that begins like an event of
+/// the gateway.
 static bool admit_line(iwc_t *self, iwc_span_t line) {
     const bool begins = line.length > sizeof EVENT && memcmp(line.at, EVENT, sizeof EVENT - 1U) == 0;
     if (line.length > IWC_LINE_MAX || !iwc_json_is_object(line.at, line.length, begins)) {
@@ -102,7 +103,7 @@ bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message) {
     return false;
 }
 
-/// FNV-1a.
+/// Adds a value to a hash (FNV-1a).
 static uint64_t mix(uint64_t kind, iwc_span_t value) {
     for (size_t i = 0; i < value.length; i++) {
         kind = (kind ^ (unsigned char)value.at[i]) * UINT64_C(0x100000001B3);
@@ -110,7 +111,7 @@ static uint64_t mix(uint64_t kind, iwc_span_t value) {
     return kind;
 }
 
-/// Two lines of one kind are about the same thing. A reply is a thing of its own.
+/// Returns the kind of a line: the newer of two lines of one kind supersedes the older. Each reply has its own kind.
 static uint64_t kind_of(iwc_span_t line) {
     const iwc_span_t event = iwc_json_find(line, "event");
     uint64_t kind = mix(UINT64_C(0xCBF29CE484222325), (event.at != NULL) ? event : iwc_json_find(line, "id"));
@@ -136,10 +137,10 @@ static uint64_t lost_count(iwc_span_t line) {
 typedef struct {
     uint64_t kind[KINDS_MAX];
     unsigned kinds;
-    size_t bytes; ///< Of what is kept.
+    size_t bytes; ///< Size of the retained lines.
 } survivors_t;
 
-/// Whether a line stays, seen from the newest to the oldest.
+/// Returns true if a line stays. The caller calls it for each line, from the newest to the oldest.
 static bool keep(iwc_t *self, survivors_t *survivors, iwc_span_t line) {
     if (line.at[0] == STRUCK) {
         return false;

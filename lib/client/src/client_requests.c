@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Requests: composed, numbered, sent; and the reply that a call waits for.
+// Composes, numbers and sends requests, and waits for replies.
 #include "connection.h"
 
 #include <poll.h>
@@ -21,14 +21,16 @@ static bool is_driving(iwc_span_t cmd) {
     return is_command(cmd, driving);
 }
 
-/// A newer protocol may mean something else by the same words: nothing is moved or changed by guessing.
+/// Returns true for a command that is safe with a newer protocol. The same command may have another meaning there, so
+/// the library sends none that moves or changes anything.
 static bool is_harmless(iwc_span_t cmd) {
     static const char *const harmless[] = {"hello",  "status", "why",        "watch",     "stop",
                                            "disarm", "estop",  "recordings", "recording", NULL};
     return is_command(cmd, harmless);
 }
 
-/// A place for the id of one more drive command, NULL if there is none: a gateway that hangs would find them all when it wakes.
+/// Returns a free entry for the id of one more drive command; NULL: none. The limit prevents a gateway that hung from
+/// receiving many old commands when it resumes.
 static int64_t *place_to_drive(iwc_t *self) {
     for (int look = 0; look < 2; look++) {
         for (size_t i = 0; i < IWC_DRIVES_MAX; i++) {
@@ -36,12 +38,13 @@ static int64_t *place_to_drive(iwc_t *self) {
                 return &self->driven[i];
             }
         }
-        (void)iwc_fill(self); // Their replies may be there already.
+        (void)iwc_fill(self); // Replies may already be waiting in the socket.
     }
     return NULL;
 }
 
-/// Writes the request with its id into `line`, whose size is IWC_REQUEST_MAX + 2. 0: it is none, or too long.
+/// Writes the request with its id to `line`, whose size is IWC_REQUEST_MAX + 2. Returns the length; 0: it is not a
+/// request, or too long.
 static size_t number_it(char *line, const char *request, int64_t id) {
     const size_t length = strlen(request);
     if (!iwc_json_is_object(request, length, false) || request[0] != '{' || memchr(request, '\n', length) != NULL) {
@@ -98,7 +101,7 @@ static iwc_result_t await_answer(iwc_t *self, int64_t deadline_us) {
         if (result == IWC_TIMEOUT) {
             result = iwc_await(self, POLLIN, deadline_us);
         } else if (result == IWC_OK && iwc_now_us() >= deadline_us) {
-            result = IWC_TIMEOUT; // Events without end.
+            result = IWC_TIMEOUT; // Events keep coming, but not the reply.
         }
         if (result != IWC_OK) {
             return result;
@@ -139,7 +142,7 @@ bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply) {
     return true;
 }
 
-/// Room for the longest request of ours: `estop` with a reason that is escaped throughout.
+/// Size of the longest request of this library: `estop` with a reason in which every character is escaped.
 #define TEXT_SIZE        640U
 #define NAME_MAX_BYTES   64U
 #define REASON_MAX_BYTES 200U
@@ -177,7 +180,7 @@ static void add_known(request_t *self, const char *key, iwc_value_t value) {
     }
 }
 
-/// False if the text may not stand in a request.
+/// Returns false if a request may not contain the text.
 static bool add_text(request_t *self, const char *key, const char *text, size_t most) {
     if (text == NULL) {
         return true;
@@ -264,7 +267,7 @@ iwc_result_t iwc_arm_as(iwc_t *self, const iwc_arm_t *arm, int timeout_ms, iwc_t
     return result;
 }
 
-/// `request` drives.
+/// Sends a request that drives.
 static iwc_result_t command(iwc_t *self, const char *request, int timeout_ms, iwc_applied_t *out_applied) {
     iwc_message_t reply;
     if (timeout_ms == 0) {
@@ -316,7 +319,7 @@ iwc_result_t iwc_twist_as(iwc_t *self, const iwc_twist_t *twist, const char *key
     return command(self, request.text, timeout_ms, out_applied);
 }
 
-/// What was not heard to stop is stopped by the end of the connection.
+/// Closes the connection if the gateway has not confirmed a stop. That ends the lease and stops the wheels.
 static iwc_result_t or_close(iwc_t *self, iwc_result_t result) {
     if (result != IWC_OK && result != IWC_REFUSED && result != IWC_INVALID) {
         iwc_close(self);
@@ -328,7 +331,7 @@ iwc_result_t iwc_stop(iwc_t *self, int timeout_ms) {
     return or_close(self, ask_plainly(self, "stop", timeout_ms));
 }
 
-/// False if the reason may not stand in a request.
+/// Returns false if a request may not contain the reason.
 static bool begin_estop(request_t *out_request, const char *reason) {
     *out_request = begin_request("estop");
     if (!add_text(out_request, "reason", reason, REASON_MAX_BYTES)) {

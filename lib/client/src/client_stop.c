@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stop through a connection of its own: by one socket of a gateway or by the other, whichever takes it.
+// Sends a stop through a connection of its own, to whichever of the gateway's two sockets accepts it.
 #include "connection.h"
 
 #include <limits.h>
@@ -7,12 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 
-/// With another socket to try, one attempt takes no longer than this.
+/// Longest time of one attempt, if there is another socket.
 #define ATTEMPT_US 300000
-/// Between two rounds of attempts.
+/// Interval between two rounds of attempts.
 #define AGAIN_US 5000
 
-/// The custom is watch/NAME.sock next to NAME.sock. Returns false if the path is too long.
+/// Writes the path of the gateway's other socket: watch/NAME.sock for NAME.sock, and the reverse. Returns false if it
+/// is too long.
 static bool find_other(const char *path, char *out, size_t size) {
     const char *slash = strrchr(path, '/');
     const char *name = (slash != NULL) ? slash + 1 : path;
@@ -25,13 +26,13 @@ static bool find_other(const char *path, char *out, size_t size) {
     return length > 0 && (size_t)length < size;
 }
 
-/// Another attempt cannot change it.
+/// Returns true for a result that another attempt cannot change.
 static bool is_settled(const iwc_t *self, iwc_result_t result) {
     const bool crowded = result == IWC_REFUSED && strcmp(self->error, "too_many_clients") == 0;
     return result == IWC_OK || result == IWC_INTERRUPTED || (result == IWC_REFUSED && !crowded);
 }
 
-/// Nothing is to be expected of another attempt with the same socket soon.
+/// Returns true if another attempt with the same socket will fail for the same reason.
 static bool is_closed_to_us(iwc_result_t result) {
     return result == IWC_NOT_THERE || result == IWC_DENIED || result == IWC_INVALID;
 }
@@ -43,7 +44,7 @@ static iwc_result_t attempt(iwc_t *self, const char *path, const char *request, 
     return (result == IWC_OK) ? iwc_ask(self, request, (left_ms < INT_MAX) ? (int)left_ms : IWC_FOREVER, NULL) : result;
 }
 
-/// What came of the first socket of all is the answer, if none stops.
+/// Outcome of the first socket. It is the result of the call if no socket accepts the stop.
 typedef struct {
     iwc_result_t result;
     int error_number;
@@ -77,7 +78,7 @@ static iwc_result_t stop_by_either(iwc_t *self, const char *const paths[2], cons
                 return result;
             }
             if (i == 0 &&
-                (first.result == IWC_CLOSED || result != IWC_TIMEOUT)) { // Not that the time was over in the end.
+                (first.result == IWC_CLOSED || result != IWC_TIMEOUT)) { // Not the timeout of the last attempt.
                 keep(&first, self, result);
             }
             again = again || !is_closed_to_us(result);

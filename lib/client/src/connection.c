@@ -12,9 +12,9 @@
 #include <time.h>
 #include <unistd.h>
 
-/// Between two attempts while the gateway's queue of callers is full.
+/// Interval between two attempts while the gateway's queue of connections is full.
 #define RETRY_US 20000
-/// iwc_latest reads no more often than this: a gateway may be faster than we are.
+/// Most reads of one iwc_latest, because a gateway may send faster than this process reads.
 #define READS_MAX 64
 
 int64_t iwc_now_us(void) {
@@ -50,16 +50,16 @@ const char *iwc_words(iwc_result_t result) {
         [IWC_OK] = "done",
         [IWC_TIMEOUT] = "nothing came in time; if the gateway does not answer, see its log",
         [IWC_INTERRUPTED] = "a signal ended the wait",
-        [IWC_REFUSED] = "the gateway refused; its words tell cause and cure",
+        [IWC_REFUSED] = "the gateway refused; its message states cause and fix",
         [IWC_FULL] = "not sent, because the gateway does not read; see its log",
         [IWC_CLOSED] = "there is no connection; connect, and arm again if the wheels shall turn",
-        [IWC_GARBLED] = "not the gateway's language on this socket; check its path, or versions that differ",
-        [IWC_NEWER] = "the gateway speaks a newer protocol; install the libiwheel-client that belongs to it",
+        [IWC_GARBLED] = "this socket does not use the gateway's protocol; check its path and the versions",
+        [IWC_NEWER] = "the gateway has a newer protocol; install the libiwheel-client of its version",
         [IWC_INVALID] = "an argument is outside its range; see the contract in iwheel_client/client.h",
         [IWC_NOT_THERE] =
-            "nobody listens on the socket; start the gateway (systemctl start iwheel-gateway), or name its socket",
+            "no program listens on the socket; start the gateway (systemctl start iwheel-gateway), or name its socket",
         [IWC_DENIED] =
-            "the socket may not be used by you; join its group (sudo usermod -aG iwheel $USER), then log in again",
+            "this user may not use the socket; join its group (sudo usermod -aG iwheel $USER), then log in again",
         [IWC_SEVERAL] = "several gateways are running; name the socket of one (IWHEEL_SOCKET)",
     };
     const size_t index = (size_t)result;
@@ -81,7 +81,7 @@ iwc_result_t iwc_await(const iwc_t *self, short events, int64_t deadline_us) {
 
 void iwc_end(iwc_t *self, iwc_result_t result) {
     if (self->fd >= 0) {
-        // A forked child may hold a copy: without the shutdown the lease would not end with our close.
+        // A forked child may hold a copy of the socket. Without the shutdown the lease would not end with this close.
         (void)((getpid() == self->owner) ? shutdown(self->fd, SHUT_RDWR) : 0);
         (void)close(self->fd);
     }
@@ -128,11 +128,11 @@ iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadl
             continue;
         }
         if (errno != EAGAIN && errno != EINTR) {
-            return IWC_CLOSED; // What the gateway said before it left can still be read.
+            return IWC_CLOSED; // The caller can still read the messages that the gateway sent before it closed.
         }
         const iwc_result_t result = iwc_await(self, POLLOUT, deadline_us);
         if (result != IWC_OK && sent > 0) {
-            iwc_end(self, IWC_CLOSED); // Its other half must never leave later.
+            iwc_end(self, IWC_CLOSED); // The rest of the line must never be sent later.
             return IWC_CLOSED;
         }
         if (result != IWC_OK) {
@@ -157,7 +157,7 @@ void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply) {
     (void)iwc_text(reply, "message", self->reason, sizeof self->reason);
 }
 
-/// The first line tells who is there: the event hello, or the refusal of one client too many.
+/// Reads the first line: the event hello, or the refusal of one client too many.
 static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
     iwc_message_t hello;
     iwc_result_t result = IWC_OK;
@@ -214,7 +214,7 @@ static iwc_result_t meaning_of(int error) {
     }
 }
 
-/// Calls `self->path` until somebody takes the call or the time is over.
+/// Tries to connect to `self->path` until a program accepts or the time is over.
 static iwc_result_t call(iwc_t *self, int64_t deadline_us) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     memcpy(address.sun_path, self->path, sizeof address.sun_path);
@@ -326,7 +326,7 @@ iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message) {
         if (result == IWC_TIMEOUT && timeout_ms != 0) {
             result = iwc_await(self, POLLIN, deadline_us);
         } else if (result == IWC_OK && iwc_now_us() >= deadline_us && !iwc_pending(self)) {
-            result = IWC_TIMEOUT; // Something comes all the time, but nothing to hand out.
+            result = IWC_TIMEOUT; // Data keeps coming, but no message for the caller.
         }
         if (result != IWC_OK) {
             return result;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// The handle: a socket and a buffer of lines.
+/// Private to the library: the handle, which is a socket and a buffer of lines.
 ///
-///     in: | taken | lines that are whole | one that is still coming | room |
-///         0     begin                  whole                       end   IWC_IN_SIZE
+///     in: | read by the caller | whole lines | incomplete line | free |
+///         0                  begin         whole              end   IWC_IN_SIZE
 ///
-/// A line is looked at once, when its newline comes. What nobody will ask for is struck out there, by a NUL in the place of its first
-/// byte. When room runs out, events that a newer one supersedes go first, then the oldest.
+/// The library examines a line once, when its newline comes. It strikes out a line that no call will read, by a NUL as
+/// its first byte. When the buffer is full, it drops events that a newer one supersedes, then the oldest messages.
 #ifndef IWC_CONNECTION_H
 #define IWC_CONNECTION_H
 
@@ -15,72 +15,77 @@
 #include <sys/types.h>
 #include <sys/un.h>
 
-/// Room for two lines that are kept, one that is coming, and one to read into.
+/// Size of the buffer: two stored lines, an incomplete one, and one to read into.
 #define IWC_IN_SIZE (4U * ((size_t)IWC_LINE_MAX + 1U))
 
 struct iwc {
-    int fd;            ///< -1: closed; what came before may still be taken.
-    pid_t owner;       ///< The process that connected: a forked child may not speak for it.
-    iwc_result_t over; ///< IWC_OK while the connection lives, else what became of it.
-    bool watches;      ///< The gateway lets it watch and stop only.
-    bool newer;        ///< The gateway speaks a protocol above IWC_PROTOCOL.
+    int fd;            ///< -1: closed; the caller may still read messages that came before.
+    pid_t owner;       ///< The process that connected. A forked child must not send on the connection.
+    iwc_result_t over; ///< IWC_OK while the connection exists, otherwise the result with which it ended.
+    bool watches;      ///< The gateway permits only watching and stopping.
+    bool newer;        ///< The gateway's protocol is above IWC_PROTOCOL.
     int error_number;  ///< errno of the last iwc_connect.
     const sigset_t *let_in;
-    sigset_t mask;    ///< What let_in points to.
-    int64_t number;   ///< Of this connection, by the gateway.
-    int64_t requests; ///< Sent so far. Ids are even where a call waits for the reply, odd where iwc_next brings it.
-    int64_t awaited;  ///< The id that a call waits for; 0: none.
-    size_t answer;    ///< The length of the answer to it in `line`; 0: not there yet.
+    sigset_t mask;    ///< The mask to which let_in points.
+    int64_t number;   ///< Number that the gateway assigned to this connection.
+    int64_t requests; ///< Requests sent. Ids are even if a call waits for the reply, odd if iwc_next returns it.
+    int64_t awaited;  ///< The id for which a call waits; 0: none.
+    size_t answer;    ///< Length of the reply to `awaited` in `line`; 0: it has not come yet.
     int64_t driven[IWC_DRIVES_MAX]; ///< Ids of drive commands without reply; 0: free.
-    uint64_t skipped;               ///< Events left out since the last message that was taken.
+    uint64_t skipped;               ///< Events dropped since the last message that the caller read.
     size_t begin;
     size_t whole;
     size_t end;
     char path[sizeof(((struct sockaddr_un *)NULL)->sun_path)];
     char error[64];
     char reason[1024];
-    char line[IWC_LINE_MAX + 1U]; ///< The message handed out last, terminated.
+    char line[IWC_LINE_MAX + 1U]; ///< The last message that the caller received, terminated.
     char in[IWC_IN_SIZE];
 };
 
-/// CLOCK_MONOTONIC, microseconds.
+/// Returns CLOCK_MONOTONIC in microseconds.
 int64_t iwc_now_us(void);
 
-/// When a wait of `timeout_ms` from now is over; INT64_MAX: never.
+/// Returns the end of a wait of `timeout_ms` from now; INT64_MAX: never.
 int64_t iwc_deadline_us(int timeout_ms);
 
-/// The first half of `iwc_connect`: connects, and awaits no greeting.
+/// Connects, without waiting for the greeting: the first half of `iwc_connect`.
 iwc_result_t iwc_dial(iwc_t *self, const char *path, int64_t deadline_us);
 
-/// Reads once. IWC_OK: something came; IWC_TIMEOUT: nothing is there; else the connection is over.
+/// Reads once from the socket. Returns IWC_OK if bytes came, IWC_TIMEOUT if there are none; otherwise the connection
+/// has ended.
 iwc_result_t iwc_fill(iwc_t *self);
 
-/// Waits for `events` on the connection; with 0 on nothing but the time. IWC_OK, IWC_TIMEOUT, IWC_INTERRUPTED.
+/// Waits for `events` on the connection; 0: only for the time. Returns IWC_OK, IWC_TIMEOUT or IWC_INTERRUPTED.
 iwc_result_t iwc_await(const iwc_t *self, short events, int64_t deadline_us);
 
-/// Sends a line whole or not at all; half a line ends the connection.
+/// Sends a whole line or nothing; if only part of a line could be sent, ends the connection.
 iwc_result_t iwc_put(iwc_t *self, const char *line, size_t length, int64_t deadline_us);
 
-/// Ends the connection with that result. What came before stays.
+/// Ends the connection with that result. Received messages stay.
 void iwc_end(iwc_t *self, iwc_result_t result);
 
+/// Stores name and message of a refusal for `iwc_error` and `iwc_reason`.
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
 
-/// Sends a request that stops through a connection of its own, by one socket of the gateway or the other: client_stop.c.
+/// Sends a stop request through a connection of its own, to one of the gateway's two sockets: client_stop.c.
 iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);
 
-// ---- the lines in the buffer: client_queue.c -----------------------------------------------------------------------------
+// ---- the lines in the buffer: client_queue.c
+// -----------------------------------------------------------------------------
 
-/// Looks at what came since the last time. False: a line is no message, or too long; the good ones before it are kept.
+/// Examines the lines that have come since the last call. Returns false if a line is not a message or too long; the
+/// valid lines before it stay.
 bool iwc_queue_admit(iwc_t *self);
 
-/// Hands out the oldest message, in `self->line`. False: there is none.
+/// Moves the oldest message to `self->line`. Returns false if there is none.
 bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message);
 
-/// Leaves out, counted, every event of which a newer one is there, and then the oldest messages until half of the buffer is free.
+/// Drops and counts every event that a newer one supersedes, and then the oldest messages until half of the buffer is
+/// free.
 void iwc_queue_thin(iwc_t *self);
 
-/// Makes room to read into: a line at least.
+/// Frees space in the buffer for at least one line.
 void iwc_queue_make_room(iwc_t *self);
 
 #endif

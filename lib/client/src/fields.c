@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a message says.
+// Reads the fields of messages.
 #include "connection.h"
 
 #include <string.h>
@@ -30,7 +30,7 @@ iwc_value_t iwc_truth(const iwc_message_t *message, const char *path) {
     return truth_of(field(message, path));
 }
 
-/// Bytes of the character, or of the escape, that begins with `byte`.
+/// Returns the length in bytes of the character or escape at `at`.
 static size_t unit_length(const char *at) {
     const unsigned char byte = (unsigned char)at[0];
     if (byte == '\\') {
@@ -51,7 +51,7 @@ bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t 
     }
     for (size_t at = 1; at + 1U < value.length;) {
         const size_t length = unit_length(value.at + at);
-        // Only these three lose their backslash; the rest may stand for what moves a terminal.
+        // Only these three lose their backslash; other escapes may stand for control characters.
         const size_t escape = (value.at[at] == '\\' && strchr("\"\\/", value.at[at + 1U]) != NULL) ? 1 : 0;
         if (used + length - escape >= size) {
             break;
@@ -74,7 +74,7 @@ const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out
     return value.at;
 }
 
-/// Reads the fields in the order of the gateway, so that one walk finds all; another order only costs time.
+/// Reads the fields in the order of the gateway, so that one walk finds all. Another order only takes longer.
 static void read_wheel(iwc_span_t span, iwc_wheel_t *out_wheel) {
     iwc_walk_t wheel = {span, NULL};
     memset(out_wheel, 0, sizeof *out_wheel);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which gateway is meant when none is named, and by which of its sockets it is reached.
+// Finds the gateway if the caller names none, and the socket through which this user may reach it.
 #include "iwheel_client/client.h"
 
 #include <dirent.h>
@@ -22,7 +22,7 @@ static bool is_socket(const char *path) {
            stat(path, &status) == 0 && S_ISSOCK(status.st_mode);
 }
 
-/// What is found in a directory.
+/// Sockets found in a directory.
 typedef struct {
     char *out;
     size_t size;
@@ -41,7 +41,8 @@ static bool may_use(const char *path) {
     return faccessat(AT_FDCWD, path, W_OK, AT_EACCESS) == 0;
 }
 
-/// Of a gateway's two sockets the one to drive by, unless only the other is there or may be used.
+/// Adds the drive socket of a gateway, or its watch socket if the drive socket does not exist or this user may not use
+/// it.
 static void note_gateway(found_t *self, const char *directory, const char *name) {
     char drive[PATH_MAX];
     char watch[PATH_MAX];
@@ -59,7 +60,7 @@ static void note_gateway(found_t *self, const char *directory, const char *name)
     }
 }
 
-/// The gateways that have a socket in `directory`, or, with `alone`, one in its folder for watching only.
+/// Finds the gateways with a socket in `directory`; with `alone` those with only a watch socket.
 static int find_gateways(found_t *self, const char *directory, bool alone) {
     char path[PATH_MAX];
     (void)snprintf(path, sizeof path, "%s%s", directory, alone ? "/" IWC_WATCH_DIRECTORY : "");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a message is judged and walked by is the reader of the protocol's own library; here are lengths and paths.
+// Adds lengths and paths to the JSON reader of the protocol library, which checks the messages.
 #include "json.h"
 
 #include "iwheel_northbound/json_in.h"
@@ -9,7 +9,7 @@
 static const iwc_span_t NOTHING = {NULL, 0};
 
 bool iwc_json_is_object(const char *text, size_t length, bool trusted) {
-    char reason[1]; // Nobody asks for it.
+    char reason[1]; // The reason is not used.
     iwn_text_t fault = iwn_text_begin(reason, sizeof reason);
     iwn_work_t work;
     iwn_json_t root;

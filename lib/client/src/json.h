@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// JSON where it lies: is it an object, and where in it is a field? No copy, no heap. `iwheel_northbound/json_in.h` says what is refused.
+/// Checks a JSON object and finds its fields in place. No copy, no heap. `iwheel_northbound/json_in.h` defines which
+/// JSON it refuses.
 #ifndef IWC_JSON_H
 #define IWC_JSON_H
 
@@ -8,29 +9,31 @@
 #include <stdint.h>
 
 typedef struct {
-    const char *at; ///< NULL: nothing.
+    const char *at; ///< NULL: not found.
     size_t length;
 } iwc_span_t;
 
-/// True if the text is one object and nothing else but blanks. Names are not compared in a trusted text.
+/// Returns true if the text is one object and otherwise only blanks. In a trusted text it does not search for equal
+/// names.
 bool iwc_json_is_object(const char *text, size_t length, bool trusted);
 
-/// The value at a path of keys, "left.speed_mm_s", in an object for which `iwc_json_is_object` holds; keys are compared as written.
+/// Returns the value at a path of keys, "left.speed_mm_s". `iwc_json_is_object` must be true for the object. Compares
+/// keys byte by byte.
 iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
 
-/// An object whose fields are read in their order.
+/// An object whose fields a caller reads in their order.
 typedef struct {
     iwc_span_t object;
-    const char *rest; ///< Place behind the last value; NULL before the first.
+    const char *rest; ///< Position behind the last value; NULL before the first.
 } iwc_walk_t;
 
-/// Returns the value of a key as `iwc_json_find` does, but searches behind the last value first.
+/// Returns the value of a key like `iwc_json_find`, but searches behind the last value first.
 iwc_span_t iwc_json_walk(iwc_walk_t *self, const char *key, size_t length);
 
-/// True if the value is exactly that text, as written between its quotes.
+/// Returns true if the value is this string, byte by byte between its quotes.
 bool iwc_json_is_text(iwc_span_t value, const char *text);
 
-/// True with the number in `*out_number` if the value is a whole one of 64 bits.
+/// Returns true and writes `*out_number` if the value is an integer of 64 bits.
 bool iwc_json_integer(iwc_span_t value, int64_t *out_number);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Recordings, in pieces that are checked.
+// Reads recordings in pieces, and checks their checksums.
 #include "connection.h"
 
 #include "iwheel_northbound/line.h"
@@ -8,17 +8,17 @@
 #include <stdio.h>
 #include <string.h>
 
-/// Of a name: the gateway takes no longer one.
+/// Length of the longest name that the gateway accepts.
 #define NAME_MAX_BYTES 63U
 
-/// 0..63; 64: no digit of base64.
+/// Returns the value of a base64 digit, 0..63; 64: not a digit.
 static uint32_t digit(char c) {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     const char *at = (c != '\0') ? strchr(digits, c) : NULL;
     return (at != NULL) ? (uint32_t)(at - digits) : 64U;
 }
 
-/// Base64 between quotes, as JSON has it. False if it is none, or more than IWC_PIECE_MAX bytes.
+/// Decodes a JSON string of base64. Returns false if it is not base64, or more than IWC_PIECE_MAX bytes.
 static bool decode(iwc_span_t text, uint8_t *out, size_t *out_length) {
     size_t used = 0;
     if (text.at == NULL || text.length < 2U || text.at[0] != '"' || (text.length - 2U) % 4U != 0U ||
@@ -48,7 +48,7 @@ static bool decode(iwc_span_t text, uint8_t *out, size_t *out_length) {
     return true;
 }
 
-/// What a name may consist of, so that it stands in a request as it is; the gateway judges the rest.
+/// Returns true if the name consists of characters that need no escape in a request. The gateway checks the rest.
 static bool is_name(const char *name) {
     static const char all[] = "abcdefghijklmnopqrstuvwxyz0123456789_-.";
     const size_t length = strlen(name);
@@ -67,7 +67,7 @@ bool iwc_piece_take(const iwc_message_t *reply, void *out, iwc_piece_t *piece) {
         crc.value != iwn_line_crc(0, out, piece->length)) {
         return false;
     }
-    const bool goes_on = piece->length > 0U || piece->next == piece->size; // Else it would be asked for without end.
+    const bool goes_on = piece->length > 0U || piece->next == piece->size; // Otherwise the caller would never finish.
     piece->next += (int64_t)piece->length;
     piece->crc32 = iwn_line_crc(piece->crc32, out, piece->length);
     return goes_on && piece->next <= piece->size && (!whole.known || whole.value == piece->crc32);
@@ -83,7 +83,7 @@ iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *
                    piece->next);
     const iwc_result_t result = iwc_ask(self, request, timeout_ms, &reply);
     if (result == IWC_OK && !iwc_piece_take(&reply, out, piece)) {
-        iwc_close(self); // Nothing that comes after it can be trusted either.
+        iwc_close(self); // Nothing that comes after it is reliable.
         return IWC_GARBLED;
     }
     return result;

@@ -6,12 +6,12 @@
     with Gateway().arm("example") as wheels:
         wheels.drive_for(2.0, 200, 200)          # mm/s, left and right
 
-However that block is left, the wheels are stopped: at its end, by an exception, by Ctrl-C. If the program hangs, is killed or
-loses its connection, the gateway stops them a lease (200 ms) after the last command. Nothing in this package repeats a command
-behind the program's back: no thread, no task, no timer.
+The wheels stop however the block ends: at its end, by an exception, by Ctrl-C. If the program hangs, is killed or loses its
+connection, the gateway stops them one lease (200 ms) after the last command. This package has no thread, no task and no timer
+that could repeat a command.
 
-`AsyncGateway` is the same for asyncio. Speeds are mm/s, currents mA, integers as on the bus (numpy's too, and 200.0, but not 200.5).
-None means unknown, never 0.
+`AsyncGateway` is the client for asyncio. Speeds are in mm/s, currents in mA, both integers as on the bus (numpy integers and 200.0
+are accepted, 200.5 is not). None means unknown, never 0.
 """
 
 from ._aio import AsyncArmed, AsyncGateway

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The client for asyncio. Contract: as `Gateway` and `Armed`, with `await` before every request.
+"""The client for asyncio. It has the contract of `Gateway` and `Armed`, with `await` before every request.
 
-No task runs behind the program's back, and nothing repeats a command: when the program's own task hangs, the lease ends.
+This package starts no task and repeats no command: if the program's own task hangs, the lease ends.
 """
 
 from __future__ import annotations
@@ -54,20 +54,20 @@ CONNECT_AGAIN_S = 0.005
 
 
 class _Stream(asyncio.Protocol):
-    """One connection: what comes is sorted into replies and events by the event loop; no task of ours runs.
+    """One connection. The event loop sorts messages into replies and events; this package starts no task.
 
-    Every wait of this package is a plain `await` on a future, with a timer that ends it. `asyncio.wait_for` of Python 3.10 and 3.11
-    loses a cancellation that meets a finished reply, and the cancelled task drives on.
+    Every wait is a plain `await` on a future, with a timer that ends it. `asyncio.wait_for` of Python 3.10 and 3.11 loses a cancellation
+    that comes together with the reply, and the cancelled task would drive on.
     """
 
     def __init__(self, path: str, sock: socket.socket) -> None:
         self.path = path
         self.hello: asyncio.Future[Message] = asyncio.get_running_loop().create_future()
-        """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
+        """The gateway's greeting. Its `client` is the number of this connection, as in `lease.holder` of the status."""
         self.hello.add_done_callback(_retrieved)
         self.arms = 0
         self.told = False
-        """That it ended, to whoever reads the events."""
+        """The reader of events has received the end of the connection."""
         self.came = asyncio.Event()
         self.events: deque[Event] = deque()
         self.error: GatewayUnavailable | None = None
@@ -81,12 +81,12 @@ class _Stream(asyncio.Protocol):
 
     @classmethod
     async def connect(cls, path: str, timeout: float) -> _Stream:
-        """Nothing is asked before it is known who answers."""
+        """Connects and waits for the greeting. No request is sent before it."""
         until = time.monotonic() + timeout
         stream = cls(path, await _connected_socket(path, until))
         try:
             await stream._loop.create_unix_connection(lambda: stream, sock=stream._socket)
-            error = NoAnswer(f"{path}: the gateway did not say hello within {timeout:g} s")
+            error = NoAnswer(f"{path}: the gateway sent no greeting within {timeout:g} s")
             timer = stream._loop.call_later(max(0.0, until - time.monotonic()), _end_wait, stream.hello, error)
             try:
                 await stream.hello
@@ -104,7 +104,7 @@ class _Stream(asyncio.Protocol):
         return self.error is None
 
     def close(self, reason: str = "the connection is closed") -> None:
-        """Ends the connection, and with it the lease, if it was ours. Works from any thread, with any state of the loop."""
+        """Closes the connection, which ends its lease. It works from any thread, in every state of the loop."""
         error = GatewayUnavailable(f"{self.path}: {reason}")
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
@@ -113,15 +113,15 @@ class _Stream(asyncio.Protocol):
             self._socket.close()
         elif _running_loop() is self._loop or not self._loop.is_running():
             self._fail(error)
-        # Else the loop runs in another thread, and reads there that the connection has ended.
+        # Otherwise the loop runs in another thread, and reads the end of the connection there.
 
     def leave(self) -> None:
-        """In a forked child: lets go of what belongs to the parent, without ending it."""
+        """Closes the socket in a forked child, without ending the parent's connection."""
         self.error = GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
         self._socket.close()
 
     def post(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> asyncio.Future[Message]:
-        """Hands the request over at once; its reply comes with the future. NoAnswer, with the connection closed, if it does not come in time."""
+        """Sends the request immediately. The future returns the reply; if none comes in time, closes the connection and raises NoAnswer."""
         if not self.open or self._transport is None:
             raise self.error or GatewayUnavailable(f"{self.path}: the connection is closed")
         if _running_loop() is not self._loop:
@@ -144,7 +144,7 @@ class _Stream(asyncio.Protocol):
         return await self.post(cmd, fields, timeout)
 
     async def something(self, seconds: float | None) -> None:
-        """Until an event came, or the connection ended, or that time is over."""
+        """Waits until an event comes, the connection ends, or the time is over."""
         self.came.clear()
         timer = None if seconds is None else self._loop.call_later(max(0.0, seconds), self.came.set)
         try:
@@ -166,7 +166,7 @@ class _Stream(asyncio.Protocol):
         kept, left_out = newest(self.events)
         self.events, self._lost = deque(kept), self._lost + left_out
 
-    # What the event loop calls
+    # Functions that the event loop calls
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
@@ -225,7 +225,7 @@ class _Stream(asyncio.Protocol):
 
 
 async def _connected_socket(path: str, until: float) -> socket.socket:
-    """A connect to a local socket does not wait, unless too many others wait already."""
+    """Connects. A connect to a local socket does not wait, unless the queue of connections is full."""
     sock = socket.socket(socket.AF_UNIX)
     try:
         sock.setblocking(False)
@@ -251,7 +251,7 @@ def _end_wait(future: asyncio.Future[Message], error: GatewayUnavailable) -> Non
 
 
 def _retrieved(future: asyncio.Future[Message]) -> None:
-    """An error that no task waits for any more, because it was cancelled, is no news."""
+    """Marks the error of a future as read: no task waits for it any more, because it was cancelled."""
     if not future.cancelled():
         future.exception()
 
@@ -264,7 +264,7 @@ def _running_loop() -> asyncio.AbstractEventLoop | None:
 
 
 class AsyncGateway:
-    """As `Gateway`. Any number of tasks of one event loop may use it; each watcher of events should have its own."""
+    """Like `Gateway`. All tasks of one event loop may share it; each reader of events should have its own."""
 
     def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
         self._path = socket
@@ -284,13 +284,13 @@ class AsyncGateway:
         self.close()
 
     def close(self) -> None:
-        """Ends the connection, and with it the lease, if it was ours. The next request makes a new one."""
+        """Closes the connection, which ends its lease. The next request connects again."""
         stream, self._stream = self._stream, None
         if stream is not None:
             stream.close()
 
     def __del__(self) -> None:
-        """The event loop would keep the connection of a gateway that the program has dropped."""
+        """Closes the connection of an object that the program has dropped; the event loop would hold it open."""
         if getattr(self, "_stream", None) is not None:
             self.close()
 
@@ -319,7 +319,7 @@ class AsyncGateway:
         return cast(Watched, without_envelope(granted))
 
     async def events(self, timeout: float | None = None, *, latest: bool = False) -> AsyncIterator[Event]:
-        """As `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
+        """Like `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
         while True:
             event = await self._next_event(timeout, latest)
             if event is None:
@@ -346,15 +346,15 @@ class AsyncGateway:
         return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found, how=how)))
 
     async def config(self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None) -> Configured:
-        """As `Gateway.config`."""
+        """Like `Gateway.config`."""
         wanted = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Configured, without_envelope(await self._ask("config", key=key, value=wanted, commit=commit)))
 
     def arm(self, name: str | None = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
-        """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`. `wait` as in `Gateway.arm`."""
+        """Like `Gateway.arm`. Use `async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`."""
         return _Arming(self, name, takeover, wait)
 
-    # The inside ------------------------------------------------------------------------------------------------------
+    # Private ---------------------------------------------------------------------------------------------------------
 
     async def _connected(self, deadline: float | None, any_api: bool = False) -> _Stream:
         async with self._connecting:
@@ -398,7 +398,7 @@ class AsyncGateway:
         return result_of(cmd, await (await self._connected(deadline, cmd in ALWAYS)).ask(cmd, fields, self._timeout))
 
     async def _stop(self, cmd: str, **fields: Any) -> Message:
-        """By the connection that is there, else by one of its own: no place is needed for it, and no greeting awaited."""
+        """Sends a stop through the open connection, or a separate one, which needs no place at the gateway and does not wait for the greeting."""
         if self._stream is not None and self._stream.open:
             try:
                 return result_of(cmd, await self._stream.ask(cmd, fields, self._timeout))
@@ -410,7 +410,7 @@ class AsyncGateway:
         except GatewayUnavailable:
             if self._wait <= 0:
                 raise
-        return await self._ask(cmd, **fields)  # It may come yet.
+        return await self._ask(cmd, **fields)  # The gateway may still start.
 
     async def _arm(self, name: str | None, takeover: bool, wait: float) -> AsyncArmed:
         until = time.monotonic() + wait
@@ -422,8 +422,8 @@ class AsyncGateway:
             except Refused as refusal:
                 if refusal.error not in PASSING or not time.monotonic() < until:
                     raise
-            except BaseException:  # Cancelled, dropped, no usable reply: only the end of the connection surely ends a lease that began.
-                stream.close("arming did not come to its end")
+            except BaseException:  # Cancelled, dropped, no usable reply: only closing the connection surely ends a lease that began.
+                stream.close("arming was interrupted")
                 raise
             await asyncio.sleep(ARM_AGAIN_S)
 
@@ -465,7 +465,7 @@ class AsyncGateway:
 
 
 class _Arming:
-    """What `AsyncGateway.arm` returns: to be awaited, or entered with `async with`."""
+    """Result of `AsyncGateway.arm`, for `await` or `async with`."""
 
     def __init__(self, gateway: AsyncGateway, name: str | None, takeover: bool, wait: float) -> None:
         self._gateway, self._name, self._takeover, self._wait = gateway, name, takeover, wait
@@ -489,7 +489,7 @@ class _Arming:
 
 
 class AsyncArmed:
-    """As `Armed`. A cancelled task stops the wheels too."""
+    """Like `Armed`. A cancelled task also stops the wheels."""
 
     def __init__(self, gateway: AsyncGateway, stream: _Stream, terms: Terms) -> None:
         self.terms = terms
@@ -518,7 +518,7 @@ class AsyncArmed:
         on_status: OnStatus | None = None,
         rate_hz: float | None = None,
     ) -> Applied:
-        """As `Armed.drive_for`; `on_status` is an ordinary function here too."""
+        """Like `Armed.drive_for`; `on_status` is an ordinary function, not a coroutine."""
         end = time.monotonic() + seconds_of(seconds)
         period = period_of(self.terms, rate_hz)
         due = time.monotonic()
@@ -535,7 +535,7 @@ class AsyncArmed:
     async def stop(self, wait: float = REST_S) -> bool:
         self._end("it was stopped")
         if self._stream.open:
-            await self._stream.ask("stop", {}, self._gateway._timeout)  # Its first step hands the line over.
+            await self._stream.ask("stop", {}, self._gateway._timeout)  # Its first step sends the line.
         else:
             await self._gateway.stop()
         return await self._gateway._wait_for_rest(wait)
@@ -544,7 +544,7 @@ class AsyncArmed:
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if kind is GeneratorExit:  # Its task was dropped: no wait is possible any more.
+        if kind is GeneratorExit:  # The program has dropped the task: no wait is possible any more.
             self._end("its block was dropped")
             self._stream.close()
             return
@@ -561,7 +561,7 @@ class AsyncArmed:
             if not self._gateway._kept:
                 self._gateway.close()
         if not at_rest:
-            warnings.warn(f"the wheels were told to stop but are not known to stand: {trouble}", RuntimeWarning, stacklevel=2)
+            warnings.warn(f"the wheels were commanded to stop, but may still turn: {trouble}", RuntimeWarning, stacklevel=2)
 
     def _end(self, reason: str) -> None:
         self._ended = self._ended or reason

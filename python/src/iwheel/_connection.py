@@ -20,7 +20,7 @@ from ._wire import Message, Wire, cannot_connect, lost_event, newest
 
 EVENTS_KEPT = 1000
 SLICE_S = 0.05
-"""A signal handler may have taken what is waited for: look again this often."""
+"""Longest single wait: a signal handler may have read the awaited message, so the wait checks again after this time."""
 
 
 class _Left(Protocol):
@@ -28,25 +28,25 @@ class _Left(Protocol):
 
 
 class Connection:
-    """Replies are matched by number; events are kept until they are taken, the oldest are lost first and counted."""
+    """Matches replies by number. Stores events until the program reads them; if there are too many, drops and counts the oldest."""
 
     def __init__(self, path: str, timeout: float) -> None:
         self.path = path
         self.hello: Message | None = None
-        """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
+        """The gateway's greeting. Its `client` is the number of this connection, as in `lease.holder` of the status."""
         self.arms = 0
-        """How often this connection was armed: only the last one counts."""
+        """Number of arms on this connection: only the last permission is valid."""
         self.events: deque[Event] = deque()
         self._latest = False
         self.untold: str | None = None
-        """What ended the connection, if whoever reads the events has not been told."""
+        """Why the connection ended, if the reader of events has not received it yet."""
         self._lost = 0
         self._wire = Wire()
         self._replies: dict[int, Message] = {}
         self._wanted: set[int] = set()
         self._sending = False
         self._error: GatewayUnavailable | None = None
-        """What ended it, if it was not us."""
+        """Why the connection ended, unless this side closed it."""
         self._socket: socket.socket | None = socket.socket(socket.AF_UNIX)
         self._socket.settimeout(timeout)
         try:
@@ -59,15 +59,15 @@ class Connection:
         self._greet(timeout)
 
     def _greet(self, timeout: float) -> None:
-        """Nothing is asked before it is known who answers."""
+        """Waits for the greeting. No request is sent before it."""
         deadline = time.monotonic() + timeout
         while self.hello is None:
             self.wait(deadline)
             if self.hello is None and time.monotonic() > deadline:
-                raise self._fail(NoAnswer(f"{self.path}: the gateway did not say hello within {timeout:g} s"))
+                raise self._fail(NoAnswer(f"{self.path}: the gateway sent no greeting within {timeout:g} s"))
 
     def close(self) -> None:
-        """The end of the connection ends the lease, if it was ours. Works at any time."""
+        """Closes the connection, which ends its lease. It works in every state."""
         gone, self._socket = self._socket, None
         if gone is not None:
             with contextlib.suppress(OSError):
@@ -75,7 +75,7 @@ class Connection:
             gone.close()
 
     def leave(self) -> None:
-        """In a forked child: lets go of what belongs to the parent, without ending it."""
+        """Closes the socket in a forked child, without ending the parent's connection."""
         gone, self._socket = self._socket, None
         if gone is not None:
             gone.close()
@@ -85,7 +85,7 @@ class Connection:
         return self._socket is not None
 
     def alive(self) -> bool:
-        """Takes what has come; False if the gateway has closed the connection."""
+        """Reads all that has come. Returns False if the gateway has closed the connection."""
         try:
             while self._readable(0.0):
                 self._read()
@@ -94,7 +94,7 @@ class Connection:
         return self.open
 
     def ask(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
-        """The reply. GatewayUnavailable, with the connection closed, if there is none within that time."""
+        """Sends a request and returns the reply. If none comes within `timeout`, closes the connection and raises GatewayUnavailable."""
         number, line = self._wire.request(cmd, fields)
         deadline = time.monotonic() + timeout
         self._wanted.add(number)
@@ -111,19 +111,19 @@ class Connection:
             self._replies.pop(number, None)
 
     def wait(self, deadline: float) -> None:
-        """Until something came, or the deadline, or a short while."""
+        """Waits for data, at most until the deadline or for SLICE_S, and reads it."""
         if self._readable(min(SLICE_S, max(0.0, deadline - time.monotonic()))):
             self._read()
 
     def take_event(self) -> Event | None:
-        """The oldest event that came; None: none is there."""
+        """Returns the oldest event; None if there is none."""
         if self._lost > 0:
             count, self._lost = self._lost, 0
             return lost_event(count)
         return self.events.popleft() if self.events else None
 
     def thin(self) -> None:
-        """Takes what has come and leaves out every event of which a newer one is there; from now on also when too many are kept."""
+        """Reads all that has come and drops every event that a newer one supersedes; from now on also when too many are stored."""
         self._latest = True
         try:
             while self.open and self._readable(0.0):
@@ -151,23 +151,23 @@ class Connection:
         return self._ready(select.POLLIN, seconds)
 
     def _ready(self, what: int, seconds: float) -> bool:
-        """By poll: select refuses a descriptor above 1023, and a program with as many open files could not stop."""
+        """Waits with poll, because select refuses a descriptor above 1023, and a program with as many open files could not stop."""
         poller = select.poll()
         try:
             poller.register(self._require(), what)
-        except ValueError:  # A signal handler has closed it since.
+        except ValueError:  # A signal handler has closed the socket in the meantime.
             raise GatewayUnavailable(f"{self.path}: the connection is closed") from None
         return bool(poller.poll(math.ceil(seconds * 1000)))
 
     def _send(self, line: bytes, deadline: float, cmd: str) -> None:
         sock = self._require()
-        if self._sending:  # An interrupted request of ours is half sent; only the end of the connection undoes it.
+        if self._sending:  # A request was interrupted after half of it was sent; only closing the connection ends it.
             raise self._fail(GatewayUnavailable(f"{self.path}: a request was interrupted; the connection was closed"))
         self._sending = True
         while line:
             left = deadline - time.monotonic()
             if left <= 0 or not self._ready(select.POLLOUT, left):
-                raise self._fail(NoAnswer(f"{self.path}: the gateway does not take {cmd}; the connection was closed"))
+                raise self._fail(NoAnswer(f"{self.path}: the gateway does not accept {cmd}; the connection was closed"))
             try:
                 line = line[sock.send(line) :]
             except BlockingIOError:
@@ -195,7 +195,7 @@ class Connection:
         if "ok" in message:
             if message.get("id") in self._wanted:
                 self._replies[message["id"]] = message
-            elif message.get("id") is None:  # too_many_clients, line_too_long: the gateway closes after it.
+            elif message.get("id") is None:  # too_many_clients, line_too_long: the gateway closes the connection next.
                 raise self._fail(GatewayUnavailable(f"{self.path}: {message.get('error')}: {message.get('message')}"))
             return
         if message["event"] == "hello":
@@ -213,7 +213,7 @@ _alive: weakref.WeakSet[_Left] = weakref.WeakSet()
 
 
 def ends_in_children(connection: _Left) -> None:
-    """A forked child would keep the parent's connection, and with it the lease, after the parent's death."""
+    """Registers a connection that a forked child must close. Otherwise the child would hold the parent's lease after the parent's death."""
     _alive.add(connection)
 
 

@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""What can go wrong. All of it is an IWheelError; none of it leaves a wheel turning."""
+"""The errors of this package. All are an IWheelError, and after none of them a wheel keeps turning."""
 
 from __future__ import annotations
 
 
 class IWheelError(Exception):
-    """The base of everything this package raises, beside programming errors."""
+    """Base class of all errors of this package, except programming errors."""
 
 
 class GatewayUnavailable(IWheelError):
-    """There is no connection: nobody listens, no rights, or the gateway has closed it."""
+    """There is no connection: no program listens, this user has no rights, or the gateway has closed it."""
 
 
 class NoAnswer(GatewayUnavailable):
-    """The gateway did not answer in time. The connection was closed, so the lease has ended."""
+    """The gateway did not reply in time. This package has closed the connection, so the lease has ended."""
 
 
 class ProtocolError(GatewayUnavailable):
-    """What came is not the northbound protocol, or a newer one than this package speaks. The connection was closed."""
+    """The peer does not use the northbound protocol, or a newer version than this package supports. This package has closed the connection."""
 
 
 class LeaseEnded(IWheelError):
-    """This permission to drive is over. Look why (`Gateway.why()`), then `arm()` again if that is what is wanted.
+    """This permission to drive is over. Read the reason (`Gateway.why()`), then call `arm()` again to drive on.
 
-    `error`: the name of the refusal by which the gateway told it (`not_armed`, `latched` ...); None if it was known without asking.
+    `error`: the name of the gateway's refusal (`not_armed`, `latched` ...); None if the end was known without a request.
     """
 
     def __init__(self, message: str, error: str | None = None) -> None:
@@ -32,13 +32,13 @@ class LeaseEnded(IWheelError):
 
 
 class ConnectionLost(LeaseEnded, GatewayUnavailable):
-    """The gateway has closed the connection, and with it the permission to drive ended."""
+    """The gateway has closed the connection, which ended the permission to drive."""
 
 
 class Refused(IWheelError):
-    """The gateway said no; nothing was applied.
+    """The gateway refused a request and applied nothing.
 
-    `error` is a name of the closed list in docs/user/northbound.md, `message` tells cause and cure, `cmd` what was asked.
+    `error` is a name of the closed list in docs/user/northbound.md, `message` states cause and fix, `cmd` is the request.
     """
 
     def __init__(self, cmd: str, error: str, message: str) -> None:

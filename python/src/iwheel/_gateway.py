@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The client for ordinary programs. Contract: see `Gateway` and `Armed`."""
+"""The client for programs without asyncio. Contract: see `Gateway` and `Armed`."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from ._wire import (
 
 
 class Gateway:
-    """A connection to the gateway, made when it is first needed and again when it broke. Driving is never resumed.
+    """A connection to the gateway. It connects with the first request, and again after the connection broke. It never resumes driving.
 
-    `socket`: else $IWHEEL_SOCKET, else the only gateway's in /run/iwheel that may be used. `timeout`: for each answer, in seconds. `wait`: how long to
-    wait for a gateway that is not there (yet).
+    `socket`: path of the socket; by default $IWHEEL_SOCKET, or the only gateway in /run/iwheel. `timeout`: longest wait for each reply, in seconds.
+    `wait`: longest wait for a gateway that is not running (yet), in seconds.
 
-    One thread at a time: give each thread its own Gateway. `with` closes the connection at its end.
+    One thread at a time: create a Gateway for each thread. `with` closes the connection at its end.
     """
 
     def __init__(self, socket: str | None = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
@@ -69,7 +69,7 @@ class Gateway:
         self.close()
 
     def close(self) -> None:
-        """Ends the connection, and with it the lease, if it was ours. The next request makes a new one."""
+        """Closes the connection, which ends its lease. The next request connects again."""
         connection, self._connection = self._connection, None
         if connection is not None:
             connection.close()
@@ -77,32 +77,32 @@ class Gateway:
     # Reading: moves nothing ------------------------------------------------------------------------------------------
 
     def hello(self) -> Hello:
-        """Who answers: `name version api bus state client rights`; `rights` is `drive` or `watch`, by the socket."""
+        """Data of the gateway and the connection: `name version api bus state client rights`; `rights` is `drive` or `watch`."""
         return cast(Hello, without_envelope(self._ask("hello")))
 
     def status(self) -> Status:
-        """One complete snapshot."""
+        """Returns a complete snapshot."""
         return cast(Status, without_envelope(self._ask("status")))
 
     def why(self) -> Stop:
-        """The last stop; `sentence` tells it in plain English."""
+        """Returns the last stop; `sentence` describes it in plain English."""
         return cast(Stop, without_envelope(self._ask("why")))
 
     def recordings(self) -> list[RecordingEntry]:
-        """The recordings of stops on the gateway's disk, the oldest first: `name cause wall_us log_bytes jsonl_bytes conf_bytes`."""
+        """Lists the recordings of stops on the gateway's disk, oldest first: `name cause wall_us log_bytes jsonl_bytes conf_bytes`."""
         return cast(list[RecordingEntry], self._ask("recordings")["recordings"])
 
     def recording(self, name: str) -> bytes:
-        """A file of one of them, whole and checked: `name` as `recordings` tells it, with .log, .jsonl or .conf behind it."""
+        """Returns a whole file of a recording, after checking it. `name`: a name from `recordings`, with .log, .jsonl or .conf added."""
         data = bytearray()
         while not add_piece(data, cast(Piece, self._ask("recording", name=name, offset=len(data)))):
             pass
         return bytes(data)
 
     def watch(self, *topics: str, rate_hz: Whole | None = None) -> Watched:
-        """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`.
+        """Subscribes to topics of `state bus estop lease stop force frame`, instead of those before. Then read `events`.
 
-        Returns what was granted: `topics rate_hz limited`.
+        Returns the accepted subscription: `topics rate_hz limited`.
         """
         fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}
         granted = self._ask("watch", **fields)
@@ -110,13 +110,13 @@ class Gateway:
         return cast(Watched, without_envelope(granted))
 
     def events(self, timeout: float | None = None, *, latest: bool = False) -> Iterator[Event]:
-        """Events as they come; ends when none came for `timeout` seconds (None: never ends).
+        """Yields events as they come. Ends when none came for `timeout` seconds (None: never ends).
 
-        A lost connection is an event too: `disconnected`, then `reconnected` as soon as the gateway is back, with the same
-        subscription. `lost` tells how many events were not read in time.
+        A lost connection is an event too: `disconnected`, then `reconnected` with the same subscription as soon as the gateway is back. `lost`
+        states how many events the program did not read in time.
 
-        `latest`: for who may be slow. Of each thing only the newest event that is there (`fault`, `offset`, `ledger` and `frame` differ by
-        cause, side, item, id), instead of a backlog; before it `lost` tells how many were left out.
+        `latest`: for slow programs. It yields only the newest event of each kind instead of a backlog (`fault`, `offset`, `ledger` and `frame`
+        have a kind for each cause, side, item, id), after a `lost` with the number of dropped events.
         """
         while True:
             event = self._next_event(timeout, latest)
@@ -127,55 +127,54 @@ class Gateway:
     # Stopping: always allowed ----------------------------------------------------------------------------------------
 
     def stop(self) -> State:
-        """Ramp to zero, whoever drives. The state after that."""
+        """Stops the wheels with the ramp, whichever client drives. Returns the state after that."""
         return cast(State, self._stop("stop")["state"])
 
     def estop(self, reason: str | None = None) -> State:
-        """Zero without ramp, latched until `reset`. No substitute for the button that cuts power."""
+        """Stops the wheels without a ramp, latched until `reset`. It does not replace the button that cuts power."""
         return cast(State, self._stop("estop", reason=reason)["state"])
 
-    # What needs a decision -------------------------------------------------------------------------------------------
+    # Requests that need a decision -----------------------------------------------------------------------------------
 
     def reset(self) -> State:
-        """Leaves the latch, if its cause is gone. Moves nothing."""
+        """Ends the latched state, if its cause is gone. Moves nothing."""
         return cast(State, self._ask("reset")["state"])
 
     def release(self) -> State:
-        """Ends a hold (`after_stop = hold`): on a slope the wheels roll then. Set the parking brake first."""
+        """Ends the hold of zeros (`after_stop = hold`). On a slope the wheels then roll: set the parking brake first."""
         return cast(State, self._ask("release")["state"])
 
     def tare(self, side: str | None = None) -> Tared:
-        """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing.
+        """Makes the present force the zero of `left`, `right`, or both wheels. Moves nothing.
 
-        Returns, for each of them, the new zero and how good it is, and the one before.
+        Returns for each wheel the new zero with its quality, and the zero before.
         """
         return cast(Tared, without_envelope(self._ask("tare", side=side)))
 
     def confirm(self, item: str, value: str | Whole | None = None, how: str | None = None) -> Confirmed:
-        """The operator's word on an item of the assumption ledger (docs/developer/ledger.md). Moves nothing.
+        """Stores the operator's decision about an assumption (docs/developer/ledger.md). Moves nothing.
 
-        `value` is what was found at the machine; without it what is configured is confirmed. Returns the item's entry: another value
-        than the configured one contradicts it, and `disabled` tells what that costs. `how` it was found (up to 127 bytes) is kept as its
-        evidence.
+        `value` is the value found at the machine; None confirms the configured value. Returns the entry of the item. A value that differs from
+        the configured one contradicts it, and `disabled` states the consequence. The gateway stores `how` (up to 127 bytes), the method.
         """
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
 
     def config(self, key: str | None = None, value: str | Whole | None = None, *, commit: bool | None = None) -> Configured:
-        """The configuration of a gateway that keeps it itself (a board, docs/user/serial.md); a daemon's is its file, and it raises Refused.
+        """Reads or changes the configuration of a gateway that stores it itself (a board, docs/user/serial.md). A daemon has a file and raises Refused.
 
-        Alone it reads; with `key` (`drive.lease_ms`) and `value` it stages that; with `commit` True it writes what is staged, after
-        which the board starts anew and this connection ends, with False it forgets it.
+        Without arguments it reads. With `key` (`drive.lease_ms`) and `value` it stages a value. `commit` True writes the staged values; then the
+        board restarts and this connection ends. `commit` False discards them.
         """
         wanted = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Configured, without_envelope(self._ask("config", key=key, value=wanted, commit=commit)))
 
     def arm(self, name: str | None = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
-        """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.
+        """Requests the permission to drive; the wheels stay at zero until the first command. An older permission of this Gateway ends.
 
-        `name` is shown to others. `takeover` takes the lease from somebody else, with the wheels at rest. `wait`: seconds in which a
-        stop that is only just over is waited out: wheels that do not count as standing yet (`not_at_rest`), a drive command of
-        half a second ago (`stale_command`). Every other refusal is raised at once.
+        Other clients can read `name`. `takeover` transfers the lease from another client, with the wheels at standstill. `wait`: seconds for which
+        the call repeats the request after a recent stop: while the wheels do not count as at standstill (`not_at_rest`), or a drive command is less
+        than half a second old (`stale_command`). It raises every other refusal immediately.
         """
         deadline = time.monotonic() + wait
         while True:
@@ -195,7 +194,7 @@ class Gateway:
             connection.close()
             raise
 
-    # The inside ------------------------------------------------------------------------------------------------------
+    # Private ---------------------------------------------------------------------------------------------------------
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -207,7 +206,7 @@ class Gateway:
             self._busy.release()
 
     def _connected(self, deadline: float | None, any_api: bool = False) -> Connection:
-        """The connection, made anew if it broke. Tries until the deadline (None: once)."""
+        """Returns the connection, a new one if the last one broke. Tries until the deadline (None: once)."""
         connection = self._connection
         if connection is None or not connection.alive():
             connection = self._connect(deadline)
@@ -249,7 +248,7 @@ class Gateway:
             return result_of(cmd, self._connected(deadline, cmd in ALWAYS).ask(cmd, fields, self._timeout))
 
     def _stop(self, cmd: str, **fields: Any) -> Message:
-        """By the connection that is there, else by one of its own: no place is needed for it, and no greeting awaited."""
+        """Sends a stop through the open connection, or a separate one, which needs no place at the gateway and does not wait for the greeting."""
         with self._alone():
             if self._connection is not None and self._connection.alive():
                 try:
@@ -261,10 +260,10 @@ class Gateway:
             except GatewayUnavailable:
                 if self._wait <= 0:
                     raise
-        return self._ask(cmd, **fields)  # It may come yet.
+        return self._ask(cmd, **fields)  # The gateway may still start.
 
     def _ask_on(self, connection: Connection, cmd: str, fields: Message) -> Message:
-        """On this connection or not at all. What has come is taken first: the connection's end may be among it."""
+        """Sends a request on this connection only. Reads all that has come first, because the connection may have ended."""
         with self._alone():
             connection.alive()
             return result_of(cmd, connection.ask(cmd, fields, self._timeout))
@@ -315,10 +314,10 @@ class Gateway:
 
 
 class Armed:
-    """The permission to drive, from `Gateway.arm`. Use it in a `with`; its end stops the wheels and waits until they stand.
+    """The permission to drive, from `Gateway.arm`. Use it in a `with`; its end stops the wheels and waits for standstill.
 
-    Each command holds `terms.lease_ms`; the next one must come sooner, or the wheels ramp to zero and this permission is over
-    (LeaseEnded). It also is over after a stop, a latch, a lost connection, or another `arm`; it never comes back by itself.
+    Each command is valid for `terms.lease_ms`. If the next one comes later, the wheels ramp to zero and this permission is over (LeaseEnded). It is
+    also over after a stop, a latch, a lost connection, or another `arm`. It never becomes valid again.
     """
 
     def __init__(self, gateway: Gateway, connection: Connection, terms: Terms) -> None:
@@ -331,12 +330,12 @@ class Armed:
         self._number = connection.arms
 
     def drive(self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Whole | None = None, right_mA: Whole | None = None) -> Applied:
-        """Sets both wheels' speed. The currents may be left out, both, unless the configuration says current_role = setpoint."""
+        """Sets the speeds of both wheels. Both currents may be None, unless the configuration has current_role = setpoint."""
         fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
         return self._command("drive", fields)
 
     def twist(self, v_mm_s: Whole, yaw_mrad_s: Whole) -> Applied:
-        """Forward speed and turning rate, positive to the left."""
+        """Sets forward speed and yaw rate, positive to the left."""
         return self._command("twist", integers(v_mm_s=v_mm_s, yaw_mrad_s=yaw_mrad_s))
 
     def drive_for(
@@ -350,10 +349,10 @@ class Armed:
         on_status: OnStatus | None = None,
         rate_hz: float | None = None,
     ) -> Applied:
-        """Repeats the command for that long, three times per lease or at `rate_hz`, and returns while it still holds.
+        """Repeats the command for that time, three times per lease or at `rate_hz`, and returns while the last command is still valid.
 
-        `on_status` is called after each command with a snapshot taken then. If it returns True the drive ends; if it raises, that is
-        raised here. It is part of the loop that keeps the lease: what takes longer than a lease in there ends the permission.
+        It calls `on_status` after each command with a new snapshot. If `on_status` returns True, the drive ends; if it raises, the exception leaves
+        `drive_for`. The loop extends the lease, so an `on_status` that takes longer than a lease ends the permission.
         """
         end = time.monotonic() + seconds_of(seconds)
         period = period_of(self.terms, rate_hz)
@@ -369,7 +368,7 @@ class Armed:
             time.sleep(due - now)
 
     def stop(self, wait: float = REST_S) -> bool:
-        """Ramps to zero and waits that many seconds at most until both wheels stand; True if they do. Ends the permission."""
+        """Ramps to zero and waits at most `wait` seconds for standstill of both wheels. Returns True if they reached it. Ends the permission."""
         self._end("it was stopped")
         self._gateway.stop()
         return self._gateway._wait_for_rest(wait)
@@ -391,16 +390,16 @@ class Armed:
             if not self._gateway._kept:
                 self._gateway.close()
         if not at_rest:
-            warnings.warn(f"the wheels were told to stop but are not known to stand: {trouble}", RuntimeWarning, stacklevel=2)
+            warnings.warn(f"the wheels were commanded to stop, but may still turn: {trouble}", RuntimeWarning, stacklevel=2)
 
-    # The inside ------------------------------------------------------------------------------------------------------
+    # Private ---------------------------------------------------------------------------------------------------------
 
     def _end(self, reason: str) -> None:
         self._ended = self._ended or reason
 
     def _command(self, cmd: str, fields: Message) -> Applied:
         if self._number != self._connection.arms:
-            self._end("the same Gateway was armed anew")
+            self._end("the same Gateway was armed again")
         if self._ended is not None:
             raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
         asked = time.monotonic()
@@ -415,11 +414,11 @@ class Armed:
             self._end(str(trouble))
             self._connection.close()
             raise
-        self._fed = asked  # The lease runs from when the command was sent, at the earliest.
+        self._fed = asked  # The lease begins when the command was sent, at the earliest.
         return applied
 
     def _ask(self, cmd: str, fields: Message) -> Message:
-        """On the connection that was armed; what breaks it ends the permission."""
+        """Sends a request on the armed connection. A broken connection ends the permission."""
         try:
             return self._gateway._ask_on(self._connection, cmd, fields)
         except (NoAnswer, ProtocolError) as trouble:
@@ -433,7 +432,7 @@ class Armed:
         return cast(Status, without_envelope(self._ask("status", {})))
 
     def _leave(self) -> bool:
-        """Stops, unless it is somebody else who drives by now."""
+        """Stops the wheels, unless another client drives now."""
         surely_ours = self._ended is None and time.monotonic() - self._fed < self.terms.lease_ms / 1000
         if not surely_ours and self._somebody_else_drives():
             return True

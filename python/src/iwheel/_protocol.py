@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the gateway answers, as types. Written by scripts/northbound.py from share/northbound.json; None means unknown."""
+"""Types of the gateway's replies and events. Written by scripts/northbound.py from share/northbound.json; None means unknown."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ Rights = Literal["drive", "watch"]
 
 
 class Hello(TypedDict):
-    """Who answers."""
+    """Data of the gateway and this connection."""
 
     name: str
     """iwheel-gateway"""
     version: str
-    """of the gateway"""
+    """version of the gateway"""
     api: int
-    """of this protocol; grows when a client of before would be misled"""
+    """version of this protocol; increases if an older client would misunderstand it"""
     bus: str
-    """the interface"""
+    """name of the interface"""
     state: State
     client: int
-    """of this connection; no other one ever gets it"""
+    """number of this connection; never used again"""
     rights: Rights
-    """of this connection, by its socket"""
+    """rights of this connection, which depend on its socket"""
 
 
 Cause = Literal[
@@ -57,14 +57,14 @@ Cause = Literal[
 
 
 class LeaseStatus(TypedDict):
-    """Who may drive. All None if nobody may, but lease_ms."""
+    """The lease. All fields except lease_ms are None if it is free."""
 
     holder: int | None
-    """of the client"""
+    """number of the client"""
     name: str | None
-    """that it gave itself"""
+    """name from its arm request"""
     pid: int | None
-    """of its process"""
+    """id of its process"""
     remaining_ms: int | None
     lease_ms: int
     """as configured"""
@@ -85,9 +85,9 @@ class BusStatus(TypedDict):
     bitrate: int | None
     sample_point_permille: int | None
     load_permille: int | None
-    """of the last second, without stuff bits"""
+    """load in the last second, without stuff bits"""
     lost_frames: int | None
-    """that came faster than they were read"""
+    """frames that came faster than the gateway could read"""
 
 
 EstopState = Literal["released", "pressed", "unreadable", "disagrees", "none"]
@@ -105,7 +105,7 @@ class EstopStatus(_EstopStatusPartly):
     state: EstopState
     simulated: bool
     tried_wall_us: int | None
-    """when its button was last seen pressed and released on this wiring; None: never"""
+    """last time at which the button was pressed and released on this wiring; None: never"""
 
 
 class WheelValid(TypedDict):
@@ -137,17 +137,17 @@ class WheelStatus(TypedDict):
     """One wheel. Speeds in mm/s are in the machine's sense, rpm and ticks in the wheel's own."""
 
     heard: bool
-    """its speed, within wheel_silent_ms"""
+    """online: a speed frame came within wheel_silent_ms"""
     at_rest: bool | None
-    """for rest_ms; None while not heard"""
+    """at standstill for rest_ms; None while offline"""
     speed_rpm: int | None
     speed_mm_s: int | None
     acceleration_raw: int | None
     commanded_mm_s: int | None
-    """what the client wants; None if nothing is wanted"""
+    """speed that the client commands; None if none does"""
     commanded_mA: int | None
     applied_mm_s: int | None
-    """what the wheel was told last; None in silence"""
+    """speed in the last setpoint; None if the gateway sends none"""
     applied_mA: int | None
     speed_age_ms: int | None
     """None: never"""
@@ -155,11 +155,11 @@ class WheelStatus(TypedDict):
     temperature_degC: int | None
     cpu_percent: int | None
     ticks: int | None
-    """64 bits, unwrapped"""
+    """without the wrap-around of the frame, 64 bits"""
     distance_mm: int | None
     status_age_ms: int | None
     reboots: int
-    """seen since the gateway started"""
+    """reboots since the gateway started"""
     valid: WheelValid
     saturated: WheelSaturated
     force_raw: int | None
@@ -170,31 +170,31 @@ class WheelStatus(TypedDict):
     force_validity: ForceValidity
     force_age_ms: int | None
     offset_provenance: Provenance
-    """where the zero in force comes from"""
+    """source of the zero in force"""
     offset_origin: Origin | None
-    """what it was when it was taken, also if it is stored now"""
+    """source of the zero when it was measured, also if it is a stored one now"""
     offset_age_ms: int | None
     offset_contaminated: bool | None
-    """it, or the attempt at one, was taken while the wheel turned, or under load or unrest; None: nobody saw"""
+    """the zero, or the attempt to measure one, was measured while the wheel turned, under load, or with an unsteady force; None: not known"""
     offset_window: Window
-    """the two seconds after the wheel's start, or after ours"""
+    """result of the two seconds after the start of the wheel or of the gateway"""
     offset_samples: int | None
     offset_deviation_mN: int | None
     offset_drift_mN: int | None
     wheel_offset_mN: int | None
-    """the wheel's own, in force or not; None: not heard since its start"""
+    """the wheel's own offset, in force or not; None: not received since its start"""
     unit_evidence: UnitEvidence
 
 
 class Pose(TypedDict):
-    """As the right wheel sends it."""
+    """The pose that the right wheel sends."""
 
     x_mm: int | None
     y_mm: int | None
     z_mm: int | None
     psi_mrad: int | None
     limited: bool
-    """a coordinate stands at the end of its range"""
+    """a coordinate is at the end of its range"""
     age_ms: int | None
 
 
@@ -204,23 +204,23 @@ Evidence = Literal["none", "document", "configuration", "bus", "operator"]
 
 
 class LedgerEntry(TypedDict):
-    """An assumption, and what is known of it."""
+    """An assumption, and what supports it."""
 
     state: LedgerState
     evidence: Evidence
     figure: int | None
-    """measured, by the bus only"""
+    """measured value; only for evidence from the bus"""
     value: str | None
-    """in force"""
+    """value in force"""
     found: str | None
-    """by the operator, if told"""
+    """value that the operator found, if given"""
     how: str | None
-    """by what it was found, if told"""
+    """method of the operator, if given"""
     since_wall_us: int | None
     reason: str
-    """the evidence in words"""
+    """the evidence as a text"""
     disabled: str | None
-    """by a contradiction: what, and the cure"""
+    """functions that a contradiction disables, and the fix"""
 
 
 LedgerItem = Literal[
@@ -244,26 +244,26 @@ MemoryState = Literal["loading", "new", "kept", "ignored", "failed"]
 
 
 class Memory(TypedDict):
-    """Where what is known of the wheels is kept."""
+    """The assumption store: the file with observations of the wheels."""
 
     file: str
     state: MemoryState
     reason: str | None
-    """of ignored and failed"""
+    """reason of ignored and failed"""
 
 
 class Gaps(TypedDict):
-    """Between setpoint pairs since the gateway's start, while they are sent."""
+    """Intervals between setpoint pairs since the gateway's start, while it sends them."""
 
     limits_ms: list[int]
-    """upper bounds of all buckets but the last"""
+    """upper limits of all buckets except the last"""
     count: list[int]
-    """per bucket"""
+    """number of intervals in each bucket"""
     worst_us: int | None
 
 
 class Budget(TypedDict):
-    """How long and how far the machine goes on at most."""
+    """Longest time and distance of motion after a client is lost, or after the gateway is killed."""
 
     client_lost_ms: int
     client_lost_mm: int
@@ -272,18 +272,18 @@ class Budget(TypedDict):
 
 
 class Pair(TypedDict):
-    """How far the pair is from its commanded path, right wheel against left, in mm of the wheels' firmware (radius 192). What is ordinary does not count."""
+    """Deviation of the pair from its commanded path, right wheel against left, in mm of the wheels' firmware (radius 192). Ordinary deviations do not count."""
 
     deviation_mm: int
-    """now; positive: it turns to the left of its path"""
+    """present deviation; positive: the machine turns to the left of its path"""
     largest_mm: int
-    """of this drive, or of the last one, either way"""
+    """largest deviation of this or the last drive, to either side"""
     limit_mm: int
-    """pair_mm: there it stops"""
+    """pair_mm: deviation at which the gateway stops"""
 
 
 class Counters(TypedDict):
-    """Of the bus and the loop, since the gateway's start."""
+    """Counters of the bus and the loop since the gateway's start."""
 
     received: int
     echoes: int
@@ -295,7 +295,7 @@ class Counters(TypedDict):
     out_of_range: int
     purges: int
     left_behind: int
-    """times that a setpoint stayed in the controller"""
+    """how often a setpoint stayed in the controller"""
     pairs: int
     send_later: int
     clamped: int
@@ -317,9 +317,9 @@ class Status(TypedDict):
     arming: bool
     """a zero pair was sent and is not proven yet"""
     cause: Cause | None
-    """why stopping or latched"""
+    """cause of stopping or latched"""
     present: list[Cause]
-    """what keeps arm or reset from succeeding now"""
+    """causes for which arm or reset fails now"""
     lease: LeaseStatus
     bus: BusStatus
     estop: EstopStatus
@@ -334,9 +334,9 @@ class Status(TypedDict):
     counters: Counters
     clients: int
     holding: bool
-    """zeros are held without limit of time, until `release` or `arm` (key after_stop)"""
+    """the gateway sends zeros without limit of time, until `release` or `arm` (key after_stop)"""
     rolling: bool
-    """a wheel turns faster than 100 mm/s and nothing is sent to it"""
+    """a wheel turns faster than 100 mm/s although the gateway sends nothing to it"""
     listen_only: bool
     shutting_down: bool
     warnings: list[str]
@@ -346,12 +346,12 @@ Topic = Literal["state", "bus", "estop", "lease", "stop", "force", "frame"]
 
 
 class Watched(TypedDict):
-    """What was granted."""
+    """The accepted subscription."""
 
     topics: list[Topic]
     rate_hz: int
     limited: bool
-    """it is slower than what was asked"""
+    """it is less than the request"""
 
 
 class TaredWheel(TypedDict):
@@ -371,7 +371,7 @@ class _TaredPartly(TypedDict, total=False):
 
 
 class Tared(_TaredPartly):
-    """The reply to `tare`; only the wheels that were asked for are there."""
+    """The reply to `tare`, with the requested wheels only."""
 
     state: State
 
@@ -399,22 +399,22 @@ _StopSummaryNamed = TypedDict("_StopSummaryNamed", {"from": State | None})
 
 
 class StopSummary(_StopSummaryNamed):
-    """A stop: the event `stop`, and part of the reply to `why`. `number` 0: there was none, and the others are None."""
+    """A stop: the event `stop`, and part of the reply to `why`. `number` 0: there was no stop, and the other fields are None."""
 
     number: int
-    """of the stop since the gateway's start"""
+    """number of the stop since the gateway's start"""
     cause: Cause | None
     side: Sides | None
     detail: int | None
     latched: bool
     client: int | None
-    """who held the lease or asked for the stop"""
+    """client that held the lease or requested the stop"""
     client_name: str | None
     applied_left_mm_s: int | None
     applied_right_mm_s: int | None
     at_us: int | None
     wall_us: int | None
-    """when the stop was seen"""
+    """time of the stop"""
     age_ms: int | None
     sentence: str
 
@@ -423,11 +423,11 @@ class Stop(StopSummary):
     """The last stop: the reply to `why`."""
 
     directory: str
-    """of the recordings"""
+    """directory of the recordings"""
     recording: str | None
     """the file of this stop; None: not latched, or not written yet"""
     recording_error: str | None
-    """why it could not be written"""
+    """why the file could not be written"""
     frames_before: list[Frame]
     """up to 40"""
     frames_after: list[Frame]
@@ -435,20 +435,20 @@ class Stop(StopSummary):
 
 
 class Confirmed(LedgerEntry):
-    """The reply to `confirm`: the item and its entry. `value` is what is configured."""
+    """The reply to `confirm`: the item and its entry. `value` is the configured value."""
 
     item: LedgerItem
 
 
 class RecordingEntry(TypedDict):
-    """A recording on disk: three files with one name and an ending each."""
+    """A recording on disk: three files with the same name and different endings."""
 
     name: str
-    """of its files, without .log, .jsonl or .conf"""
+    """name of its files, without .log, .jsonl or .conf"""
     cause: str
     """a cause, gateway_died or rolling"""
     wall_us: int | None
-    """when its .conf was written, at the stop"""
+    """time at which its .conf was written, at the stop"""
     log_bytes: int | None
     """None: there is no such file"""
     jsonl_bytes: int | None
@@ -459,24 +459,24 @@ class Recordings(TypedDict):
     """The reply to `recordings`."""
 
     recordings: list[RecordingEntry]
-    """the oldest first; of more than 64 the newest"""
+    """oldest first; if there are more than 64, only the newest"""
 
 
 class Piece(TypedDict):
-    """The reply to `recording`: some bytes of a file."""
+    """The reply to `recording`: a piece of a file."""
 
     name: str
-    """of the file"""
+    """name of the file"""
     offset: int
-    """of the first byte in data"""
+    """offset of the first byte in data"""
     size: int
-    """of the file now; it may grow for two seconds after the stop"""
+    """present size of the file; it may grow for two seconds after the stop"""
     data: str
-    """base64 (RFC 4648): 24576 bytes, or what is left"""
+    """base64 (RFC 4648) of 24576 bytes, or of the rest of the file"""
     crc32: int
     """CRC-32 (as zlib's) of these bytes"""
     file_crc32: int | None
-    """of the whole file; None unless this is its last piece"""
+    """CRC-32 of the whole file; None unless this is its last piece"""
 
 
 class ConfiguredEntry(TypedDict):
@@ -485,15 +485,15 @@ class ConfiguredEntry(TypedDict):
     key: str
     """section.key, as in the configuration file"""
     value: str | None
-    """as staged, else as in force; None: not set"""
+    """staged value, or else the value in force; None: not set"""
 
 
 class Configured(TypedDict):
     """The reply to `config`."""
 
     keys: list[ConfiguredEntry]
-    """all there are"""
+    """all keys"""
     staged: bool
-    """something is staged and not committed"""
+    """a value is staged and not committed"""
     restarts: bool
-    """it was committed, and the gateway starts anew"""
+    """the values were committed, and the gateway restarts"""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A stop through a connection of its own: by one socket of a gateway or by the other, whichever takes it."""
+"""Sends a stop through a connection of its own, to whichever of the gateway's two sockets accepts it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,22 @@ from ._errors import GatewayUnavailable, NoAnswer
 from ._wire import WATCH_FOLDER, Message, Wire, cannot_connect
 
 ATTEMPT_S = 0.3
-"""One attempt takes no longer than this."""
+"""Longest time of one attempt."""
 AGAIN_S = 0.005
 
 
 def other_socket(path: str) -> str:
-    """The gateway's other socket, by custom: watch/NAME.sock next to NAME.sock."""
+    """Returns the gateway's other socket: watch/NAME.sock for NAME.sock, and the reverse."""
     folder, name = os.path.split(path)
     above, last = os.path.split(folder)
     return os.path.join(above, name) if last == WATCH_FOLDER else os.path.join(folder, WATCH_FOLDER, name)
 
 
 def stop_by_either(path: str, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
-    """The reply to `stop` or `estop`. The line is sent with the connection: beyond its maximum a gateway sends no greeting, and stops.
+    """Returns the reply to `stop` or `estop`. It sends the line immediately after connecting: a gateway with its maximum of clients sends no greeting,
+    but executes the stop.
 
-    Tries both sockets until the time is over. GatewayUnavailable tells what was wrong with `path`.
+    Tries both sockets until the time is over. GatewayUnavailable states the problem with `path`.
     """
     deadline = time.monotonic() + timeout
     first: GatewayUnavailable | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the gateway answers, as this package hands it out. The other types are in _protocol.py; docs/user/northbound.md tells more."""
+"""Types that this package returns, in addition to those of _protocol.py. docs/user/northbound.md describes them."""
 
 from __future__ import annotations
 
@@ -10,39 +10,39 @@ from collections.abc import Callable
 from ._protocol import Status
 
 Event = dict[str, Any]
-"""An event as it came: `event` is its name. Names and fields that are not known must be ignored."""
+"""An event as received: `event` is its name. Ignore unknown names and fields."""
 
 Whole = SupportsIndex | float
-"""A whole number of any type: 200, 200.0, numpy.int64(200). 200.5, True, NaN are refused when it is used."""
+"""A whole number of any type: 200, 200.0, numpy.int64(200). The call that uses it refuses 200.5, True and NaN."""
 
 OnStatus = Callable[[Status], object]
-"""What `drive_for` calls with each snapshot. If it returns True the drive ends; whatever else it returns means nothing."""
+"""Function that `drive_for` calls with each snapshot. If it returns True, the drive ends; `drive_for` ignores all other results."""
 
 
 @dataclass(frozen=True)
 class Applied:
-    """The target after limits; ramps come on top."""
+    """Target after limits. Ramps lead to it."""
 
     left_mm_s: int
     right_mm_s: int
     left_mA: int
     right_mA: int
     limited: bool
-    """It differs from what was asked: both wheels were scaled by one factor."""
+    """The target differs from the request: the gateway scaled both wheels by one factor."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What `arm` was answered with."""
+    """Terms of a granted `arm`."""
 
     lease_ms: int
-    """Each accepted command holds this long."""
+    """Each accepted command is valid for this time."""
     first_lease_ms: int
-    """The first command must come this soon."""
+    """The first command must come within this time."""
     stop_budget_ms: int
-    """How long the machine goes on at most after the last command ..."""
+    """Longest time of motion after the last command."""
     stop_budget_mm: int
-    """... and how far."""
+    """Longest distance of motion after the last command."""
     warnings: tuple[str, ...]
     key: str | None = field(default=None, repr=False)
-    """The secret of this lease; None: a microcontroller gives none."""
+    """Secret of this lease; None: the gateway is a microcontroller, which has none."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The northbound protocol without any I/O: requests to bytes, bytes to replies and events. Both clients are built on it."""
+"""The northbound protocol without I/O: converts requests to bytes, and bytes to replies and events. Both clients use it."""
 
 from __future__ import annotations
 
@@ -21,31 +21,32 @@ from ._version import __version__
 
 DEFAULT_FOLDER = "/run/iwheel"
 WATCH_FOLDER = "watch"
-"""In there: the sockets of who may only watch, each under the name of the one to drive by."""
+"""Subdirectory of DEFAULT_FOLDER with the watch sockets, each with the name of the drive socket."""
 HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_json")
-"""Refusals of a drive command that say nothing about the permission to drive."""
+"""Refusals of a drive command that do not end the permission to drive."""
 PASSING = ("not_at_rest", "stale_command")
-"""Refusals of `arm` that end by themselves: the wheels come to rest, and a drive command of before is half a second old."""
+"""Refusals of `arm` that end on their own: when the wheels are at standstill, or the last drive command is half a second old."""
 REPEATABLE = ("hello", "status", "why", "recordings", "recording", "stop", "estop")
-"""Asked again on a new connection if the old one broke: they never start a motion."""
+"""Requests that are repeated on a new connection if the old one broke. They never start a motion."""
 ALWAYS = ("stop", "estop")
-"""Sent even to a gateway that speaks a newer protocol."""
+"""Requests that are sent even to a gateway with a newer protocol."""
 REST_S = 3.0
-"""How long an end of driving waits at most for the wheels to stand."""
+"""Longest wait for standstill at the end of driving."""
 ARM_S = 2.0
-"""How long `arm` waits out a stop that is only just over."""
+"""Time for which `arm` repeats its request after a recent stop."""
 ARM_AGAIN_S = 0.05
 RATE_MAX_HZ = 100
 DISTINCTIONS = {"fault": ("cause",), "offset": ("side",), "ledger": ("item",), "frame": ("id", "kind")}
-"""What makes two events of one name different things."""
+"""Fields that must be equal for one event to supersede another of the same name."""
 
 Message = dict[str, Any]
 NoneType = type(None)
 
 
 def default_socket() -> str:
-    """$IWHEEL_SOCKET, or the socket of the only gateway in /run/iwheel: the one to drive by if it may be used, else the one to watch by.
-    Several: GatewayUnavailable says what to do."""
+    """Returns $IWHEEL_SOCKET, or the socket of the only gateway in /run/iwheel: its drive socket, or the watch socket if only that may be used.
+
+    Raises GatewayUnavailable with the fix if several gateways run."""
     named = os.environ.get("IWHEEL_SOCKET")
     if named:
         return named
@@ -70,9 +71,9 @@ def may_use(path: str) -> bool:
 
 
 def cannot_connect(path: str, error: OSError) -> GatewayUnavailable:
-    """The error with its cure."""
+    """Returns the error with its fix."""
     if isinstance(error, PermissionError):
-        cure = "you may not use it; join its group (usermod -aG iwheel USER), then log in again"
+        cure = "this user may not use it; join its group (usermod -aG iwheel USER), then log in again"
     elif isinstance(error, (FileNotFoundError, ConnectionRefusedError)):
         cure = "no gateway listens there; start it, or name another socket"
     else:
@@ -81,14 +82,14 @@ def cannot_connect(path: str, error: OSError) -> GatewayUnavailable:
 
 
 class Wire:
-    """One connection's worth of protocol: numbers requests, cuts the stream into lines, keeps replies that came early."""
+    """Protocol state of one connection: numbers requests, and splits the stream into messages."""
 
     def __init__(self) -> None:
         self._number = 0
         self._pending = bytearray()
 
     def request(self, cmd: str, fields: Mapping[str, Any]) -> tuple[int, bytes]:
-        """The request's number and its bytes. Fields that are None are left out."""
+        """Returns the request's number and its bytes. Omits fields that are None."""
         self._number += 1
         body = {"cmd": cmd, "id": self._number, **{k: v for k, v in fields.items() if v is not None}}
         line = json.dumps(body, allow_nan=False).encode() + b"\n"
@@ -97,7 +98,7 @@ class Wire:
         return self._number, line
 
     def feed(self, data: bytes) -> list[Message]:
-        """All messages that are complete now. ProtocolError if that is no northbound protocol."""
+        """Returns all messages that are now complete. Raises ProtocolError if the data is not of the northbound protocol."""
         self._pending += data
         *lines, rest = self._pending.split(b"\n")
         self._pending = bytearray(rest)
@@ -117,19 +118,19 @@ class Wire:
 
 
 def named(message: Message) -> bool:
-    """The number of a reply and the name of an event are of the type that they are looked up by."""
+    """Returns True if the number of a reply, or the name of an event, has a valid type."""
     return isinstance(message["event"], str) if "event" in message else isinstance(message.get("id"), (int, NoneType))
 
 
 def result_of(cmd: str, reply: Message) -> Message:
-    """The reply's fields, or Refused."""
+    """Returns the reply, or raises Refused."""
     if reply["ok"] is not True:
         raise Refused(cmd, str(reply.get("error")), str(reply.get("message")))
     return reply
 
 
 def integer(name: str, value: object) -> int:
-    """An int, or what is one but for its type: numpy's integers, 200.0. ValueError or TypeError says what else it is."""
+    """Returns an int from an int or an equal value of another type: numpy integers, 200.0. Otherwise raises ValueError or TypeError."""
     if isinstance(value, bool):
         raise TypeError(f"{name} must be a whole number, not {value}")
     number = cast(Any, value)
@@ -140,7 +141,7 @@ def integer(name: str, value: object) -> int:
     if not isinstance(value, numbers.Real):
         raise TypeError(f"{name} must be a whole number, not {value!r} ({type(value).__name__})")
     if not math.isfinite(number):
-        raise ValueError(f"{name} must be a whole number, not {value!s}; is something unknown where it comes from?")
+        raise ValueError(f"{name} must be a whole number, not {value!s}; is its source unknown?")
     whole = int(number)
     if whole != number:
         raise ValueError(f"{name} must be a whole number, as on the bus, not {value!s}; round it: round(x)")
@@ -148,19 +149,19 @@ def integer(name: str, value: object) -> int:
 
 
 def integers(**values: object) -> Message:
-    """Fields of a request; None is left out later."""
+    """Converts fields of a request. `Wire.request` omits None."""
     return {name: None if value is None else integer(name, value) for name, value in values.items()}
 
 
 def seconds_of(value: float) -> float:
-    """A time to drive. Infinite means: until something ends it."""
+    """Checks a time of driving. Infinite means without limit."""
     if not value >= 0:
         raise ValueError(f"seconds must be a number of at least 0, not {value}")
     return value
 
 
 def period_of(terms: Terms, rate_hz: float | None) -> float:
-    """Seconds between two commands: three per lease, or more if that is asked for."""
+    """Returns the seconds between two commands: three per lease, or more if `rate_hz` requests it."""
     if rate_hz is not None and not 0 < rate_hz <= RATE_MAX_HZ:
         raise ValueError(f"rate_hz must be a number above 0 and at most {RATE_MAX_HZ}, not {rate_hz}")
     return min(terms.lease_ms / 3000, 1 / rate_hz if rate_hz is not None else math.inf)
@@ -175,12 +176,12 @@ def lost_with(error: GatewayUnavailable) -> ConnectionLost:
 
 
 def check_api(path: str, hello: Message) -> None:
-    """A newer protocol may mean something else by the same words: nothing is driven by guessing."""
+    """Raises ProtocolError for a newer protocol: the same words may have another meaning there, so this package must not drive."""
     api = hello.get("api", API)
     if not isinstance(api, int) or api > API:
         raise ProtocolError(
-            f"{path}: this gateway (version {hello.get('version')}) speaks the northbound protocol {api}, this Python package "
-            f"iwheel {__version__} knows it up to {API}; install the package that belongs to the gateway"
+            f"{path}: this gateway (version {hello.get('version')}) has the northbound protocol {api}, this Python package "
+            f"iwheel {__version__} supports it up to {API}; install the package of the gateway's version"
         )
 
 
@@ -204,33 +205,33 @@ def fields_of(cmd: str, reply: Message, names: Iterable[str]) -> Message:
 
 
 def without_envelope(reply: Message) -> Any:
-    """The reply without `id` and `ok`."""
+    """Returns the reply without `id` and `ok`."""
     return {name: value for name, value in reply.items() if name not in ("id", "ok")}
 
 
 def add_piece(data: bytearray, piece: Piece) -> bool:
-    """Appends a piece of a recording. True with the last one, when the whole is as its checksum says. ProtocolError: it is not."""
+    """Appends a piece of a recording. Returns True after the last one. Raises ProtocolError if a checksum is wrong."""
     try:
         more = base64.b64decode(piece["data"], validate=True)
     except binascii.Error as error:
-        raise ProtocolError(f"{piece['name']}: a piece is no base64: {error}") from error
+        raise ProtocolError(f"{piece['name']}: a piece is not base64: {error}") from error
     if piece["offset"] != len(data) or zlib.crc32(more) != piece["crc32"]:
-        raise ProtocolError(f"{piece['name']}: the piece at {len(data)} is damaged; ask for the recording again")
+        raise ProtocolError(f"{piece['name']}: the piece at {len(data)} is damaged; request the recording again")
     data += more
     if len(data) < piece["size"] and more:
         return False
     if len(data) != piece["size"] or zlib.crc32(data) != piece["file_crc32"]:
-        raise ProtocolError(f"{piece['name']}: its pieces do not make the whole; ask for the recording again")
+        raise ProtocolError(f"{piece['name']}: the checksum of the whole file is wrong; request the recording again")
     return True
 
 
 def lost_event(count: int) -> Event:
-    """What the gateway tells a slow reader, told by ourselves: events that were not taken in time."""
+    """Returns the event with which the gateway reports lost events; here for events that the program did not read in time."""
     return {"event": "lost", "count": count}
 
 
 def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
-    """Of each thing only the newest event, and how many were left out: here, or by the gateway (`lost`)."""
+    """Returns only the newest event of each kind, and the number of dropped ones, including those that the gateway reports (`lost`)."""
     kept: dict[tuple[str, ...], Event] = {}
     left_out = 0
     for event in events:
@@ -245,6 +246,6 @@ def newest(events: Iterable[Event]) -> tuple[list[Event], int]:
 
 
 def stands(status: Message) -> bool:
-    """Nothing is commanded any more and both wheels are known to be at rest."""
+    """Returns True if no speed is commanded and both wheels are known to be at standstill."""
     wheels = [cast(Message, status[side]) for side in ("left", "right")]
     return all(wheel["at_rest"] is True and not wheel["applied_mm_s"] for wheel in wheels)

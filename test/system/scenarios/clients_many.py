@@ -106,7 +106,7 @@ def row05_out_of_descriptors(t):
         crowd.append(sock)
     time.sleep(0.2)
     t.check(rig.gateway.descriptors() >= limit - 1, f"{rig.gateway.descriptors()} of {limit} descriptors are in use")
-    t.check("there is no room for more" in rig.gateway.text(), "clients are turned away, and the log says so")
+    t.check("there is no place for more" in rig.gateway.text(), "clients are turned away, and the log says so")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(1.5)
     percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)

@@ -7,9 +7,9 @@
 
 typedef struct {
     iwn_scan_t scan;
-    iwn_work_t *work;              ///< NULL: names are not compared.
+    iwn_work_t *work;              ///< NULL: do not search for equal names.
     uint16_t names;                ///< Number of names in all open objects.
-    uint16_t first[IWN_DEPTH_MAX]; ///< The first of them, per object.
+    uint16_t first[IWN_DEPTH_MAX]; ///< Index of the first name, per object.
     bool is_list[IWN_DEPTH_MAX];
     unsigned depth;
 } check_t;
@@ -20,7 +20,8 @@ static bool fail(check_t *self, const char *what) {
 
 // Objects and lists -------------------------------------------------------------------------------------------------
 
-/// Below 0, 0 or above 0: the names that begin behind their quotes there, by what they mean.
+/// Compares two names, given by the position behind their opening quotes, with escapes decoded. Returns a number below
+/// 0, 0 or above 0.
 static int compare_names(const char *one, const char *other) {
     uint32_t a;
     uint32_t b;
@@ -31,7 +32,7 @@ static int compare_names(const char *one, const char *other) {
     return (a < b) ? -1 : (a > b) ? 1 : 0;
 }
 
-/// Puts the token among the names of its object. False, and that is told, if it is there already.
+/// Adds the token to the names of its object. Returns false and reports it if the object already has this name.
 static bool add_name(check_t *self) {
     unsigned low = self->first[self->depth - 1U];
     uint16_t *const name_at = self->work->name_at;
@@ -57,7 +58,7 @@ static bool add_name(check_t *self) {
     return true;
 }
 
-/// A name and its colon; `*token` is then the value's.
+/// Checks a name and its colon, and reads the first token of the value to `*token`.
 static bool check_name(check_t *self, int *token) {
     if (*token != IWN_TOKEN_TEXT) {
         return fail(self, "string or '}' expected");
@@ -83,7 +84,7 @@ static int closing(const check_t *self) {
     return in_list(self) ? ']' : '}';
 }
 
-/// The names of the root stay, for iwn_json_name.
+/// Closes an object or list and removes its names, except those of the root, for iwn_json_name.
 static void close_container(check_t *self) {
     self->depth--;
     if (self->depth > 0U) {
@@ -91,8 +92,8 @@ static void close_container(check_t *self) {
     }
 }
 
-/// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which
-/// closes it.
+/// Opens an object or list, and reads the first token of its first value to `*token`. Returns false on a fault, and if
+/// it is empty, after closing it.
 static bool open_container(check_t *self, int *token) {
     if (self->depth == IWN_DEPTH_MAX) {
         return fail(self, "nested too deeply");
@@ -121,7 +122,7 @@ static bool check_scalar(check_t *self, int token) {
     return token == IWN_TOKEN_TEXT || token == IWN_TOKEN_SCALAR || fail(self, "unexpected token");
 }
 
-/// A whole scalar, or the beginning of objects and lists down to the first scalar, or the end of an empty one of them.
+/// Checks a scalar; or opens objects and lists down to the first scalar or to an empty one.
 static bool check_value(check_t *self, int token) {
     while (token == '{' || token == '[') {
         if (!open_container(self, &token)) {
@@ -131,7 +132,7 @@ static bool check_value(check_t *self, int token) {
     return check_scalar(self, token);
 }
 
-/// What stands behind a value of an object or list: its end, or a comma and the next one.
+/// Checks the text behind a value of an object or list: its end, or a comma and the next value.
 static bool check_next(check_t *self) {
     int token = iwn_scan_skip(&self->scan, ',') ? ',' : iwn_scan(&self->scan);
     if (token == closing(self)) {
@@ -163,7 +164,7 @@ bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_
     return good && (iwn_scan(&self.scan) == IWN_TOKEN_END || fail(&self, "end of file expected"));
 }
 
-// Walking what has been checked ---------------------------------------------------------------------------------------
+// Walking a checked text ----------------------------------------------------------------------------------------------
 
 static const char *skip_blanks(const char *at) {
     while ((unsigned char)*at <= ' ') {
@@ -179,7 +180,7 @@ static const char *skip_text(const char *at) {
     return at + 1;
 }
 
-/// A brace is a bracket with 0x20 added.
+/// Returns the position behind a value. A brace differs from a bracket by 0x20.
 static const char *skip_value(const char *at) {
     unsigned depth = 0;
     do {
@@ -289,7 +290,7 @@ bool iwn_json_text(iwn_json_t value, char *out_text, size_t size) {
     while (*at != '"') {
         char bytes[4];
         const char *from = at;
-        size_t length = 1; // What is not escaped is copied byte by byte.
+        size_t length = 1; // Characters without an escape are copied byte by byte.
         if (*at == '\\') {
             length = iwn_utf8(iwn_scan_character(&at), bytes);
             from = bytes;

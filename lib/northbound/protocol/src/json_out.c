@@ -3,14 +3,14 @@
 
 #include "iwheel_northbound/text.h"
 
-// One copy of each function that takes a name: for programs compiled for size.
+// One copy of each function with a name argument, for programs compiled for size.
 #ifdef __OPTIMIZE_SIZE__
 #include "iwheel_northbound/json_out_inline.h"
 #endif
 
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
 
-/// Room for so many bytes; NULL: there is none, the line is lost.
+/// Reserves this number of bytes and returns their position; NULL: they do not fit, and the line is invalid.
 static char *take(iwn_out_t *self, size_t length) {
     if (self->overflow || length >= self->size - self->length) {
         self->overflow = true;
@@ -28,7 +28,8 @@ static void put(iwn_out_t *self, const char *text, size_t length) {
     }
 }
 
-/// Comma, name and colon, and room for a value of that length, which is returned; NULL: it does not fit.
+/// Writes comma, name and colon, and reserves a value of that length. Returns the position of the value; NULL: it does
+/// not fit.
 static char *begin(iwn_out_t *self, iwn_span_t name, size_t length) {
     const size_t comma = self->comma ? 1U : 0U;
     char *at = take(self, comma + ((name.text != NULL) ? name.length + 3U : 0U) + length);
@@ -83,7 +84,7 @@ void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values)
     }
 }
 
-/// One character that may have to be written otherwise; how many bytes it has in `text`.
+/// Writes one character, escaped if necessary. Returns its number of bytes in `text`.
 static size_t put_character(iwn_out_t *self, const char *text) {
     char escape[7];
     size_t bytes;
@@ -102,7 +103,7 @@ static size_t put_character(iwn_out_t *self, const char *text) {
     return bytes;
 }
 
-/// The rest of a text, from a character on that may have to be written otherwise.
+/// Writes the rest of a string, with escapes.
 static void put_escaped(iwn_out_t *self, const char *text, size_t length) {
     size_t at = 0;
     while (at < length) {

@@ -3,17 +3,17 @@
 
 #include <string.h>
 
-/// No more of a wrong token than this is repeated.
+/// Most bytes of a wrong token that a message repeats.
 #define NEAR_MAX 20U
-/// The decimal exponent of the largest double.
+/// Decimal exponent of the largest double.
 #define REAL_EXPONENT_MAX 308
-/// No exponent beyond it means anything else, however many digits come before.
+/// A larger exponent has the same result as this one, however many digits come before it.
 #define EXPONENT_FAR 1000000
 
-/// What `peek` finds other than a byte.
+/// Results of `peek` other than a byte.
 enum { PEEK_END = -1, PEEK_BROKEN = -2 };
 
-/// -1: it is none.
+/// Returns the value of a hexadecimal digit; -1: not a digit.
 static int hex_value(int c) {
     if (iwn_scan_is_digit(c)) {
         return c - '0';
@@ -22,7 +22,7 @@ static int hex_value(int c) {
     return (lower >= 'a' && lower <= 'f') ? lower - 'a' + 10 : -1;
 }
 
-// What is told of a fault -------------------------------------------------------------------------------------------
+// Messages about faults ---------------------------------------------------------------------------------------------
 
 static bool is_printable(const char *text, size_t length) {
     for (size_t i = 0; i < length; i++) {
@@ -33,7 +33,7 @@ static bool is_printable(const char *text, size_t length) {
     return true;
 }
 
-/// The reason with the token it was found in, as far as that can be shown.
+/// Reports the fault with the token in which it was found, as far as the token is printable.
 static bool fail_with(iwn_scan_t *self, const char *what, const char *more, const char *nowhere) {
     const size_t length = (size_t)(self->at - self->token);
     if (self->failed) {
@@ -67,7 +67,7 @@ static int fail_byte(iwn_scan_t *self, const char *what, unsigned char byte, con
 
 // Tokens ------------------------------------------------------------------------------------------------------------
 
-/// How many bytes the character has that comes next; 0: it is no UTF-8.
+/// Returns the number of bytes of the next character; 0: it is not UTF-8.
 static size_t character_length(const iwn_scan_t *self) {
     size_t bytes;
     char copy[5] = "";
@@ -76,7 +76,8 @@ static size_t character_length(const iwn_scan_t *self) {
     return (iwn_plain_read(copy, &bytes) != IWN_PLAIN_BROKEN) ? bytes : 0U;
 }
 
-/// Returns the next byte, which is not ASCII; PEEK_BROKEN, and reports it, if it begins no UTF-8 character.
+/// Returns the next byte, which is not ASCII. If it does not begin a UTF-8 character, reports it and returns
+/// PEEK_BROKEN.
 static int peek_wide(iwn_scan_t *self) {
     const unsigned char byte = (unsigned char)*self->at;
     if (character_length(self) == 0U) {
@@ -86,7 +87,7 @@ static int peek_wide(iwn_scan_t *self) {
     return byte;
 }
 
-/// The next byte, which begins a character or stands in one that has been looked at.
+/// Returns the next byte, which begins a character or belongs to a checked one.
 static inline int peek(iwn_scan_t *self) {
     if (self->at == self->end) {
         return PEEK_END;
@@ -116,7 +117,7 @@ static bool is_low(uint32_t unit) {
     return unit >= 0xDC00U && unit <= 0xDFFFU;
 }
 
-/// A surrogate without the other, or with something else behind it.
+/// Reports a surrogate without its counterpart.
 static bool fail_unit(iwn_scan_t *self, uint32_t unit, const char *second) {
     char units[sizeof "\\uD800\\uD800'"];
     iwn_text_t text = iwn_text_begin(units, sizeof units);
@@ -130,7 +131,7 @@ static bool fail_unit(iwn_scan_t *self, uint32_t unit, const char *second) {
     return fail_with(self, "invalid Unicode '", units, "");
 }
 
-/// `c` is on the `u` of a surrogate. False, and that is told, if it is not the first of a pair.
+/// Checks the surrogate with its `u` at `c`. Returns false and reports it if it is not the first of a pair.
 static bool check_pair(iwn_scan_t *self, const char *c, uint32_t unit) {
     const bool followed = is_high(unit) && c[5] == '\\' && c[6] == 'u';
     if (followed && is_low(read_hex4(c + 7))) {
@@ -139,7 +140,7 @@ static bool check_pair(iwn_scan_t *self, const char *c, uint32_t unit) {
     return fail_unit(self, unit, followed ? c + 7 : NULL);
 }
 
-/// The token is a whole text in which every escape is right in itself: surrogates come in pairs.
+/// Checks that surrogates come in pairs, in a whole string in which every single escape is valid.
 static int check_units(iwn_scan_t *self) {
     for (const char *c = self->token + 1; c < self->at - 1; c++) {
         if (*c != '\\') {
@@ -159,7 +160,7 @@ static int check_units(iwn_scan_t *self) {
     return IWN_TOKEN_TEXT;
 }
 
-/// `at` is on the backslash. False, and that is told, if what it begins is wrong.
+/// Skips the escape whose backslash is at `at`. Returns false and reports it if it is invalid.
 static bool skip_escape(iwn_scan_t *self, bool *out_unit) {
     int c = step(self);
     unsigned digits = 0;
@@ -174,13 +175,13 @@ static bool skip_escape(iwn_scan_t *self, bool *out_unit) {
         self->at++;
     }
     if (!good) {
-        self->at += (c >= 0) ? 1 : 0; // The byte that is wrong is shown.
+        self->at += (c >= 0) ? 1 : 0; // The message shows the wrong byte.
         (void)iwn_scan_fail(self, "invalid escape");
     }
     return good;
 }
 
-/// What comes behind the bytes that need no look.
+/// Skips plain bytes. Returns the next one.
 static int skip_plain(iwn_scan_t *self) {
     self->at += iwn_plain_length(self->at, (size_t)(self->end - self->at));
     return peek(self);
@@ -207,7 +208,7 @@ static int scan_text(iwn_scan_t *self) {
     return units ? check_units(self) : IWN_TOKEN_TEXT;
 }
 
-/// Digits, one at least; `*c` is what they begin with, and then what comes behind them.
+/// Skips digits, at least one. `*c` is the first byte before the call, and the byte behind the digits after it.
 static bool skip_digits(iwn_scan_t *self, int *c) {
     const char *const begin = self->at;
     while (self->at < self->end && iwn_scan_is_digit(*self->at)) {
@@ -217,7 +218,7 @@ static bool skip_digits(iwn_scan_t *self, int *c) {
     return self->at > begin;
 }
 
-/// 64 bits.
+/// Checks that the integer has at most 64 bits.
 static int check_integer(iwn_scan_t *self) {
     const bool negative = *self->token == '-';
     const uint64_t most = negative ? (uint64_t)INT64_MAX + 1U : (uint64_t)INT64_MAX;
@@ -233,7 +234,7 @@ static int check_integer(iwn_scan_t *self) {
     return IWN_TOKEN_SCALAR;
 }
 
-/// The number behind `e`, or about as far away as it gets.
+/// Returns the number behind `e`, limited to about EXPONENT_FAR.
 static int32_t read_exponent(const char *c, const char *end) {
     const bool negative = *c == '-';
     int32_t exponent = 0;
@@ -245,8 +246,9 @@ static int32_t read_exponent(const char *c, const char *end) {
     return negative ? -exponent : exponent;
 }
 
-/// Whether the digits from `c` on, whose first is not zero, are at least those of what is no double any more: halfway
-/// between the largest one and the power of two behind it. Nobody writes more of its 309 digits than these.
+/// Returns true if the digits from `c` on, of which the first is not zero, are beyond the range of a double: from
+/// halfway between the largest double and the next power of two. Of the 309 digits of that limit it compares the first
+/// 24, which is precise enough.
 static bool is_beyond(const char *c, const char *end) {
     static const char limit[] = "179769313486231580793728";
     for (const char *wanted = limit; *wanted != '\0'; wanted++) {
@@ -259,7 +261,7 @@ static bool is_beyond(const char *c, const char *end) {
     return true;
 }
 
-/// The first digit that counts; `end`: there is none.
+/// Returns the first digit that is not zero; `end`: none.
 static const char *find_first(const char *c, const char *end) {
     while (c < end && !(*c >= '1' && *c <= '9')) {
         c++;
@@ -267,7 +269,7 @@ static const char *find_first(const char *c, const char *end) {
     return c;
 }
 
-/// Where that byte is; `end` if it is nowhere.
+/// Returns the position of that byte in either case; `end`: none.
 static const char *find(const char *c, const char *end, char lower) {
     while (c < end && (*c | 0x20) != lower) {
         c++;
@@ -275,7 +277,7 @@ static const char *find(const char *c, const char *end, char lower) {
     return c;
 }
 
-/// Within what a double holds. Too small is zero, and no fault.
+/// Checks that a double can hold the number. A number that is too small counts as zero and is not a fault.
 static int check_real(iwn_scan_t *self) {
     const char *const end = find(self->token, self->at, 'e');
     const char *const first = find_first(self->token, end);
@@ -292,7 +294,7 @@ static int check_real(iwn_scan_t *self) {
     return IWN_TOKEN_SCALAR;
 }
 
-/// From the point or `e` on.
+/// Reads a number from its point or `e` on.
 static int scan_real(iwn_scan_t *self, int c) {
     if (c == '.') {
         c = step(self);
@@ -365,7 +367,7 @@ int iwn_scan(iwn_scan_t *self) {
     return IWN_TOKEN_INVALID;
 }
 
-/// What the escape means that begins at the backslash there.
+/// Returns the code point of the escape whose backslash is at `*at`, and advances `*at`.
 static uint32_t read_escape(const char **at) {
     static const char letters[] = "bfnrt";
     static const char meanings[] = "\b\f\n\r\t";

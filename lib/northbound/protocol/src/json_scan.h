@@ -1,31 +1,30 @@
 // SPDX-License-Identifier: MIT
-/// The tokens of a JSON text, each judged to its last byte, and what is told of the first that is wrong.
+/// Reads the tokens of a JSON text, checks every byte of them, and reports the first fault.
 #ifndef IWHEEL_NORTHBOUND_JSON_SCAN_H
 #define IWHEEL_NORTHBOUND_JSON_SCAN_H
 
 #include "iwheel_northbound/json_in.h"
 
-/// What `iwn_scan` finds: a punctuation mark as itself, or one of these. A scalar is a number or one of true, false,
-/// null.
+/// Results of `iwn_scan`: a punctuation mark as itself, or one of these. A scalar is a number, true, false or null.
 enum { IWN_TOKEN_END = 0, IWN_TOKEN_INVALID = 1, IWN_TOKEN_TEXT = '"', IWN_TOKEN_SCALAR = '0' };
 
 typedef struct {
     const char *text;
     const char *end;
-    const char *at;    ///< What comes next.
-    const char *token; ///< Where the token begins that `at` is in, or behind.
+    const char *at;    ///< Next byte.
+    const char *token; ///< Beginning of the token that `at` is in or behind.
     iwn_text_t *fault;
-    bool failed;  ///< The first reason is told, no later one.
-    bool has_nul; ///< The token is a text with \u0000 in it.
+    bool failed;  ///< A fault has been reported. Only the first one is.
+    bool has_nul; ///< The token is a string with \u0000 in it.
 } iwn_scan_t;
 
-/// The next token. What is wrong in it is told, if that can be said better than by the token itself.
+/// Reads the next token. Reports a fault in it, if its message is more precise than that of the caller.
 int iwn_scan(iwn_scan_t *self);
 
-/// Tells that this is wrong, and near which token, unless something has been told already. False, always.
+/// Reports a fault and the token near it, unless a fault has been reported already. Returns false.
 bool iwn_scan_fail(iwn_scan_t *self, const char *what);
 
-/// The next code point of a text whose escapes are right; 0 behind it.
+/// Reads the next code point of a string with valid escapes; 0 at its end.
 uint32_t iwn_scan_character(const char **at);
 
 /// Skips the mark if it is the next byte.

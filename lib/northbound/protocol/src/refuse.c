@@ -39,7 +39,7 @@ static void say_holder(wording_t *self) {
            over ? 0 : (int32_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS),
            " ms at least; let it stop first");
     if (self->request->cmd != IWN_CMD_RELEASE) {
-        iwn_text_add(&self->text, ", or, with the wheels at rest, arm with takeover");
+        iwn_text_add(&self->text, ", or, with the wheels at standstill, arm with takeover");
     }
 }
 
@@ -58,7 +58,7 @@ static void say_not_armed(wording_t *self) {
     since(self, "; the last stop was ", stop->at_us, " ms ago: ");
     iwn_text_add(&self->text, iwn_cause_name(stop->cause));
     if (stop->cause == IW_CAUSE_CLIENT_STOP && by != NULL) {
-        SAY(self, ", asked for by ", by);
+        SAY(self, ", requested by ", by);
     }
     iwn_text_add(&self->text, ". Arm first");
 }
@@ -78,9 +78,9 @@ static void say_lost(wording_t *self) {
         }
         SAY(self, "the ", (side == IW_LEFT) ? "left" : "right");
         if (wheel->speed_us == IW_NEVER) {
-            iwn_text_add(&self->text, " wheel was never heard; ");
+            iwn_text_add(&self->text, " wheel never sent telemetry; ");
         } else {
-            since(self, " wheel was last heard ", wheel->speed_us, " ms ago; ");
+            since(self, " wheel sent its last telemetry ", wheel->speed_us, " ms ago; ");
         }
     }
     iwn_text_add(&self->text, "check its power, cable and termination");
@@ -110,10 +110,11 @@ static void say_not_at_rest(wording_t *self) {
         number(self, "the wheels are not at standstill for ", seen->config->rest_ms, " ms yet; wait, then try again");
         return;
     }
-    number(self, "the wheels turn or are told to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm, " rpm, told ");
+    number(self, "the wheels turn or are commanded to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm,
+           " rpm, commanded ");
     number(self, "", seen->applied.wheel[IW_LEFT].speed_mm_s, " mm/s; right ");
-    number(self, "", seen->wheel[IW_RIGHT].told->speed.speed_rpm, " rpm, told ");
-    number(self, "", seen->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s; wait until both stand for ");
+    number(self, "", seen->wheel[IW_RIGHT].told->speed.speed_rpm, " rpm, commanded ");
+    number(self, "", seen->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s; wait until both are at standstill for ");
     number(self, "", seen->config->rest_ms, " ms");
 }
 
@@ -134,7 +135,7 @@ static void say_stalled(wording_t *self) {
 static void say_stale(wording_t *self) {
     if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
         iwn_text_add(&self->text,
-                     "this command was sent before arm was answered; wait for that answer, then command anew");
+                     "this command was sent before the reply to arm; wait for that reply, then send a new command");
         return;
     }
     iwn_text_add(&self->text, self->context->stale_client);
@@ -143,14 +144,14 @@ static void say_stale(wording_t *self) {
 }
 
 static void say_second_master(wording_t *self) {
-    since(self, "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
+    since(self, "another device sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
           self->seen->seen_us[IW_CAUSE_SECOND_MASTER], " ms ago; switch the other sender off, wait a second");
 }
 
-/// Names the client that sends stops repeatedly, on any way.
+/// Names the client that sends stops repeatedly, over any connection.
 static void say_estopped(wording_t *self) {
-    since(self, "estop_software was asked for ", self->context->estopped_us, " ms ago by ");
-    SAY(self, self->context->estopped_by, "; end that program if it keeps asking, and wait a second");
+    since(self, "estop_software was requested ", self->context->estopped_us, " ms ago by ");
+    SAY(self, self->context->estopped_by, "; end that program if it repeats the request, and wait a second");
 }
 
 static void say_present(wording_t *self) {
@@ -195,7 +196,7 @@ static void say_type(wording_t *self) {
 }
 
 static void say_track(wording_t *self) {
-    SAY(self, "track_mm not configured, and every bound of turning rests on it; set it ", self->context->configure);
+    SAY(self, "track_mm not configured, and every limit of turning depends on it; set it ", self->context->configure);
 }
 
 static void say_bus_down(wording_t *self) {
@@ -262,7 +263,7 @@ bool iwn_refuse_late(const iwn_request_t *request, const iwn_moment_t *moment, i
     const int64_t now_us = (int64_t)moment->now_us;
     const int64_t t_us = request->t_us;
     if (request->has_stop && request->stop != (int64_t)moment->stop) {
-        return refuse_late(out_refusal, "this request means another stop than the last one, number ", moment->stop,
+        return refuse_late(out_refusal, "this request names another stop than the last one, number ", moment->stop,
                            "; read why (iwheelctl why), then send it again");
     }
     if (!request->has_t_us) {
@@ -274,7 +275,7 @@ bool iwn_refuse_late(const iwn_request_t *request, const iwn_moment_t *moment, i
     }
     if (t_us < now_us - (int64_t)moment->max_age_ms * (int64_t)IW_US_PER_MS) {
         return refuse_late(out_refusal, "this request came too late, more than ", moment->max_age_ms,
-                           " ms after t_us; if it is still meant, send it again");
+                           " ms after t_us; if it is still wanted, send it again");
     }
     if (t_us < (int64_t)moment->stopped_us) {
         return refuse_late(out_refusal, "the wheels were stopped after t_us of this request, ",
@@ -293,7 +294,7 @@ void iwn_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *o
         [IW_TARE_NO_FORCE] =
             {IWN_WHEEL_LOST,
              "has not sent force for two seconds without a gap; check its power and cable, wait two seconds"},
-        [IW_TARE_MOVING] = {IWN_NOT_AT_REST, "turned within the last two seconds; let it stand, wait two seconds"},
+        [IW_TARE_MOVING] = {IWN_NOT_AT_REST, "turned within the last two seconds; stop it, wait two seconds"},
         [IW_TARE_NOISY] = {IWN_DENIED, "has an unsteady force; let go of the machine, wait two seconds"},
         [IW_TARE_LOADED] = {IWN_DENIED,
                             "carries a load far from its earlier zero; let go of the machine, wait two seconds"},

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The requests and their fields, beside cmd and id. Written by scripts/northbound.py from share/northbound.json.
+// The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 #define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 
-/// In the order of iwn_cmd_t.
+/// Names in the order of iwn_cmd_t.
 #define IWN_REQUEST_NAMES(NAME)                                                                                        \
     NAME(hello)                                                                                                        \
     NAME(status)                                                                                                       \
@@ -23,7 +23,7 @@
     NAME(recording)                                                                                                    \
     NAME(config)
 
-/// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.
+/// Name, member of iwn_request_t, kind, largest size of a text in bytes, required, requests with this field.
 #define IWN_REQUEST_FIELDS(ROW)                                                                                        \
     ROW(topics, topics, TOPICS, 0, true, BIT(WATCH))                                                                   \
     ROW(rate_hz, rate_hz, RATE, 0, false, BIT(WATCH))                                                                  \

@@ -10,9 +10,9 @@ static const char *wheels(uint8_t sides) {
 }
 
 static const char *reboot_sign(uint32_t detail) {
-    return (detail == IW_REBOOT_SILENCE)    ? "it was silent for a second"
+    return (detail == IW_REBOOT_SILENCE)    ? "it sent nothing for a second"
            : (detail == IW_REBOOT_ODOMETRY) ? "its odometry jumped"
-                                            : "its start-up offset frames came back";
+                                            : "it sent its start-up offset frames again";
 }
 
 static void add_number(iwn_text_t *text, int64_t number, const char *unit) {
@@ -42,12 +42,12 @@ static const row_t rows[IW_CAUSES] = {
     // Causes in the gateway.
     [IW_CAUSE_ESTOP_LINE] = {"e-stop $e $d", "release the button"},
     [IW_CAUSE_ESTOP_DISAGREES] = {"the two contacts of e-stop $e disagree",
-                                  "mend contact or wire, press and release the button"},
+                                  "fix contact or wire, press and release the button"},
     [IW_CAUSE_LOOP_HUNG] = {"the gateway itself was held up for $n ms", "see what else runs on this machine"},
     [IW_CAUSE_LOOP_LATE] = {"the gateway itself was held up for $n ms",
                             "see what else runs on this machine, then arm again"},
     [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log"},
-    [IW_CAUSE_SHUTDOWN] = {"the gateway was told to end", "start it again to go on"},
+    [IW_CAUSE_SHUTDOWN] = {"the gateway was shut down", "start it again to go on"},
     [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
                           "look for the crash in the log, then arm again"},
     // Causes by a person or a client.
@@ -55,16 +55,16 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms",
                              "send drive commands more often or raise lease_ms, then arm again"},
     [IW_CAUSE_CLIENT_GONE] = {"$c disconnected", "arm again to go on"},
-    [IW_CAUSE_CLIENT_STOP] = {"$c said stop", "arm again to go on"},
+    [IW_CAUSE_CLIENT_STOP] = {"$c requested a stop", "arm again to go on"},
     // Causes in the machine: bus and wheels.
-    [IW_CAUSE_WHEEL_LOST] = {"$w not heard for $n ms", "check the wheel's power and cable"},
+    [IW_CAUSE_WHEEL_LOST] = {"$w sent no telemetry for $n ms", "check the wheel's power and cable"},
     [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power"},
     [IW_CAUSE_SEND_STALLED] = {"setpoint not acknowledged on the bus for $n ms",
                                "check that the wheels have power and the bus is terminated"},
     [IW_CAUSE_BUS_DOWN] = {"bus $b is $d", "bring the bus up"},
-    [IW_CAUSE_SECOND_MASTER] = {"somebody else sent a setpoint, id $n (0x$x)", "switch the other sender off"},
+    [IW_CAUSE_SECOND_MASTER] = {"another device sent a setpoint, id $n (0x$x)", "switch the other sender off"},
     [IW_CAUSE_FEEDBACK_SIGN] = {"$w turns against its command at $n mm/s", "check invert in the configuration"},
-    [IW_CAUSE_OVERSPEED] = {"$w turns faster than told, at $n mm/s", "check radius, gear ratio and slope"},
+    [IW_CAUSE_OVERSPEED] = {"$w turns faster than commanded, at $n mm/s", "check radius, gear ratio and slope"},
     [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel, then arm again"},
     [IW_CAUSE_PAIR_DIVERGES] =
         {"$w does not follow its command: the machine left its path by $n mm, right against left",
@@ -112,7 +112,7 @@ static void add_clause(const iw_stop_t *stop, const iwn_why_context_t *context, 
     const bool known = (unsigned)stop->cause < IW_CAUSES;
     const char *clause = known ? rows[stop->cause].clause : iwn_cause_name(stop->cause);
     if (stop->cause == IW_CAUSE_WHEEL_LOST && stop->detail == UINT32_MAX) {
-        clause = "$w never heard";
+        clause = "$w never sent telemetry";
     }
     for (; *clause != '\0'; clause++) {
         if (*clause == '$') {

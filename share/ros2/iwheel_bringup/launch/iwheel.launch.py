@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The description of the machine, and with `joystick:=true` a gamepad. iwheel-ros2 itself is a service of systemd and is not started here."""
+"""Starts the description of the machine, and with `joystick:=true` a gamepad. systemd starts iwheel-ros2 as a service; this file does not."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Drives by a gamepad with a deadman: topic `joy` in, `cmd_vel` out at 20 Hz.
 
-It publishes while the deadman button is held and the gamepad has reported something within `report_timeout` seconds: a wireless gamepad whose link
-dies reports nothing more, with the button held or not. The stick held still reports nothing either: move it a little. Then, and when the button is
-released, it publishes zeros for half a second, then nothing. After a stop the button must be released once. It never arms: call iwheel/arm.
+The node publishes speeds while the deadman button is held and the gamepad has reported a change within `report_timeout` seconds. A wireless gamepad whose
+link has died reports nothing, with the button held or not. A stick that is held still reports nothing either: move it slightly. After the timeout, and
+when the button is released, the node publishes zeros for half a second, then nothing. To drive again, release the button once. The node
+never arms: call iwheel/arm.
 """
 
 import math
@@ -20,7 +21,7 @@ LONGEST_TIMEOUT_S = 2.0
 
 
 class Deadman:
-    """What to send. Pure: the caller gives the time in seconds. None: nothing.
+    """Decides which speeds to publish. Pure: the caller passes the time in seconds.
 
     RELEASED --held--> DRIVING --released or no report--> ENDING --ZEROS_S--> WAITING --a report with the button released--> RELEASED
     """
@@ -33,7 +34,7 @@ class Deadman:
         self.reported_s = self.ended_s = -math.inf
 
     def report(self, held, linear, angular, now_s):
-        """The gamepad reported."""
+        """Handles a report of the gamepad: button held, speeds in m/s and rad/s."""
         good = math.isfinite(linear) and math.isfinite(angular)
         if not held and self.state in ("WAITING", "ENDING"):
             self.state = "RELEASED" if self.state == "WAITING" else self.state
@@ -48,8 +49,9 @@ class Deadman:
         self.state, self.ended_s = "ENDING", now_s
 
     def step(self, now_s):
+        """Returns the speeds to publish in m/s and rad/s; None: publish nothing."""
         if self.state == "DRIVING" and now_s - self.reported_s > self.timeout_s:
-            self.held = True  # As far as it is known: it must be released once.
+            self.held = True  # The button counts as held until a report shows it released.
             self.end(now_s)
         if self.state == "ENDING" and now_s - self.ended_s > ZEROS_S:
             self.state = "WAITING" if self.held else "RELEASED"
@@ -75,7 +77,7 @@ class JoystickNode(Node):
         self.type = TwistStamped if self.values["stamped"] else Twist
         self.publisher = self.create_publisher(self.type, "cmd_vel", 10)
         self.create_subscription(Joy, "joy", self.on_joy, 10)
-        # Steady: neither a clock that is set nor simulated time lengthens the timeout.
+        # With a steady clock neither a step of the wall clock nor simulated time lengthens the timeout.
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / RATE_HZ, self.on_timer, clock=self.steady)
 

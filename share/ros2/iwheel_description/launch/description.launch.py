@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""robot_state_publisher with the machine's measures, and with `rviz:=true` RViz."""
+"""Starts robot_state_publisher with the machine's measures, and with `rviz:=true` RViz."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -13,7 +13,7 @@ ARGUMENTS = {
     "namespace": ("", "[ros] namespace of ros2.conf; empty: none"),
     "radius": ("0.192", "m, [wheels] radius_mm of gateway.conf"),
     "track": ("0.540", "m, [wheels] track_mm of gateway.conf"),
-    "prefix": ("", "of the base's frame, such as w1/"),
+    "prefix": ("", "prefix of all frames, as in [odometry] base_frame of ros2.conf, such as w1/"),
     "rviz": ("false", "start RViz"),
 }
 

@@ -14,7 +14,7 @@ constexpr int CONNECT_MS = 1000;
 constexpr int ASK_MS = 150;
 constexpr int ARM_MS = 500;
 constexpr int RATE_HZ = 100;
-// A snapshot that came so soon after the lease was granted may have been made before it.
+// The gateway may have made a snapshot before the grant of the lease if it came within this time after the grant.
 constexpr std::chrono::milliseconds GRANTED{200};
 constexpr double MOST_MM_S = 32767.0;
 constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
@@ -47,7 +47,7 @@ void Drive::close()
     (void)iwc_stop(gateway_, ASK_MS);
   }
   if (gateway_ != nullptr) {
-    iwc_close(gateway_);  // Which ends a lease that is left.
+    iwc_close(gateway_);  // The gateway ends the lease with the connection.
   }
   state_ = State::CLOSED;
 }
@@ -79,7 +79,7 @@ bool Drive::open(const std::string & socket)
     return fail("this socket may only watch: use the gateway's own socket and the group iwheel");
   }
   if (!read_radius()) {
-    return fail("the gateway does not tell the radius of its wheels: set [wheels] radius_mm in gateway.conf");
+    return fail("the gateway does not report the radius of its wheels: set [wheels] radius_mm in gateway.conf");
   }
   if (iwc_watch(gateway_, IWC_WATCH_STATE | IWC_WATCH_STOP, RATE_HZ, ASK_MS) != IWC_OK) {
     return fail("the gateway does not answer");
@@ -101,7 +101,7 @@ bool Drive::activate(const std::string & name)
     return false;
   }
   if (result != IWC_OK) {
-    return fail(iwc_words(result));  // Whether it is armed is not known: the end of the connection ends it.
+    return fail(iwc_words(result));  // The gateway may have granted the lease; closing the connection ends it.
   }
   state_ = State::ACTIVE;
   activated_ = Clock::now();
@@ -141,7 +141,7 @@ bool Drive::judge_active()
 {
   const auto now = Clock::now();
   if (now - received_ > SILENT) {
-    return fail("the gateway is silent; see its log (journalctl -u iwheel-gateway)");
+    return fail("the gateway does not send; see its log (journalctl -u iwheel-gateway)");
   }
   if (received_ - activated_ > GRANTED && !(newest_.machine == IWC_ARMED && newest_.ours)) {
     return fail("the lease has ended");
@@ -187,8 +187,8 @@ bool Drive::write(const std::array<double, SIDES> & rad_s)
   std::array<double, SIDES> mm_s;
   for (size_t side = 0; side < SIDES; side++) {
     mm_s[side] = std::round(rad_s[side] * radius_m_ * 1000.0);
-    if (!(std::fabs(mm_s[side]) <= MOST_MM_S)) {  // Also what is no number.
-      return fail("a command is no number, or faster than 32 m/s: fix the controller");
+    if (!(std::fabs(mm_s[side]) <= MOST_MM_S)) {  // Also true for NaN.
+      return fail("a command is not a number, or faster than 32 m/s: fix the controller");
     }
   }
   const iwc_drive_t command = {static_cast<int32_t>(mm_s[LEFT]), static_cast<int32_t>(mm_s[RIGHT]), false, 0, 0};

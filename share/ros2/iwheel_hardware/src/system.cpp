@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The thin side of ros2_control: names, parameters and states of the lifecycle. Everything that decides is in drive.cpp.
+// The adapter to ros2_control: names, parameters and states of the lifecycle. drive.cpp makes all decisions.
 #include <array>
 #include <string>
 #include <vector>
@@ -25,11 +25,11 @@ public:
       return Result::ERROR;
     }
     if (info_.joints.size() != SIDES) {
-      return say("the URDF must have two joints, the left wheel first");
+      return report("the URDF must have two joints, the left wheel first");
     }
     for (const auto & joint : info_.joints) {
       if (joint.command_interfaces.size() != 1 || joint.command_interfaces[0].name != hardware_interface::HW_IF_VELOCITY) {
-        return say(joint.name + " must have one command interface: velocity");
+        return report(joint.name + " must have one command interface: velocity");
       }
     }
     return Result::SUCCESS;
@@ -37,20 +37,20 @@ public:
 
   Result on_configure(const rclcpp_lifecycle::State &) override
   {
-    return drive_.open(parameter("socket", "")) ? Result::SUCCESS : say(drive_.error());
+    return drive_.open(parameter("socket", "")) ? Result::SUCCESS : report(drive_.error());
   }
 
   Result on_activate(const rclcpp_lifecycle::State &) override
   {
-    for (const auto & joint : info_.joints) {  // A command from before is none.
+    for (const auto & joint : info_.joints) {  // A command from before the activation must not act.
       set_command(joint.name + "/" + hardware_interface::HW_IF_VELOCITY, 0.0);
     }
-    return drive_.activate(parameter("name", "ros2_control")) ? Result::SUCCESS : say(drive_.error());
+    return drive_.activate(parameter("name", "ros2_control")) ? Result::SUCCESS : report(drive_.error());
   }
 
   Result on_deactivate(const rclcpp_lifecycle::State &) override
   {
-    return drive_.deactivate() ? Result::SUCCESS : say(drive_.error());
+    return drive_.deactivate() ? Result::SUCCESS : report(drive_.error());
   }
 
   Result on_cleanup(const rclcpp_lifecycle::State &) override { return end(); }
@@ -61,7 +61,7 @@ public:
   {
     std::array<Wheel, SIDES> wheels;
     if (!drive_.read(wheels)) {
-      (void)say(drive_.error());
+      (void)report(drive_.error());
       return Return::ERROR;
     }
     for (size_t side = 0; side < SIDES; side++) {
@@ -82,7 +82,7 @@ public:
       rad_s[side] = get_command(info_.joints[side].name + "/" + hardware_interface::HW_IF_VELOCITY);
     }
     if (!drive_.write(rad_s)) {
-      (void)say(drive_.error());
+      (void)report(drive_.error());
       return Return::ERROR;
     }
     return Return::OK;
@@ -95,7 +95,7 @@ private:
     return Result::SUCCESS;
   }
 
-  Result say(const std::string & why)
+  Result report(const std::string & why)
   {
     RCLCPP_ERROR(rclcpp::get_logger("iwheel_hardware"), "%s", why.c_str());
     return Result::ERROR;

@@ -2,12 +2,12 @@
 /// @file
 /// Writes one JSON object as one line into a buffer of fixed size.
 ///
-/// Commas are placed by the writer. A name of NULL is for elements of a list. What does not fit sets `overflow` and the
-/// line must not be used. Texts are escaped: what moves a terminal (text.h) stands as `\uXXXX`, and what is no UTF-8 as
-/// U+FFFD. Names are words of ours, in which nothing is to be escaped. No heap, no stdio.
+/// The functions write the commas. Elements of a list have the name NULL. An element that does not fit sets `overflow`,
+/// and the caller must not use the line. Strings are escaped: `\uXXXX` for characters that are not plain (text.h), and
+/// U+FFFD for bytes that are not UTF-8. Names are constants of the program that need no escape. No heap, no stdio.
 ///
-/// Each element is written as a whole, in one or two copies. The functions that take a name are inline, so that the
-/// compiler knows how long a literal one is, unless the program is compiled for size.
+/// Each element is written as a whole, in one or two copies. The functions with a name argument are inline, so that the
+/// compiler knows the length of a literal, unless the program is compiled for size.
 #ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
 #define IWHEEL_NORTHBOUND_JSON_OUT_H
 
@@ -19,78 +19,79 @@
 #include <stdint.h>
 #include <string.h>
 
-/// A line that is being written, in a buffer of the owner's.
+/// A line that is being written, in a buffer of the owner.
 typedef struct {
     char *data;    ///< The buffer.
-    size_t size;   ///< Of the buffer, bytes.
-    size_t length; ///< Written so far, bytes.
-    bool comma;    ///< The next element needs one before it.
-    bool overflow; ///< Something did not fit: the line must not be used.
+    size_t size;   ///< Size of the buffer in bytes.
+    size_t length; ///< Bytes written.
+    bool comma;    ///< The next element needs a comma before it.
+    bool overflow; ///< An element did not fit: the caller must not use the line.
 } iwn_out_t;
 
 /// Part of a text, not terminated.
 typedef struct {
-    const char *text; ///< Its first byte.
-    size_t length;    ///< Bytes.
+    const char *text; ///< First byte.
+    size_t length;    ///< Length in bytes.
 } iwn_span_t;
 
-/// Begins a line, with nothing open.
+/// Begins a line without an open object.
 void iwn_out_init(iwn_out_t *self, char *data, size_t size);
 
-/// Ends the line. Its length with the newline; 0 if it did not fit.
+/// Ends the line. Returns its length with the newline; 0 if it did not fit.
 size_t iwn_out_finish(iwn_out_t *self);
 
-/// `bracket` is the one that was opened, or its counterpart.
+/// Closes an object or list. `bracket` is the opening or the closing bracket.
 void iwn_out_close(iwn_out_t *self, char bracket);
 
-/// The fields of a frame, into an object that is open: for `why` and the event `frame`.
+/// Writes the fields of a frame to an open object, for `why` and the event `frame`.
 void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *json);
 
-/// A value that is JSON already: `true`, a number, a whole object written before.
+/// Writes a value that is JSON: `true`, a number, an object written before.
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value);
-/// A whole number.
+/// Writes an integer.
 void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value);
-/// Whole numbers one after the other. Each of `names` ends with a zero byte, and the last with another one.
+/// Writes several integers. Each of `names` ends with a zero byte, and the last with another one.
 void iwn_out_numbers(iwn_out_t *self, const char *names, const uint32_t *values);
-/// The same with the values as arguments: IWN_OUT_NUMBERS(json, "first\0second\0", 1, 2). A literal adds the last byte.
+/// Does the same with the values as arguments: IWN_OUT_NUMBERS(json, "first\0second\0", 1, 2). The terminator of the
+/// literal is the last byte.
 #define IWN_OUT_NUMBERS(self, names, ...) iwn_out_numbers((self), (names), (const uint32_t[]){__VA_ARGS__})
-/// A NULL text is `null`.
+/// Writes a string; `null` for NULL.
 void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
-/// As `iwn_out_open`, the name as a span.
+/// Opens an object or list like `iwn_out_open`, with the name as a span.
 void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket);
 
-/// A whole text; empty for NULL.
+/// Returns the span of a terminated text; empty for NULL.
 static inline iwn_span_t iwn_span(const char *text) {
     return (iwn_span_t){text, (text != NULL) ? strlen(text) : 0U};
 }
 
 #ifdef __OPTIMIZE_SIZE__
-/// The functions that take a name are compiled once, in json_out.c.
+/// The functions with a name argument are compiled once, in json_out.c.
 #define IWN_OUT_INLINE
 #else
-/// The functions that take a name are inline.
+/// The functions with a name argument are inline.
 #define IWN_OUT_INLINE static inline
 #endif
 
-/// `bracket` is '{' or '['; close with the matching '}' or ']'.
+/// Opens an object or list. `bracket` is '{' or '['; close it with '}' or ']'.
 IWN_OUT_INLINE void iwn_out_open(iwn_out_t *self, const char *name, char bracket);
 
-/// A whole number.
+/// Writes an integer.
 IWN_OUT_INLINE void iwn_out_int(iwn_out_t *self, const char *name, int64_t value);
 
-/// `true` or `false`.
+/// Writes `true` or `false`.
 IWN_OUT_INLINE void iwn_out_bool(iwn_out_t *self, const char *name, bool value);
 
-/// `null`.
+/// Writes `null`.
 IWN_OUT_INLINE void iwn_out_null(iwn_out_t *self, const char *name);
 
-/// `null` unless known. For numbers of 32 bits: without a 64-bit value each argument is in a register.
+/// Writes an integer of 32 bits, or `null` unless known. Without a 64-bit value each argument is in a register.
 IWN_OUT_INLINE void iwn_out_known32(iwn_out_t *self, const char *name, bool known, int32_t value);
 
-/// `null` unless known.
+/// Writes an integer, or `null` unless known.
 IWN_OUT_INLINE void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value);
 
-/// A NULL text is `null`.
+/// Writes a string; `null` for NULL.
 IWN_OUT_INLINE void iwn_out_text(iwn_out_t *self, const char *name, const char *text);
 
 #ifndef __OPTIMIZE_SIZE__

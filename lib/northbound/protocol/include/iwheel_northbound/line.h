@@ -86,7 +86,7 @@ iwn_line_verdict_t iwn_receiver_put(iwn_receiver_t *self, char byte, iwn_line_t 
 /// Reports lost bytes (framing, overrun, a full ring): the present line is not valid.
 void iwn_receiver_spoil(iwn_receiver_t *self);
 
-/// Data in a command that identify it, so that an old command is never taken for a new one: the start of the board, the
+/// Identifies a command, so that the board never executes an old command as a new one: the start of the board, the
 /// number of the command on its channel, and the newest stamp at the time of the command.
 typedef struct {
     char boot[IWN_LINE_BOOT + 1U]; ///< Lower-case hexadecimal digits, terminated.

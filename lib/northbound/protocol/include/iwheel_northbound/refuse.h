@@ -7,7 +7,7 @@
 
 #include "iwheel_northbound/request.h"
 
-/// Data of a message in addition to the request. Texts that may be NULL say so.
+/// Data of a message in addition to the request. The comment of a text states whether it may be NULL.
 typedef struct {
     const iw_snapshot_t *seen; ///< Present snapshot.
     const char *holder;        ///< Lease holder as shown to others.

@@ -27,7 +27,7 @@ void iwn_target_status(iwn_server_t *self, iwn_client_t *client);
 /// Sends the event `state` to clients with `due`, or to all that watch it.
 void iwn_target_state(iwn_server_t *self, const iw_snapshot_t *seen, bool due_only);
 
-// What may be carried out.
+// Decisions whether a request may be executed.
 
 /// Returns true if `self->request` (arm, reset or release) may be passed to the core. Otherwise `self->refusal` has the
 /// reason.
@@ -44,7 +44,7 @@ bool iwn_target_is_key(iwn_server_t *self, const iwn_client_t *client, const cha
 /// the command is too old or cannot show its age; `self->refusal` has the reason.
 bool iwn_target_is_fresh(iwn_server_t *self, iwn_client_t *client, iw_time_us_t *out_sent_us);
 
-// What was carried out.
+// Reports of executed requests.
 
 /// Reports a request of a client for `stop`, `disarm` or `estop`, even if it changes nothing.
 void iwn_target_asked_to_stop(iwn_server_t *self, const iwn_client_t *client);
@@ -68,7 +68,7 @@ void iwn_target_tared(iwn_server_t *self, const iwn_client_t *client, iw_side_t 
 /// Executes a request that only some programs know (confirm, config, recordings, recording), or refuses it.
 void iwn_target_other(iwn_server_t *self, iwn_client_t *client);
 
-// What is told.
+// Contents of events and replies.
 
 typedef enum {
     IWN_CHANGE_BUS = 0,     ///< `word`: its state.

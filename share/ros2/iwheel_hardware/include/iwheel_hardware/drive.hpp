@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Two velocity joints on an iWheel gateway, without ROS: what the hardware interface of ros2_control does.
+// Drives two velocity joints through an iWheel gateway: the logic of the hardware interface of ros2_control, without ROS.
 //
 //     CLOSED --open--> INACTIVE --activate--> ACTIVE --deactivate--> INACTIVE
 //        ^                                      |
@@ -25,7 +25,7 @@ enum Side { LEFT = 0, RIGHT = 1, SIDES = 2 };
 struct Wheel
 {
   double position_rad;    // NaN: not known yet.
-  double velocity_rad_s;  // NaN: not known now.
+  double velocity_rad_s;  // NaN: not known at present.
 };
 
 class Drive
@@ -38,27 +38,28 @@ public:
   Drive(const Drive &) = delete;
   Drive & operator=(const Drive &) = delete;
 
-  // Connects to the gateway's socket (empty: the only one) and reads the wheels' radius from it. Waits up to a second. Arms nothing.
+  // Connects to the gateway's socket (empty: the only one) and reads the wheels' radius from it. Waits up to a second. Does not arm.
   bool open(const std::string & socket);
 
-  // Stops the wheels if they are ours, and closes the connection.
+  // Stops the wheels if this object holds the lease, and closes the connection.
   void close();
 
-  // Asks for the lease under this name; never takes it over. Waits up to half a second.
+  // Requests the lease under this name; never takes it over. Waits up to half a second.
   bool activate(const std::string & name);
 
-  // Ramp to zero. False: the gateway did not answer, and the connection is closed.
+  // Stops with the ramp. Returns false after closing the connection if the gateway did not reply.
   bool deactivate();
 
-  // The newest measurements. False in ACTIVE: a wheel is not known, the gateway has stopped or is silent for SILENT; everywhere: the
-  // connection has ended.
+  // Writes the newest measurements to `out_wheels`. Returns false if the connection has ended; in ACTIVE also if a wheel sends no telemetry, or
+  // the gateway has stopped the wheels or sent nothing for SILENT.
   bool read(std::array<Wheel, SIDES> & out_wheels);
 
-  // One command, rad/s. False: not a number, faster than the protocol can carry, not ACTIVE, or the gateway does not read.
+  // Sends one command, in rad/s. Returns false if a value is not a number or faster than the protocol can carry, the state is not ACTIVE, or
+  // the gateway does not read.
   bool write(const std::array<double, SIDES> & rad_s);
 
   State state() const { return state_; }
-  const std::string & error() const { return error_; }  // Of the last call that returned false, with the fix.
+  const std::string & error() const { return error_; }  // Reason and fix of the last call that returned false.
 
   static constexpr std::chrono::milliseconds SILENT{200};
 
@@ -74,8 +75,8 @@ private:
   std::string error_;
   double radius_m_ = 0.0;
   iwc_state_t newest_ = {};
-  Clock::time_point received_ = {};   // When the newest snapshot came.
-  Clock::time_point activated_ = {};
+  Clock::time_point received_ = {};   // Reception of the newest snapshot.
+  Clock::time_point activated_ = {};  // Grant of the lease.
 };
 
 }  // namespace iwheel_hardware
