@@ -77,7 +77,7 @@ static void tell_file(work_t *work) {
 }
 
 /// Writes a new file, flushes it to the disk, and renames it; never writes into an existing file. The directory is
-/// locked in the meantime, because the store process of a gateway that died may still write.
+/// locked meanwhile, because the store process of a gateway that died may still write.
 static int write_over(const work_t *work, int directory, size_t length) {
     const char *text = &work->message[1];
     (void)unlinkat(directory, work->fresh, 0);
