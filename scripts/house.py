@@ -185,12 +185,12 @@ def facts():
 # ---- layers ---------------------------------------------------------------------------------------------------------
 
 ARCHITECTURE = "docs/developer/architecture.md"
-ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|nobody) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|none) \|$", re.MULTILINE)
 
 
 def permitted():
     """Returns {library or program: those that it may include}, from the table under its heading."""
-    table = (ROOT / ARCHITECTURE).read_text().partition("\n## Who may include whom\n")[2].partition("\n## ")[0]
+    table = (ROOT / ARCHITECTURE).read_text().partition("\n## Permitted includes\n")[2].partition("\n## ")[0]
     return {who: set(re.findall(r"`([\w/]+)`", whom)) for who, whom in ROW.findall(table)}
 
 
