@@ -17,7 +17,7 @@ static void print_line(const char *text) {
     (void)putchar('\n');
 }
 
-/// Prints the present state of the gateway and its meaning, unless --json is given.
+/// Prints the present state of the gateway and its meaning. With --json it prints nothing.
 static void tell_state(const ctl_t *self, const json_t *reply) {
     static const struct {
         const char *state;

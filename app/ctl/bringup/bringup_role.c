@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Meaning of the current next to the speed: tries with only one of the two, and a last try with both. Without the last
-// try, wheels that cannot turn at all would look like a limit.
+// Role of the current in a setpoint: tries with only current or speed, and a last try with both. Without the last try,
+// wheels that cannot turn at all would count as a limit.
 //
 //     current alone turns both           -> setpoint
 //     neither alone, nor 0 with current,

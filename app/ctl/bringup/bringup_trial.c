@@ -301,7 +301,7 @@ static const char *missing(const json_t *status) {
     const json_t *right = json_object_get(status, "right");
     const char *estop = text_word(json_object_get(status, "estop"), "state");
     if (status == NULL) {
-        return "the session's gateway does not answer";
+        return "the gateway of this session does not answer";
     }
     if (!json_is_true(json_object_get(left, "heard")) || !json_is_true(json_object_get(right, "heard"))) {
         return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is offline (power, cable)"

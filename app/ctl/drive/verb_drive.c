@@ -43,7 +43,7 @@ typedef struct {
     int64_t answered_us; ///< Time of the last reply.
     long long applied[2];
     bool limited;
-    unsigned live;       ///< Columns for the progress; 0: stdout is not a suitable terminal, or --json was given.
+    unsigned live;       ///< Columns for the progress; 0 with --json, or if stdout is not a suitable terminal.
     char last_line[512]; ///< With --json: the last reply to a drive command.
 } drive_t;
 

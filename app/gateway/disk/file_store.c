@@ -163,7 +163,7 @@ bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length)
         return false;
     }
     const bool taken = say(self, SAY_WRITE, text, length);
-    self->waits = taken || errno != EAGAIN; // If the process has ended, that is the news.
+    self->waits = taken || errno != EAGAIN; // If the process has ended, the next news report it.
     return taken;
 }
 

@@ -28,7 +28,7 @@
 /// The core never rescales a force. `iw_snapshot_force_validity` also considers the assumption store: the operator and
 /// earlier runs.
 ///
-/// The document gives no thresholds; we chose them.
+/// The document has no thresholds; we chose them.
 #ifndef IW_FORCE_OFFSET_H
 #define IW_FORCE_OFFSET_H
 
