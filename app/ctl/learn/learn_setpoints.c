@@ -225,11 +225,11 @@ static void weigh_length(const learn_t *self, learn_findings_t *out) {
     const bool one = left->low == left->high && right->low == left->low && right->high == left->low;
     if (!enough) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: not %u of them for each wheel; record a longer drive of both",
+                        "length of setpoints: fewer than %u for each wheel; record a longer drive of both",
                         LEARN_FRAMES_MIN);
     } else if (!one || left->low < (int32_t)IW_DLC_SETPOINT || left->low > (int32_t)IW_CAN_DATA_MAX) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: more than one length, so the right one is not known");
+                        "length of setpoints: they differ or are not valid, so the right length is not known");
     } else {
         learn_finding_t *told =
             learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc", LEARN_BOTH,
