@@ -455,7 +455,7 @@ class Watchers(Rights):
             [self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"], capture_output=True, text=True, check=False
         )
         self.assertIn(f"{self.socket} allows watch, stop and estop, but not drive", done.stderr)
-        self.assertIn(f"clients that drive use {self.driving} in group daemon", done.stderr)
+        self.assertIn(f"clients that drive use {self.driving} and are in group daemon", done.stderr)
         self.assertNotEqual(done.returncode, 0)
 
     def test_a_crowd_that_asks_without_end_costs_who_drives_no_gap_and_no_slot(self):

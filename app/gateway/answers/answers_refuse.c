@@ -93,9 +93,10 @@ void iwn_target_say_right(iwn_server_t *server) {
         (void)snprintf(message, size, "this socket is for watching, stop and estop; clients that drive use %s",
                        self->socket);
     } else {
-        (void)snprintf(message, size,
-                       "this socket is for watching, stop and estop; clients that drive use %s in group %s (sudo "
-                       "usermod -aG %s USER, then log in again)",
-                       self->socket, self->group, self->group);
+        (void)snprintf(
+            message, size,
+            "this socket is for watching, stop and estop; clients that drive use %s and are in group %s (sudo "
+            "usermod -aG %s USER, then log in again)",
+            self->socket, self->group, self->group);
     }
 }
