@@ -574,7 +574,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block both")
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
-        operator.expect("if both wheels do not turn, there is no result")
+        operator.expect("unless both wheels turn, there is no result")
         operator.expect("Now no wheel turned")
         self.rig.sim.ask("unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))

@@ -80,7 +80,7 @@ static void try_limit(bringup_t *self, role_t *found) {
         find_setpoint(found, sides, self->current_mA);
         return;
     }
-    talk_say("Neither wheel turned. Last, speed and current together: if both wheels do not turn, there is no result.");
+    talk_say("Neither wheel turned. Last, speed and current together: unless both wheels turn, there is no result.");
     bringup_start_with(self, self->config.core.setpoint_type);
     sides = try_burst(self, &together);
     found->seen = sides == BOTH;

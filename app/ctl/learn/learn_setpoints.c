@@ -85,7 +85,7 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
             "out which type means speed");
     } else if (few != NULL) {
         (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: %s was commanded a speed fewer than %u times; record a longer drive", few,
+                        "setpoint type: %s received a speed fewer than %u times; record a longer drive", few,
                         LEARN_FRAMES_MIN);
     } else {
         weigh_common_type(self, moving_type(left), out);

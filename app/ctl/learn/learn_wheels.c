@@ -52,8 +52,9 @@ static const char *no_sign(const learn_t *self, unsigned side) {
     if (wheel->speeds == 0U) {
         return "the recording has none of its speed frames";
     }
-    return learn_stayed(wheel) ? "it was commanded steady speeds and did not turn"
-                               : "it did not turn for half a second at a steady command of 100 mm/s or more";
+    return learn_stayed(wheel)
+               ? "it was commanded steady speeds and did not turn"
+               : "the recording does not show it turning for half a second at a steady command of 100 mm/s or more";
 }
 
 /// Writes "a positive setpoint is measured as a positive speed" for a commanded direction and its sign.
@@ -95,7 +96,8 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
 static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
         (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: it did not turn for half a second at a steady command of 100 mm/s or more",
+                        "%s mm/s per rpm: the recording does not show it turning for half a second at a steady command "
+                        "of 100 mm/s or more",
                         text_side(side));
         return;
     }

@@ -294,7 +294,8 @@ static void note_death(writer_t *self) {
     (void)snprintf(
         order.note.sentence, sizeof order.note.sentence,
         "the gateway died while setpoints were being sent, the last ones left %d mm/s and right %d mm/s; only "
-        "the wheels' own 1 s watchdog could stop them, at %llu.%03llu s; read its log and the kernel's (dmesg) for the "
+        "the wheels' own 1 s watchdog could stop them (at %llu.%03llu s); read its log and the kernel's (dmesg) for "
+        "the "
         "reason, then start it again",
         applied->wheel[IW_LEFT].speed_mm_s, applied->wheel[IW_RIGHT].speed_mm_s, ms / 1000U, ms % 1000U);
     carry_out(self, &order);

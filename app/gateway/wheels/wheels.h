@@ -20,9 +20,8 @@
 #define GW_WARNING_SIZE 400U
 /// Warning about an e-stop line, by its name, whose button was never tested.
 #define GW_ESTOP_UNTRIED                                                                                               \
-    "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would not be detected; " \
-    "press "                                                                                                           \
-    "it for a second, then release it"
+    "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would not be "           \
+    "detected; press it for a second, then release it"
 
 /// Regularity of setpoint pairs: a histogram of the gaps between them, and the largest gap, since the gateway's start.
 ///
