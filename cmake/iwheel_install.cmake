@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# What `cmake --install` puts where, in components: gateway, tools, ros2, dev (the core for other programs).
+# Files and folders of `cmake --install`, in components: gateway, tools, ros2, dev (the core for other programs).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -8,13 +8,13 @@ install(TARGETS iwheel_core EXPORT iwheelTargets ARCHIVE DESTINATION ${CMAKE_INS
 install(DIRECTORY core/include/iwheel DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
 install(EXPORT iwheelTargets NAMESPACE iwheel:: FILE iwheelConfig.cmake DESTINATION ${iwheel_package_dir} COMPONENT dev)
 write_basic_package_version_file(iwheelConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-# The package may be moved: iwheel.pc tells the prefix from where it lies.
+# The package may be moved: iwheel.pc computes the prefix from its own place.
 file(RELATIVE_PATH IWHEEL_PC_PREFIX /x/${CMAKE_INSTALL_LIBDIR}/pkgconfig /x)
 configure_file(cmake/iwheel.pc.in iwheel.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/iwheelConfigVersion.cmake DESTINATION ${iwheel_package_dir} COMPONENT dev)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/iwheel.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 
-# Manual pages, if what makes them is there. Page, section, component.
+# Manual pages, if their tools are installed. Page, section, component.
 find_program(IWHEEL_SCDOC scdoc DOC "Makes the manual pages; without it there are none")
 find_program(IWHEEL_PYTHON python3 DOC "Makes the manual pages; without it there are none")
 mark_as_advanced(IWHEEL_SCDOC IWHEEL_PYTHON)
@@ -61,7 +61,7 @@ if(TARGET iwheel-gateway)
     install(FILES share/completions/iwheel.bash RENAME iwheelctl
         DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT tools)
     install(FILES share/completions/_iwheelctl DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT tools)
-    foreach(program iwheelctl iwheel-gateway iwheel-sim) # fish looks for a file of each program's name.
+    foreach(program iwheelctl iwheel-gateway iwheel-sim) # fish needs a file for each program.
         install(FILES share/completions/iwheelctl.fish RENAME ${program}.fish
             DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT tools)
     endforeach()
@@ -76,7 +76,7 @@ if(TARGET iwheel-gateway)
             iwheel_man(iwheel-ros2 1 ros2)
         endif()
     else()
-        message(STATUS "LEFT OUT: the manual pages, because scdoc or python3 is missing. Cure: apt-get install scdoc python3")
+        message(STATUS "LEFT OUT: the manual pages, because scdoc or python3 is missing. Fix: apt-get install scdoc python3")
     endif()
 endif()
 

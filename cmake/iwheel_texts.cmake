@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-# iwheel_texts(TARGET NAME FILE...): what a program prints from files, compiled in. The header NAME_texts.h defines for each FILE a string:
-# that of help/status.txt is NAME_status. Made while configuring, so that whoever compiles one file alone has it; an edit configures anew.
+# iwheel_texts(TARGET NAME FILE...): compiles text files into a program. The header NAME_texts.h defines a string for each FILE:
+# the string of help/status.txt is NAME_status. The header is made while configuring, so that tools can compile a single file; after an edit
+# of a text CMake configures again.
 function(iwheel_texts target name)
     set(IWHEEL_TEXTS "")
     foreach(file IN LISTS ARGN)
@@ -18,7 +19,7 @@ function(iwheel_texts target name)
 endfunction()
 
 # iwheel_keys(TARGET NAME FILE): the comments of a configuration file of share/, compiled in for --print-config. The header NAME_keys.h
-# defines the table NAME_keys, a row for each key of FILE (`settings_help_t`). Made while configuring, as above.
+# defines the table NAME_keys, with a row for each key of FILE (`settings_help_t`). It is made while configuring, as above.
 function(iwheel_keys target name file)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/share/${file})
     file(READ ${PROJECT_SOURCE_DIR}/share/${file} rest)

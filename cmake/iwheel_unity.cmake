@@ -8,16 +8,16 @@
 # which makes the executable `unit_<name>` from the sources, links it with the core and Unity, and registers it with
 # CTest as `unit.<name>`. More libraries: target_link_libraries(unit_<name> PRIVATE ...) after it.
 #
-# Looked for in this order; the first that is there is taken:
+# Sources of Unity, in the order of preference:
 #   1. IWHEEL_UNITY_DIR, a folder with unity.c, unity.h and unity_internals.h
 #   2. an installed CMake package that provides unity::framework
 #   3. the copy in Debian's package cmock (Debian 13 and later)
-#   4. what 5 or 6 brought earlier, kept in IWHEEL_UNITY_CACHE outside the build tree
+#   4. the result of an earlier 5 or 6, stored in IWHEEL_UNITY_CACHE outside the build tree
 #   5. the release pinned below, downloaded
 #   6. the copy inside Debian's source package ntpsec
-# Tests are written to the interface of Unity 2.5.1, the oldest of these.
+# Tests use the interface of Unity 2.5.1, the oldest of these.
 
-set(IWHEEL_UNITY_DIR "" CACHE PATH "Folder with unity.c and unity.h; empty: look for Unity")
+set(IWHEEL_UNITY_DIR "" CACHE PATH "Folder with unity.c and unity.h; empty: search for Unity")
 if(DEFINED ENV{XDG_CACHE_HOME})
     set(iwheel_cache_home "$ENV{XDG_CACHE_HOME}")
 elseif(DEFINED ENV{HOME})
@@ -25,13 +25,13 @@ elseif(DEFINED ENV{HOME})
 else()
     set(iwheel_cache_home "${CMAKE_BINARY_DIR}")
 endif()
-set(IWHEEL_UNITY_CACHE "${iwheel_cache_home}/iwheel/unity" CACHE PATH "Where a fetched Unity is kept")
+set(IWHEEL_UNITY_CACHE "${iwheel_cache_home}/iwheel/unity" CACHE PATH "Folder for a downloaded Unity")
 
 set(iwheel_unity_version 2.6.1)
 set(iwheel_unity_url https://github.com/ThrowTheSwitch/Unity/archive/refs/tags/v${iwheel_unity_version}.tar.gz)
 set(iwheel_unity_sha256 b41a66d45a6b99758fb3202ace6178177014d52fc524bf1f72687d93e9867292)
 
-# True in `out_complete` if the folder holds all that is compiled.
+# Sets `out_complete` to true if the folder has all files that are compiled.
 function(iwheel_unity_is_complete folder out_complete)
     set(${out_complete} TRUE PARENT_SCOPE)
     foreach(file unity.c unity.h unity_internals.h)
@@ -41,7 +41,7 @@ function(iwheel_unity_is_complete folder out_complete)
     endforeach()
 endfunction()
 
-# Moves a fetched folder into the cache in one step, so that configurations running side by side never see half of it.
+# Moves a downloaded folder into the cache in one step, so that parallel configurations never see a part of it.
 function(iwheel_unity_keep folder)
     string(RANDOM LENGTH 8 suffix)
     file(MAKE_DIRECTORY "${IWHEEL_UNITY_CACHE}.${suffix}")
@@ -49,7 +49,7 @@ function(iwheel_unity_keep folder)
         file(COPY "${folder}/${file}" DESTINATION "${IWHEEL_UNITY_CACHE}.${suffix}")
     endforeach()
     file(RENAME "${IWHEEL_UNITY_CACHE}.${suffix}" "${IWHEEL_UNITY_CACHE}" RESULT result)
-    if(NOT result EQUAL 0) # Somebody else was first.
+    if(NOT result EQUAL 0) # Another configuration was first.
         file(REMOVE_RECURSE "${IWHEEL_UNITY_CACHE}.${suffix}")
     endif()
 endfunction()
@@ -66,7 +66,7 @@ function(iwheel_unity_download)
             file(ARCHIVE_EXTRACT INPUT "${archive}" DESTINATION "${work}" PATTERNS "*/src/unity*")
             iwheel_unity_keep("${work}/Unity-${iwheel_unity_version}/src")
         else()
-            message(WARNING "Unity: what ${iwheel_unity_url} gave has the wrong SHA-256 ${actual}; not used")
+            message(WARNING "Unity: the file from ${iwheel_unity_url} has the wrong SHA-256 ${actual}; it is not used")
         endif()
     else()
         list(GET status 1 reason)
@@ -85,7 +85,7 @@ function(iwheel_unity_from_debian)
     file(REMOVE_RECURSE "${work}")
 endfunction()
 
-# Sets `out_folder` to a folder with Unity's sources, or to nothing.
+# Sets `out_folder` to a folder with Unity's sources, or to an empty string.
 function(iwheel_unity_find out_folder)
     foreach(folder /usr/share/cmock/vendor/unity/src "${IWHEEL_UNITY_CACHE}")
         iwheel_unity_is_complete("${folder}" complete)
@@ -110,7 +110,7 @@ if(iwheel_unity_folder)
     iwheel_unity_is_complete("${iwheel_unity_folder}" iwheel_unity_complete)
     if(NOT iwheel_unity_complete)
         message(FATAL_ERROR "IWHEEL_UNITY_DIR=${iwheel_unity_folder} lacks unity.c, unity.h or unity_internals.h. "
-            "Give the folder that holds them (in Unity's own tree: src), or leave it empty.")
+            "Set it to the folder that has them (in Unity's own tree: src), or leave it empty.")
     endif()
 else()
     find_package(unity QUIET)
@@ -129,11 +129,11 @@ elseif(TARGET unity::framework)
     add_library(iwheel_unity INTERFACE)
     target_link_libraries(iwheel_unity INTERFACE unity::framework)
 else()
-    message(FATAL_ERROR "The unit tests need Unity and no source of it answered. Give -DIWHEEL_UNITY_DIR=FOLDER with "
+    message(FATAL_ERROR "The unit tests need Unity, and no source of it is available. Set -DIWHEEL_UNITY_DIR=FOLDER with "
         "unity.c and unity.h in it, or -DBUILD_TESTING=OFF to build without tests.")
 endif()
 
-# What many tests share, and needs only the core, is compiled once.
+# Support files of many tests that need only the core are compiled once.
 set(IWHEEL_SHARED_SUPPORT fixture fake_bus gateway_rig gateway_judge permit_rig setpoint_rig)
 
 function(iwheel_shared_support file)
@@ -144,11 +144,11 @@ function(iwheel_shared_support file)
     endif()
 endfunction()
 
-# `main`, for those that have none of their own.
+# `main` for tests without a `main` of their own.
 add_library(iwheel_unit_main STATIC "${PROJECT_SOURCE_DIR}/test/support/unit_main.c")
 target_link_libraries(iwheel_unit_main PRIVATE iwheel_unity iwheel_gnu)
 
-add_custom_target(iwheel_unit_tests) # All of them, and what they need.
+add_custom_target(iwheel_unit_tests) # All unit tests and their dependencies.
 
 function(iwheel_unit_test name)
     set(sources ${ARGN})
@@ -164,5 +164,5 @@ function(iwheel_unit_test name)
     target_link_libraries(unit_${name} PRIVATE iwheel::core iwheel_unit_main iwheel_unity iwheel_gnu)
     add_dependencies(iwheel_unit_tests unit_${name})
     add_test(NAME unit.${name} COMMAND unit_${name})
-    set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 1200) # Some steps of ./check get little of the processor.
+    set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 1200) # Some steps of ./check have little processor time.
 endfunction()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Makes a test program of the simulation fast: core and model are compiled again, together with it, as one program. Not
-# where instrumentation is to see the core as it is shipped.
+# Makes a test program of the simulation fast: core and model are compiled again, together with it, as one program. Do not
+# use it if instrumentation must measure the shipped core.
 #
 #     iwheel_whole_program(<target> <library...>)
 include(CheckIPOSupported)

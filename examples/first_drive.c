@@ -8,16 +8,16 @@
 bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted) {
     iw_config_t config;
     iw_config_default(&config);
-    config.setpoint_type = 1U; // Yours comes from the wheels' vendor: the document lists no values.
+    config.setpoint_type = 1U; // Ask the wheels' vendor for the right type: the document lists no values.
     config.setpoint_type_set = true;
-    config.current_role = IW_ROLE_LIMIT; // The same.
-    config.track_mm = 540U;              // Of your machine, from the middle of one tyre to that of the other.
+    config.current_role = IW_ROLE_LIMIT; // Ask the vendor for this one too.
+    config.track_mm = 540U;              // Measure your machine, from the middle of one tyre to that of the other.
     config.max_speed_mm_s = 500U;
     return iw_gateway_init(gateway, &config, hal, now_us, restarted) == IW_CONFIG_OK;
 }
 
 void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
-    static bool was_armed; // A stop ends it: only a person begins again.
+    static bool was_armed; // After a stop the program does not arm again: a person must start it.
     const iw_drive_t forward = {.speed_mm_s = {200, 200}};
     iw_applied_t applied;
     const bool is_armed = iw_gateway_state(gateway) == IW_STATE_ARMED;
@@ -30,8 +30,8 @@ void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
             iw_gateway_stop(gateway, now_us, CLIENT, IW_CAUSE_CLIENT_STOP);
         }
     } else if (iw_gateway_state(gateway) == IW_STATE_LISTENING && !iw_gateway_arming(gateway)) {
-        (void)iw_gateway_arm(gateway, now_us, CLIENT, false); // Refused: asked again in the next step.
+        (void)iw_gateway_arm(gateway, now_us, CLIENT, false); // If it is refused, the next step tries again.
     } else if (is_armed) {
-        (void)iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Feeds the lease.
+        (void)iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Extends the lease.
     }
 }

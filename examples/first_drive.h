@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-/// Who commands: arms half a second after the start, drives both wheels at 200 mm/s for a second, stops.
+/// Client of the gateway: arms half a second after the start, drives both wheels at 200 mm/s for a second, stops.
 #ifndef FIRST_DRIVE_H
 #define FIRST_DRIVE_H
 
 #include "iwheel/gateway.h"
 
-/// Configures and starts the gateway. `restarted`: the run before this one ended while it was sending. False: the configuration contradicts itself, do not go on.
+/// Configures and starts the gateway. `restarted`: the run before this one ended while it was sending. Returns false if
+/// the configuration is not valid; then do not continue.
 bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted);
 
-/// Before each step.
+/// Arms, drives or stops, depending on the time. Call it before each step.
 void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us);
 
 #endif

@@ -63,7 +63,7 @@ static iw_bus_state_t bus_state(void *context) {
 }
 
 static int purge(void *context) {
-    (void)context; // What was sent is on the bus already.
+    (void)context; // Every sent frame is already on the bus.
     return 1;
 }
 

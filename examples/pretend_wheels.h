@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Two wheels and their bus in a few lines of memory, so that the examples run anywhere. Not a model of the real ones
-/// (that is app/sim): a setpoint is echoed at once, and the wheel turns as told from then on.
+/// Two wheels and their bus in memory, so that the examples run anywhere. They are not a model of real wheels (see
+/// app/sim): a setpoint is echoed immediately, and the wheel has the commanded speed from then on.
 #ifndef PRETEND_WHEELS_H
 #define PRETEND_WHEELS_H
 
@@ -13,10 +13,10 @@ typedef struct {
     int16_t fastest_mm_s;
 } pretend_wheels_t;
 
-/// Once a millisecond: each wheel tells its speed.
+/// Sends the speed message of each wheel. Call it once a millisecond.
 void pretend_wheels_run(pretend_wheels_t *self);
 
-/// The five functions of a port.
+/// Returns the five functions of a port. `self` must exist as long as they are used.
 iw_hal_t pretend_wheels_hal(pretend_wheels_t *self);
 
 #endif

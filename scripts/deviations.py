@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Has everything that is switched off of the static analysis its number and its reason in docs/developer/static.md, and is each still needed?
+"""Fails unless each switched-off check of the static analysis has a number and a reason in docs/developer/static.md, and each number is needed.
 
 usage: deviations.py [ROOT]
 
-Looks at .clang-tidy, ruff.toml and .cppcheck-suppressions, at what compilers are told, and at the comments by which code silences a tool. Whether cppcheck still needs what
-.cppcheck-suppressions accepts, cppcheck tells itself.
+Reads .clang-tidy, ruff.toml and .cppcheck-suppressions, the options of the compilers, and the comments by which code silences a tool. cppcheck itself reports
+entries of .cppcheck-suppressions that it does not need.
 The last line is "N passed, N failed, N skipped". No tool does it: each tool knows its own comments (clang-tidy, `ruff --select RUF100`), none the page.
 """
 
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "docs/developer/static.md"
-# The tool that is silenced, and how: the groups are what of it, several parted by commas.
+# The silenced tool, and the form of the comment or option. The group matches the switched-off checks, separated by commas.
 SILENCERS = [
     ("compilers", r"(-Wno-[\w-]+|-fno-analyzer|no_sanitize\w*)"),
     ("compilers", r"[\"' ](-w)[\"' ]"),
@@ -34,13 +34,13 @@ SILENCERS = [
     ("ruff", r"# (?:ruff: )?(noqa)(?!: ?[A-Z])"),
     ("mypy", r"# type: (ignore[\w\[\],-]*)"),
 ]
-# Files that are nothing but a list of what is switched off: tool, and a line of it: what, and where if it says so.
+# Files that contain only a list of switched-off checks: tool, and the form of a line with the check and, if it has one, the place.
 LISTS = {
     ".clang-tidy": ("clang-tidy", r"^\s+-([a-z][\w.*-]+),?()"),
     "ruff.toml": ("ruff", r'^ +"([A-Z]+\d+)"()'),
     ".cppcheck-suppressions": ("cppcheck", r"^([^#:\n]+):?(.*)$"),
 }
-# Where nothing is looked for: what is built, and where these words stand for themselves.
+# Folders and files that are not searched: build results, and files that contain these words as data.
 ELSEWHERE = {"build", ".git", ".venv", "__pycache__"}
 THEMSELVES = {"scripts/deviations.py", "test/gates/test_planted_faults.py"}
 WORDS = {".md", ".scd", ".svg", ".json.gz"}
@@ -58,7 +58,7 @@ class Row(NamedTuple):
 
 
 def rows_of(page):
-    """The table of deviations; a line of it that is not complete ends the program."""
+    """Returns the table of deviations. An incomplete line ends the program."""
     found = []
     for line in Path(page).read_text().splitlines():
         if re.match(r"\| *D\d", line):
@@ -70,7 +70,7 @@ def rows_of(page):
 
 
 def files_of(root):
-    """(name, text) of whatever may silence a tool."""
+    """Returns (name, text) of all files that may silence a tool."""
     for folder, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if name not in ELSEWHERE)
         for name in sorted(names):
@@ -81,7 +81,7 @@ def files_of(root):
 
 
 def silenced(root):
-    """(tool, what, file, line) of everything that is switched off."""
+    """Returns (tool, check, file, line) of all switched-off checks."""
     for file, text in files_of(root):
         if Path(file).name in LISTS:
             tool, pattern = LISTS[Path(file).name]
@@ -103,9 +103,9 @@ def findings(root):
             yield f"{file}:{line}: {tool}: {what} is switched off there, without a number in {PAGE}"
     for before, row in zip([None, *rows], rows, strict=False):
         if before and int(row.number[1:]) <= int(before.number[1:]):
-            yield f"{row.number} stands behind {before.number}: numbers rise, and none is given twice"
+            yield f"{row.number} is after {before.number}: numbers increase, and none is used twice"
         if row.number not in used:
-            yield f"{row.number} ({row.tool}: {row.what}): nothing needs it any more: delete the row, and give its number to nobody"
+            yield f"{row.number} ({row.tool}: {row.what}): no longer needed: delete the row, and do not use its number again"
 
 
 def main(arguments):

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The structure of the sources: what docs/developer/architecture.md, docs/developer/how-to-add.md and the indexes promise of it. Fails where that is not so.
+"""Checks the structure of the sources against docs/developer/architecture.md, docs/developer/how-to-add.md and the indexes. Fails if one of them is wrong.
 
 usage: house.py facts|layers|pages|pins [ROOT]
 
-facts    the table of facts in docs/developer/architecture.md, each with its limit. What the trees of BUILDS compile outside core/ and test/ is compiled once more,
-         with the members of `iw_gateway_t` called otherwise: a source that names one does not compile.
-layers   who may include whom: every include from one library or program into another must be in the table of docs/developer/architecture.md. And the name
+facts    the table of facts in docs/developer/architecture.md, each with its limit. The sources outside core/ and test/ in the compilation databases of BUILDS are
+         compiled once more, with the members of `iw_gateway_t` renamed: a source that uses a member does not compile.
+layers   permitted includes: every include from one library or program into another must be in the table of docs/developer/architecture.md. And the name
          of a source or header file belongs to one file of core, lib, port and app.
 pages    the indexes of test/, scripts/ and docs/; links of Markdown, and names of pages in every file: each must exist; and the lists of
-         docs/developer/how-to-add.md. A list stands below a comment `<!-- pattern: REGEX  in: PLACE... -->`: the files in those places that have
-         the pattern are those whose names stand in the list, each after its number. A file of test/ may be named too, and must have it then.
-pins     the lists of requirements/: every package that pyproject.toml wants is pinned for each Python and machine, with checksums, and no program
+         docs/developer/how-to-add.md. A list follows a comment `<!-- pattern: REGEX  in: PLACE... -->`: it must contain exactly the files in those places
+         that have the pattern, each after its number. The list may also contain files of test/ that have the pattern.
+pins     the lists of requirements/: every package that pyproject.toml requires is pinned for each Python and machine, with checksums, and no program
          of the tree calls pip without checksums.
 
 No tool does it: clang-tidy has no check of includes between folders, and include-what-you-use judges one file; `uv lock --check` compares with uv.lock, not with lists for pip.
@@ -33,9 +33,9 @@ HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*["<]([^">]+)[">]', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "lib", "port", "app")
-DEPTH = {"core": 4, "app/bridge/ros2": 6}  # Of any other: 5.
+DEPTH = {"core": 4, "app/bridge/ros2": 6}  # All others: 5.
 OUTSIDE = ("lib", "port", "app", "examples", "zephyr")
-# Names that several files may have. CMakeLists.txt, help.txt and README.md are neither source nor header, and are found by their folder.
+# Names that several files may have. CMakeLists.txt, help.txt and README.md are neither source nor header, and their folder identifies them.
 SEVERAL = {"main.c": "one for each program", "board.h": "one for each board; the build chooses the folder"}
 
 
@@ -48,7 +48,7 @@ def name(path):
 
 
 def files_of_a_message():
-    """Production files that name every telemetry message: each new one touches them."""
+    """Returns the production files that name every telemetry message: a new message changes all of them."""
     texts = {path: path.read_text() for path in sources(*PRODUCTION)}
     of = [
         {path for path, text in texts.items() if re.search(rf"\bIW_(CODEC|ID_LEFT|ID_RIGHT|DLC)_{kind}\b|\biw_codec_{kind.lower()}_t\b", text)}
@@ -62,9 +62,9 @@ def public_headers():
 
 
 def depth(path, folders, known):
-    """Headers in these folders and beside it below this file, one in the other."""
+    """Returns the depth of the includes below this file, through headers in these folders and in its own folder."""
     if path not in known:
-        known[path] = 0  # Guards against circles.
+        known[path] = 0  # Ends the recursion in a circle.
         for included in INCLUDE.findall(path.read_text()):
             found = next((folder / included for folder in (path.parent, *folders) if (folder / included).is_file()), None)
             if found:
@@ -73,7 +73,7 @@ def depth(path, folders, known):
 
 
 def deepest(component):
-    """(levels, where) of the file with the most headers of its own library or program below it."""
+    """Returns (levels, name) of the file with the deepest includes within its own library or program."""
     known, folders = {}, [ROOT / component / folder for folder in ("include", "src", ".")]
     return max(((depth(path.resolve(), folders, known), name(path)) for path in sources(component)), default=(0, component))
 
@@ -85,7 +85,7 @@ def private_includes():
 
 
 def members_renamed(folder):
-    """A copy of the core's headers in which nobody outside knows what a member of `iw_gateway_t` is called."""
+    """Writes a copy of the core's headers in which the members of `iw_gateway_t` have other names."""
     subprocess.run(["cp", "-r", str(HEADERS / "iwheel"), folder], check=True)
     path = Path(folder) / "iwheel/gateway.h"
     head, body, tail = re.fullmatch(r"(.*typedef struct iw_gateway \{\n)(.*?)(\n\} iw_gateway_t;.*)", path.read_text(), re.DOTALL).groups()
@@ -115,8 +115,8 @@ def uses_of_parts(builds):
 
 
 def arrows(program):
-    """Ways of one folder of a program into another, by includes: {(from, to)}, the folders ("." is the program's own), and headers
-    that are not included by their folder."""
+    """Returns the includes between the folders of a program: {(from, to)}, the folders ("." is the program's own), and headers
+    that are included without their folder."""
     files = {path.relative_to(program) for path in program.rglob("*.[ch]")}
     names = {path.name: path for path in files}
     used, bare = set(), []
@@ -135,7 +135,7 @@ def arrows(program):
 
 
 def needing_each_other(used):
-    """Folders that can be reached from themselves."""
+    """Returns the folders that lie on a circle of includes."""
     ways = set(used)
     for middle in {way[0] for way in used}:
         ways |= {(a, d) for a, b in ways for c, d in ways if b == middle == c}
@@ -143,16 +143,16 @@ def needing_each_other(used):
 
 
 def fact_of_arrows(program, limit):
-    """Prints how many of the possible arrows a program has; what is wrong with them."""
+    """Prints the number of includes between the folders of a program as a share of the possible ones. Returns the findings."""
     used, folders, bare = arrows(ROOT / program)
     possible = len(folders) * (len(folders) - 1) // 2
     circle = needing_each_other(used)
     percent = 100 * len(used) / possible
-    print(f"arrows between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
+    print(f"includes between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
     return [
         *bare,
-        *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
-        *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else []),
+        *([f"{program}: these include each other: {', '.join(circle)}"] if circle else []),
+        *([f"{len(used)} includes between the folders of {program}"] if percent > limit else []),
     ]
 
 
@@ -165,7 +165,7 @@ def facts():
         ("private headers included outside the core", private_includes(), 0),
         (f"parts of iw_gateway_t named outside the core, in {compiled} files compiled", parts, 0),
         (
-            "lines of app/gateway that name gw_daemon_t, the whole of it",
+            "lines of app/gateway that name gw_daemon_t",
             [line.strip() for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line],
             60,
         ),
@@ -185,17 +185,17 @@ def facts():
 # ---- layers ---------------------------------------------------------------------------------------------------------
 
 ARCHITECTURE = "docs/developer/architecture.md"
-ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|nobody) \|$", re.MULTILINE)
+ROW = re.compile(r"^\| `([\w/]+)` \| ((?:`[\w/]+`(?:, )?)+|none) \|$", re.MULTILINE)
 
 
 def permitted():
-    """{library or program: those that it may include}, by the table under its heading."""
-    table = (ROOT / ARCHITECTURE).read_text().partition("\n## Who may include whom\n")[2].partition("\n## ")[0]
+    """Returns {library or program: those that it may include}, from the table under its heading."""
+    table = (ROOT / ARCHITECTURE).read_text().partition("\n## Permitted includes\n")[2].partition("\n## ")[0]
     return {who: set(re.findall(r"`([\w/]+)`", whom)) for who, whom in ROW.findall(table)}
 
 
 def owner(path, names):
-    """The longest name of the table in whose folder the file is."""
+    """Returns the longest name in the table whose folder contains the file."""
     return max((name for name in names if path.as_posix().startswith(f"{name}/")), key=len, default=path.parts[0])
 
 
@@ -209,20 +209,20 @@ def layers():
     wrong, used = [], set()
     for path in files:
         for included in INCLUDE.findall((ROOT / path).read_text()):
-            plain = re.sub(r"^(?:.*/)?\.\./", "", included)  # However it gets there, it ends in the name of a file.
+            plain = re.sub(r"^(?:.*/)?\.\./", "", included)  # A path with ../ also ends in the name of a file.
             there = {owners[other] for other in named.get(Path(plain).name, ()) if f"/{other.as_posix()}".endswith(f"/{plain}")}
             if there and owners[path] not in there:
-                there = there & table.get(owners[path], set()) or there  # Of several files of that name it is the one in reach.
+                there = there & table.get(owners[path], set()) or there  # If several files have that name, the permitted one is meant.
                 used |= {(owners[path], other) for other in there}
                 wrong += [f"{path} includes {included} of {other}" for other in sorted(there - table.get(owners[path], set()))]
     unused = sorted(f"{who} -> {whom}" for who, all_of in table.items() for whom in all_of if (who, whom) not in used)
     strangers = sorted(set(owners.values()) - set(table))
     wrong += [f"rename one of these: {', '.join(map(str, same))}" for one, same in named.items() if len(same) > 1 and one not in SEVERAL]
-    wrong += [f"take {one} out of SEVERAL: no two files have this name" for one in SEVERAL if len(named.get(one, ())) < 2]
+    wrong += [f"remove {one} from SEVERAL: no two files have this name" for one in SEVERAL if len(named.get(one, ())) < 2]
     wrong += [f"{stranger} is not in the table of {ARCHITECTURE}" for stranger in strangers] + [
-        f"{ARCHITECTURE} permits {pair}, which nobody needs" for pair in unused
+        f"{ARCHITECTURE} permits {pair}, which no file needs" for pair in unused
     ]
-    print(f"{len(files)} files of {len(table)} libraries and programs, {len(used)} permitted arrows")
+    print(f"{len(files)} files of {len(table)} libraries and programs, {len(used)} permitted includes")
     return wrong or ([] if table else [f"{ARCHITECTURE} has no table"])
 
 
@@ -233,7 +233,7 @@ MARK = re.compile(r"<!-- pattern: (.+?)  in: (.+?) -->\n")
 
 
 def files(*places):
-    """What git knows or would add; without git everything there."""
+    """Returns the files that git tracks or would add; without git all files."""
     run = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "--", *places], capture_output=True, text=True, check=False)
     names = (
         run.stdout.split("\n")
@@ -244,7 +244,7 @@ def files(*places):
 
 
 def line_of(name, pattern):
-    """The number of the first line with the pattern; None: there is none."""
+    """Returns the number of the first line with the pattern, or None."""
     text = (ROOT / name).read_text(errors="replace") if (ROOT / name).is_file() else ""
     found = re.search(pattern, text)
     return text.count("\n", 0, found.start()) + 1 if found else None
@@ -261,23 +261,23 @@ def judge_list(title, section):
     wrong = [f"{where}: add a numbered line for `{name}`, which has the pattern in line {line}" for name, line in there.items() if name not in listed]
     for name in listed:
         if not (ROOT / name).is_file():
-            wrong.append(f"{where}: `{name}` is not there: take its line out, or name the file that does this now")
+            wrong.append(f"{where}: `{name}` does not exist: remove its line, or name the file that replaces it")
         elif not line_of(name, pattern):
-            wrong.append(f"{where}: take the line of `{name}` out: nothing in it is like {pattern} any more")
+            wrong.append(f"{where}: remove the line of `{name}`: it does not contain {pattern} any more")
     wrong += [f"{where}: `{name}` is listed twice" for name in set(listed) if listed.count(name) > 1]
     beside = [name for name in re.findall(r"`([\w./-]+/[\w.-]+\.\w+)`", MARK.sub("", section)) if not (ROOT / name).exists()]
-    return wrong + [f"{where}: `{name}` is not there" for name in sorted(set(beside) - set(listed))]
+    return wrong + [f"{where}: `{name}` does not exist" for name in sorted(set(beside) - set(listed))]
 
 
 def judge_how_to_add():
     text = (ROOT / PAGE).read_text(encoding="utf-8")
     sections = re.findall(r"^## (.+)\n((?:(?!^## ).*\n)*)", text, re.MULTILINE)
     found = [line for title, section in sections for line in judge_list(title, section)]
-    return found if sections else [f"{PAGE}: no list is found"], len(sections)
+    return found if sections else [f"{PAGE}: it has no list"], len(sections)
 
 
 def entry(parts, deep):
-    """What an index has of a path below its folder: a file, or the folder that it is in; of the folders in `deep` each entry."""
+    """Returns the entry of an index for a path below its folder: the file or its top folder. The folders in `deep` have one entry per file."""
     depth = 2 if parts[0] in deep else 1
     return "/".join(parts[:depth]) + ("/" if len(parts) > depth else "")
 
@@ -286,8 +286,8 @@ def judge_index(folder, deep=()):
     page = f"{folder}/README.md"
     indexed = re.findall(r"^\| `([^`]+)` \|", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
     entries = {entry(name.split("/")[1:], deep) for name in files(folder)} - {"README.md"}
-    wrong = [f"{page}: add a line `| \\`{name}\\` | what it is for |`" for name in sorted(entries - set(indexed))]
-    return wrong + [f"{page}: take the line of `{name}` out: it is not there" for name in sorted(set(indexed) - entries)], len(entries)
+    wrong = [f"{page}: add a line `| \\`{name}\\` | its purpose |`" for name in sorted(entries - set(indexed))]
+    return wrong + [f"{page}: remove the line of `{name}`: it does not exist" for name in sorted(set(indexed) - entries)], len(entries)
 
 
 PAGE_NAMED = re.compile(r"(?<![\w/.-])docs/[\w./-]+\.(?:md|csv|png)\b")
@@ -295,7 +295,7 @@ LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]+)")
 
 
 def judge_names():
-    """Pages that a file names from the root, and links of Markdown relative to their page, that do not exist."""
+    """Returns the pages and links that do not exist: pages are named from the root, links of Markdown are relative to their page."""
     wrong, count = [], 0
     for file in files("."):
         text = (ROOT / file).read_text(errors="replace")
@@ -324,7 +324,7 @@ def pages():
 
 PYTHONS, MACHINES = ("3.11", "3.12", "3.13"), ("x86_64", "aarch64")
 PIN = re.compile(r"^([\w.-]+)==([^\s;]+)(?: ; ([^\\\n]+?))?((?: *\\\n? *--hash=sha256:[0-9a-f]{64})*)\n((?:    # .*\n)*)", re.MULTILINE)
-# Programs of this tree that call pip, and what must stand next to "install".
+# Calls of pip in this tree, and the options that make them safe.
 CALLS_PIP = re.compile(r"""(?:\bpip3?"?|/pip"|"pip",)\s+"?install\b""")
 SAFE = re.compile(r"--require-hashes|--no-index|\(pip install|^\s*#")
 
@@ -342,9 +342,9 @@ def pins_of_group(group, table):
         (name.lower(), version, Marker(marker or "os_name != ''"), sums, via) for name, version, marker, sums, via in PIN.findall((ROOT / file).read_text())
     ]
     wanted = [Requirement(wish) for wish in wishes(group, table)]
-    print(f"{file}: {len(found)} pins of {len(wanted)} wishes")
+    print(f"{file}: {len(found)} pins of {len(wanted)} requirements")
     yield from (f"{file}: {name} {version} has no checksum" for name, version, _, sums, _ in found if not sums)
-    yield from (f"{file}: {name} is pinned, but nothing wants it" for name, *_, via in found if "via" not in via and name not in {wish.name for wish in wanted})
+    yield from (f"{file}: {name} is pinned, but not required" for name, *_, via in found if "via" not in via and name not in {wish.name for wish in wanted})
     for wish, python, machine in ((wish, python, machine) for wish in wanted for python in PYTHONS for machine in MACHINES):
         where = {"python_version": python, "python_full_version": f"{python}.0", "platform_machine": machine, "sys_platform": "linux"}
         fits = [name for name, version, marker, *_ in found if name == wish.name and wish.specifier.contains(version) and marker.evaluate(where)]

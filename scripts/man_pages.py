@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Prints a manual page in scdoc's form: that of man/, with what the programs print, and documents of ours, in place of its lines
+"""Prints a manual page in scdoc's form: the page of man/, in which the output of the programs and documents of this tree replace the lines
 
-    ; file FILE...       files of ours as they are, in one block
-    ; document FILE      a document of ours, from Markdown
+    ; file FILE...       unchanged files of this tree, in one block
+    ; document FILE      a document of this tree, from Markdown
     ; header FILE        the contract in a public header
-    ; iwheelctl          what `iwheelctl --help` prints
+    ; iwheelctl          the output of `iwheelctl --help`
     ; verbs              the same for each of its verbs
 
-usage: man_pages.py PAGE.scd [--depends FILE PAGE]    FILE: for make, what PAGE is made of
+usage: man_pages.py PAGE.scd [--depends FILE PAGE]    writes the sources of PAGE into FILE, in the form of make
 
-It runs none of the programs: a cross build makes the same pages. No tool does it: scdoc includes no files and reads no Markdown; help2man runs programs.
+It does not run the programs, so a cross build makes the same pages. No tool does it: scdoc includes no files and reads no Markdown; help2man runs programs.
 """
 
 import argparse
@@ -38,11 +38,11 @@ class Sources:
             return file.read()
 
     def verb_pages(self):
-        """In the order of the program's table."""
+        """Returns the pages of the verbs in the order of the program's table."""
         return {verb: self.read(f"app/ctl/help/{verb}.txt") for verb in re.findall(r"\{VERB\((\w+),", self.read("app/ctl/help.c"))}
 
     def iwheelctl(self):
-        """As help_print() does it."""
+        """Returns the output of help_print() of iwheelctl."""
         summaries = "".join(f"  {verb:<9}{page.split(f'{verb}: ', 1)[1].split(chr(10), 1)[0]}\n" for verb, page in self.verb_pages().items())
         return literal(self.read("app/ctl/help/iwheelctl.txt").replace("\nVERBS\n", "\n" + summaries, 1))
 
@@ -53,7 +53,7 @@ class Sources:
         return literal("".join(self.read(name) for name in names))
 
     def header(self, name):
-        """Without what only a compiler needs."""
+        """Returns the header without the lines that only a compiler needs."""
         text = re.sub(
             r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", self.read(name), flags=re.M
         )
@@ -64,7 +64,7 @@ class Sources:
 
 
 def inline(text):
-    """Markdown within a line, to scdoc. Code and emphasis are bold, links are their text."""
+    """Converts Markdown within a line to scdoc. Code and emphasis become bold, links become their text."""
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
     out = []
     for part in re.split(r"(`[^`]*`|\*\*[^*]+\*\*|\*[^*]+\*)", text):
@@ -111,7 +111,7 @@ def from_markdown(text):
 def main():
     parser = argparse.ArgumentParser(description="Prints a manual page in scdoc's form.")
     parser.add_argument("page", metavar="PAGE.scd")
-    parser.add_argument("--depends", nargs=2, metavar=("FILE", "PAGE"), help="write into FILE, for make, what PAGE is made of")
+    parser.add_argument("--depends", nargs=2, metavar=("FILE", "PAGE"), help="write the sources of PAGE into FILE, in the form of make")
     options = parser.parse_args()
     sources = Sources()
     sys.stdout.reconfigure(encoding="utf-8")

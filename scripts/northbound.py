@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes what is derived from share/northbound.json, the description of the northbound protocol.
+"""Generates files from share/northbound.json, the description of the northbound protocol.
 
-usage: northbound.py --check     fail unless the Python client's types and the C reader's fields are what it makes of the description
+usage: northbound.py --check     fail unless the Python client's types and the C parser's fields are up to date
        northbound.py --update    write them again
 
 The form of the description: `requests`, `events` and `objects` have `fields`, each with
@@ -15,11 +15,12 @@ The form of the description: `requests`, `events` and `objects` have `fields`, e
     unit       of an integer whose name does not end in one of `units`
     least, most, default, bytes    of a field of a request
 
-`extends` names an object whose fields come before. `reply` of a request and `topic` of an event say the rest. What is sent beside that is
-`cmd` and `id` of a request, `id` and `ok` of a reply, `event` of an event. A refusal is the object `refusal`.
+`extends` names an object whose fields precede the own ones. `reply` names the object of a reply, `topic` the topic of an event. In addition each
+request has `cmd` and `id`, each reply `id` and `ok`, each event `event`. A refusal is the object `refusal`.
 
-Its form, docs/user/northbound.md and the words of the C sources are judged by test/northbound, the gateway by python/tests/test_protocol.py. No tool
-does it: JSON Schema has neither units nor words with a meaning, and datamodel-code-generator (PyPI), which writes TypedDicts from it, writes no C.
+test/northbound checks the form of the description, docs/user/northbound.md and the words of the C sources; python/tests/test_protocol.py checks the
+gateway. No tool does it: JSON Schema has neither units nor words with a meaning, and datamodel-code-generator (PyPI), which writes TypedDicts from
+it, writes no C.
 """
 
 import json
@@ -49,7 +50,7 @@ class Description:
         self.objects, self.requests, self.events = self.raw["objects"], self.raw["requests"], self.raw["events"]
 
     def fields(self, holder):
-        """All fields of an object, request or event: its own and those it extends."""
+        """Returns all fields of an object, request or event: its own and those that it extends."""
         before = self.fields(self.objects[holder["extends"]]) if "extends" in holder else {}
         return {**before, **holder["fields"]}
 
@@ -74,7 +75,7 @@ def camel(name):
 
 
 class Types:
-    """Python's text of all that a reply can hold."""
+    """The Python source of all types that a reply can contain."""
 
     def __init__(self, description, replies):
         self.description = description
@@ -83,7 +84,7 @@ class Types:
             self.define(name)
 
     def define(self, name):
-        """After what it is made of."""
+        """Adds the type after the types of its fields."""
         if name in self.done or name in PLAIN:
             return
         self.done.add(name)
@@ -115,10 +116,10 @@ class Types:
         self.blocks.append("\n".join(lines))
 
     def set_apart(self, name, base, kind, fields):
-        """A class cannot have keys that are Python's own words, nor some that may be missing. What the class extends then."""
+        """Adds a base class for keys that are keywords of Python, or that are optional, because a class cannot have them. Returns its name."""
         if not fields:
             return base
-        assert base == "TypedDict", f"{name} extends something already"
+        assert base == "TypedDict", f"{name} already extends a type"
         apart = f"_{camel(name)}{kind}"
         if kind == "Partly":
             self.blocks.append("\n".join([f"class {apart}(TypedDict, total=False):", *(f"    {key}: {self.type_of(field)}" for key, field in fields.items())]))
@@ -151,7 +152,7 @@ def python_types(description):
     return HEADER + "\n" + re.sub(r"(\nclass [^\n]*\n(?:    [^\n]*\n|\n(?=    ))*)\n(?=[A-Z_])", r"\1\n\n", body) + "\n"
 
 
-# The C reader's table ------------------------------------------------------------------------------------------------
+# The table of the C parser -------------------------------------------------------------------------------------------
 
 FIELDS_HEADER = """// SPDX-License-Identifier: MIT
 // The requests and their fields, except cmd and id. Written by scripts/northbound.py from share/northbound.json.
@@ -161,7 +162,12 @@ FIELDS_HEADER = """// SPDX-License-Identifier: MIT
 /// Names in the order of iwn_cmd_t.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
-MEMBERS = {"side": "sides", "recording.name": "file", "drive.key": "lease_key", "twist.key": "lease_key"}  # Of iwn_request_t, where it is called otherwise.
+MEMBERS = {
+    "side": "sides",
+    "recording.name": "file",
+    "drive.key": "lease_key",
+    "twist.key": "lease_key",
+}  # Members of iwn_request_t that have another name than the field.
 
 
 def c_kind(field):
@@ -171,7 +177,7 @@ def c_kind(field):
 
 
 def c_macro(name, rows):
-    """A macro of several lines, as clang-format sets them."""
+    """Returns a macro of several lines in the form of clang-format."""
     lines = [f"#define {name}", *(f"    {row}" for row in rows)]
     return "\n".join([*(f"{line:119}\\" for line in lines[:-1]), lines[-1]])
 
@@ -200,8 +206,8 @@ def main(arguments):
             with open(os.path.join(ROOT, path), "w", encoding="utf-8") as file:
                 file.write(text)
         elif not os.path.exists(os.path.join(ROOT, path)) or read(path) != text:
-            found.append(f"{path} is not what share/northbound.json makes of it; fix: scripts/northbound.py --update")
-    print("\n".join(found) or "the Python client's types and the C reader's fields are those of share/northbound.json")
+            found.append(f"{path} does not match share/northbound.json; fix: scripts/northbound.py --update")
+    print("\n".join(found) or "the Python client's types and the C parser's fields match share/northbound.json")
     return 1 if found else 0
 
 

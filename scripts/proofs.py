@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compares docs/developer/proofs.csv, the list of every proof, with what the tree has now.
+"""Compares docs/developer/proofs.csv, the list of every proof, with the tree.
 
 usage: scripts/proofs.py [--update] [TABLE]
 
 A row is a step of ./check (the tests STEP and STEP.* of test/all/steps.cmake), or one of several proofs in a step. `number` is a minimum of single
-tests. It fails: a step without a row, a row whose step or runner is no longer there, or that went to a longer list, and a number that has become
-smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts); a step that was not
-run here is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
+tests. Failures: a step without a row, a row whose step or runner does not exist any more or has moved to a longer list, and a number that has become
+smaller. Numbers come from the runners' lists, from the sources, and from the last run of the step (build/check/STEP*.counts). A step that did not
+run is "not run", which is no pass. --update raises numbers and adds steps. No tool does it: CTest and pytest compare no list with an earlier one.
 """
 
 import csv
@@ -22,7 +22,7 @@ TESTS = ROOT / "test/all/steps.cmake"
 FIELDS = ("id", "what", "command", "number", "list")
 LISTS = ("quick", "check", "ci", "full")
 TIMEOUT_S = 600
-# Proofs inside steps: (what, command of the runner that lists them) or (what, files, what begins each single test in them).
+# Proofs inside steps: (description, command of the runner that lists them) or (description, files, pattern of a single test in them).
 LISTED = {
     "system.scenarios": ("scenarios on the local bus", "-m pytest --collect-only -q test/system/test_scenarios.py"),
     "serial.wires": ("scenarios of the relay", "-m pytest --collect-only -q test/serial/test_wires.py"),
@@ -31,7 +31,7 @@ LISTED = {
     "mqtt.trials": ("trials of the MQTT bridge", "-m pytest --collect-only -q test/mqtt"),
     "web.trials": ("trials of the web bridge", "-m pytest --collect-only -q test/web"),
     "kernel.check": ("tests on a real kernel", "test/kernel/run --list"),
-    "kernel.full": ("the same, the long ones too", "test/kernel/run --list --full"),
+    "kernel.full": ("the same, with the long ones", "test/kernel/run --list --full"),
     "python.tests": ("tests of the Python client", "-m pytest --collect-only -q python/tests"),
     "service.tests": ("tests of the service", "-m pytest --collect-only -q test/service"),
 }
@@ -50,7 +50,7 @@ COUNTED = {
 
 
 def steps():
-    """{step: the shortest list that has all of it: quick, check, ci; but full only if all of it is there}"""
+    """Returns {step: the shortest list that has all tests of the step: quick, check, ci; full only if all of them are in it}."""
     found = {}
     for name, where in re.findall(r"^ *(?:build\(|tests\(|test\((?:idle|real) )([a-z0-9_]+)\S* (quick|check|ci|full)", TESTS.read_text(), re.M):
         found[name] = max(found.get(name, "quick"), where, key=LISTS.index) if where != "full" or name not in found else found[name]
@@ -58,17 +58,17 @@ def steps():
 
 
 def listed(command):
-    """How many tests the runner lists; None if what it needs is missing here."""
+    """Returns the number of tests that the runner lists; None if a tool of the runner is missing."""
     python = ROOT / ".venv/bin/python"
     words = [str(python) if python.exists() else sys.executable, *command.split()]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     if done.returncode != 0 and not re.search("ModuleNotFoundError|No module named", done.stdout + done.stderr):
-        return 0  # The runner, or its list, is gone or broken.
+        return 0  # The runner or its list is missing or broken.
     return sum("::" in line or "pytest" not in command for line in done.stdout.splitlines()) if done.returncode == 0 else None
 
 
 def last_run(step):
-    """Single tests that the step ran here last; None if it did not run, or skipped some."""
+    """Returns the number of single tests in the last run of the step; None if it did not run, or skipped some."""
     paths = [*ROOT.glob(f"build/check/{step}.counts"), *ROOT.glob(f"build/check/{step}.*.counts")]
     counts = [list(map(int, path.read_text().split())) for path in paths]
     return None if not (ROOT / f"build/check/{step}.counts").exists() or any(sum(one[2:]) for one in counts) else sum(map(sum, counts))
@@ -84,7 +84,7 @@ def number_of(name):
 
 
 def rows_now(known, table):
-    """Every row that there must be: (id, what, command, list)."""
+    """Yields every required row: (id, description, command, list)."""
     for name, where in known.items():
         yield name, table.get(name, {}).get("what", ""), f"./check {name}", where
     for name, (what, *_) in {**LISTED, **COUNTED}.items():
@@ -108,11 +108,11 @@ def main(arguments):
             wrong.append(f"{name}: in list {where}, {table[name]['list']} recorded; a proof does not change its list without a reason")
     for name, row in table.items():
         if name.split(".")[0] not in known or ("." in name and name not in LISTED and name not in COUNTED):
-            wrong.append(f"{name}: lost its place in list {row['list']}; restore the proof, or move its row with a reason")
+            wrong.append(f"{name}: no longer in list {row['list']}; restore the proof, or move its row with a reason")
             continue
         now = number_of(name)
         if row["number"] and now is not None and now < int(row["number"]):
-            wrong.append(f"{name}: {now} single tests, {row['number']} recorded; restore what is gone")
+            wrong.append(f"{name}: {now} single tests, {row['number']} recorded; restore the missing ones")
         if now is None:
             print(f"not run: {name}")
     if "--update" in arguments:

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Fails unless a portable library is what it promises: no mutable data, nothing from libc but mem*, no floating point.
+"""Fails unless a portable library has no mutable data, no functions of libc except mem*, and no floating point.
 
 usage: purity.py [--strings] [--on BASE] LIBRARY SOURCE_DIR
 
-LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too,
-with --on what another library has, which is as portable. No tool does it: `nm` lists the symbols (this judges them), and gcc has no warning for data
-that is mutable.
+LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may also use a few functions of
+str*, with --on those of another portable library. No tool does it: `nm` lists the symbols without a judgement, and gcc has no warning for mutable
+data.
 """
 
 import argparse
@@ -28,7 +28,7 @@ COMMENT = re.compile(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", re.DOTALL)
 
 
 def symbols_of(library):
-    """[(object file, kind as nm has it, name)]"""
+    """Returns [(object file, kind as nm prints it, name)]."""
     run = subprocess.run(["arm-none-eabi-nm", "-A", library], capture_output=True, text=True, check=True)
     rows = [re.match(r"(?:.*:)?([^:]+):(?:[0-9a-f]+)?\s+(\w) (\S+)$", line) for line in run.stdout.splitlines() if line]
     return [row.groups() for row in rows if row]
@@ -41,7 +41,7 @@ def symbol_findings(library, allowed):
         yield f"{library} holds no symbols"
     for unit, kind, name in symbols:
         if kind in MUTABLE:
-            yield f"{unit}: {name}: mutable data (nm says {kind})"
+            yield f"{unit}: {name}: mutable data (kind {kind} of nm)"
         if kind == "U" and name not in defined and name not in allowed and not RUNTIME.match(name):
             yield f"{unit}: {name}: undefined, and neither allowed ({', '.join(sorted(allowed & (LIBC | STRINGS)))}) nor an integer helper of the compiler"
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Is docs/developer/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
-And the threat model in docs/developer/threat-model.md: each interface has tests, and they exist.
+"""Fails unless docs/developer/safety-case.md is right: every name on it exists, every rule has code and a test, every seeded fault has a rule.
+Also fails unless each interface of the threat model in docs/developer/threat-model.md has tests that exist.
 
 usage: safety_case.py [--update]
 
---update writes the lists of seeded faults and of the fault catalogue's tests; both follow from the sources.
+--update writes the lists of seeded faults and of the fault catalogue's tests, which are generated from the sources.
 The last line is "N passed, N failed, N skipped". No tool does it: doorstop and StrictDoc (PyPI) keep requirements and links in files of their own form,
 and do not know seeded faults.
 """
@@ -19,9 +19,9 @@ PAGE, THREATS = ROOT / "docs/developer/safety-case.md", ROOT / "docs/developer/t
 sys.path.insert(0, str(ROOT / "test/faults"))
 import table
 
-FAULTS = sorted({*range(1, 35)} - {31})  # The rows of the fault catalogue; what happens in each is written on the page.
+FAULTS = sorted({*range(1, 35)} - {31})  # The rows of the fault catalogue; the page describes the effect of each.
 INTERFACES = 11
-# Tested elsewhere under other names.
+# Rows whose tests have other names.
 OTHER_TESTS = {
     21: ("sim.directed",),
     26: ("hang",),
@@ -34,12 +34,12 @@ OTHER_TESTS = {
         "test_one_person_board_refuses_late_requests",
     ),
 }
-# Tests of a row by the first part of their names, beside those that begin with rowNN_.
+# More tests of a row, by the first part of their names, in addition to those that begin with rowNN_.
 PREFIXES = {32: "test_one_person_", 33: "test_stop_never_"}
 
 
 def defined_tests():
-    """Every test's name, in C and in Python."""
+    """Returns the names of all tests, in C and in Python."""
     names = set()
     for path in (ROOT / "test").rglob("*.c"):
         names.update(re.findall(r"^(?:static void |TEST\()(test_\w+)(?:\(void)?\) \{", path.read_text(), re.M))
@@ -49,7 +49,7 @@ def defined_tests():
 
 
 def oracle_rules():
-    """The numbers of all rules that the oracle and the rigs can find broken."""
+    """Returns the numbers of all rules whose violation the oracle and the rigs can detect."""
     numbers = set()
     for folder in ("sim", "orders"):
         for path in (ROOT / "test" / folder).glob("*.c"):
@@ -61,7 +61,7 @@ def oracle_rules():
 
 
 def sections(text):
-    """{rule: {what: the rest of that line}}"""
+    """Returns {rule: {kind of line: the rest of that line}}."""
     found = {}
     for rule, body in re.findall(r"^### (R\d+) .*?\n(.*?)(?=^##)", text, re.M | re.S):
         found[rule] = dict(re.findall(r"^- (code|oracle|tests|faults): (.+)$", body, re.M))
@@ -92,9 +92,9 @@ def rule_findings(rule, entry, tests, bugs):
     if not named or "`" not in entry["code"]:
         yield f"{rule}: without code or test"
     if not re.match(r"none, ", entry["faults"]) and set(re.findall(r"`([\w-]+)`", entry["faults"])) != set(bugs_of(rule, bugs)):
-        yield f"{rule}: its seeded faults are others in test/faults; scripts/safety_case.py --update writes them"
+        yield f"{rule}: test/faults has other seeded faults; scripts/safety_case.py --update writes them"
     if re.match(r"none, ", entry["faults"]) and bugs_of(rule, bugs):
-        yield f"{rule}: says that no fault is seeded, but there are some"
+        yield f"{rule}: the page has no seeded fault, but test/faults has some"
 
 
 def findings(text, tests, bugs, rules):
@@ -103,13 +103,13 @@ def findings(text, tests, bugs, rules):
         yield from rule_findings(rule, entry, tests, bugs)
     for bug in bugs:
         if bug.rule not in found and not any(ROOT.glob(f"docs/*/{bug.rule}.md")):
-            yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither here nor a page of docs/"
+            yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither on this page nor a page of docs/"
     told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
-    yield from (f"rule {number} of the oracle belongs to no rule here" for number in sorted(rules - told))
+    yield from (f"rule {number} of the oracle belongs to no rule on this page" for number in sorted(rules - told))
     yield from (f"the oracle has no rule {number}" for number in sorted(told - rules))
     answered = re.findall(r"^\| (H\d+) .*\| (R\d+(?:, R\d+)*) \|$", text, re.M)
     for hazard, by in answered:
-        yield from (f"{hazard}: {rule} is not here" for rule in by.split(", ") if rule not in found)
+        yield from (f"{hazard}: {rule} is not on this page" for rule in by.split(", ") if rule not in found)
     yield from (f"{rule} answers no hazard" for rule in found if not any(rule in by.split(", ") for _, by in answered))
     for number in FAULTS:
         row = re.search(rf"^\| {number} \|[^|]*\|([^|]*)\|$", text, re.M)
@@ -124,7 +124,7 @@ def findings(text, tests, bugs, rules):
 
 
 def threat_findings(text, tests):
-    """Of the threat model: each interface with all that is asked of it, and tests that exist."""
+    """Yields the faults of the threat model: interfaces with an empty cell, and tests that do not exist."""
     rows = re.findall(r"^\| ([^|]+) \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", text.partition("## Threats,")[2].partition("\n## ")[0], re.M)[1:]
     for interface, who, _, stops, remains, tested in rows:
         named = re.findall(r"`(\w+)`", tested)
@@ -155,7 +155,7 @@ def update(text, tests, bugs):
 
 
 def self_test(text, tests, bugs, rules):
-    """Planted in the page: each must be found."""
+    """Seeds faults in the page, and returns the number that is not found, and the number of all."""
     faults = [
         text.replace("`step.c: watch_loop`", "`step.c: watch_nothing`"),
         text.replace("`row01_client_killed`", "`row01_client_kissed`"),
@@ -189,7 +189,7 @@ def main(arguments):
     missed, planted = self_test(text, tests, bugs, rules)
     print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")
     if missed:
-        print(f"failed: {missed} of {planted} faults planted in the page are not found")
+        print(f"failed: {missed} of {planted} faults seeded in the page are not found")
     print(f"{len(sections(text))} rules, {len(bugs)} seeded faults, {len(rules)} rules of the oracle")
     print(f"{len(sections(text)) + planted - missed - (1 if found else 0)} passed, {len(found) + missed} failed, 0 skipped")
     return 1 if found or missed else 0

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Writes the software bill of materials of what is shipped, as SPDX 2.3 JSON: what is in it, what it links and needs, what built it.
+"""Writes the software bill of materials of the shipped files, as SPDX 2.3 JSON: their contents, linked libraries, dependencies and build tools.
 
-usage: sbom.py FOLDER          the folder of the .deb files and their .buildinfo, of the Python wheel, and in images/ of the firmware (.elf, .bin,
-                               .hex, and the linker's .map); writes iwheel-gateway_VERSION_ARCH.spdx.json there
+usage: sbom.py FOLDER          FOLDER has the .deb files with their .buildinfo, the Python wheel, and in images/ the firmware (.elf, .bin, .hex, and
+                               the linker's .map); writes iwheel-gateway_VERSION_ARCH.spdx.json there
 
-The same files give the same bytes. test/debian/judge_bill.py compares them. Needs a Debian on which the linked libraries are installed. No tool does
-it: distro2sbom (PyPI) lists what is installed on a machine or what a package depends on, not what a program in a .deb links, nor what is linked
-into firmware; spdx-tools (PyPI) only reads and writes the form.
+The same files result in the same bytes. test/debian/judge_bill.py compares them. Needs a Debian on which the linked libraries are installed. No tool
+does it: distro2sbom (PyPI) lists the packages of a machine or the dependencies of a package, not the libraries of a program in a .deb, nor those
+in firmware; spdx-tools (PyPI) only reads and writes the form.
 """
 
 import base64
@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = ("gcc-[0-9]+", "binutils", "cmake", "debhelper", "dpkg-dev", "scdoc")
 IMAGE_TOOLS = ("gcc-arm-none-eabi", "binutils-arm-none-eabi", "cmake")
 PAGE = "usr/share/iwheel-web"
-# What of the page others have made: its name in scripts/web_assets, and how the npm package calls the files.
+# Files of the page from other projects: the name in scripts/web_assets, and the names in the npm package.
 UPLOT = ("uplot", {"uPlot.iife.min.js": "dist/uPlot.iife.min.js", "uPlot.min.css": "dist/uPlot.min.css", "uPlot.LICENSE": "LICENSE"})
 
 
@@ -39,11 +39,11 @@ def checksum(path):
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-# ---- what the files say ---------------------------------------------------------------------------------------------
+# ---- contents of the files ------------------------------------------------------------------------------------------
 
 
 def shipped(folder):
-    """The files that people install or flash."""
+    """Returns the files that people install or flash."""
     found = [path for kind in ("*.deb", "*.whl", "images/*") for path in glob.glob(f"{folder}/{kind}")]
     return sorted(path for path in found if "-dbgsym" not in path and not path.endswith(".map"))
 
@@ -53,7 +53,7 @@ def field(deb, name):
 
 
 def depends(deb):
-    """{name: (relation, version), or None} of what the package depends on, the first of alternatives."""
+    """Returns {name: (relation, version), or None} of the package's dependencies; the first one of alternatives."""
     found = {}
     for part in f"{field(deb, 'Pre-Depends')}, {field(deb, 'Depends')}".split(","):
         match = re.match(r"\s*([a-z0-9.+-]+)(?::any)?\s*(?:\((\S+) ([^)]+)\))?", part)
@@ -63,7 +63,7 @@ def depends(deb):
 
 
 def linked_libraries(root):
-    """The sonames that the programs and libraries in that folder need."""
+    """Returns the sonames that the programs and libraries in that folder need."""
     found = set()
     for path in (path for path in Path(root).rglob("*") if path.is_file() and not path.is_symlink()):
         with open(path, "rb") as file:
@@ -73,27 +73,27 @@ def linked_libraries(root):
 
 
 def package_of(name, architecture):
-    """The installed Debian package that brings a library or archive, given by soname or path."""
+    """Returns the installed Debian package that contains a library or archive, named by soname or path."""
     lines = output("dpkg", "-S", name if name.startswith("/") else f"*/{name}").splitlines()
     names = sorted(line.split(": ")[0] for line in lines)
     return next((name for name in names if name.endswith(f":{architecture}")), names[0]).split(":")[0]
 
 
 def version_of(name):
-    """Of an installed package; what is not installed here has none."""
+    """Returns the version of an installed package; NOASSERTION if it is not installed."""
     done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", name], capture_output=True, text=True, check=False)
     return done.stdout if done.returncode == 0 and done.stdout else "NOASSERTION"
 
 
 def archives(linker_map):
-    """The Debian packages of the archives of which the linker took something."""
+    """Returns the Debian packages of the archives that the linker has used."""
     text = Path(linker_map).read_text().partition("Discarded input sections")[0]
     paths = {os.path.realpath(path) for path in re.findall(r"^(/\S+\.a)\(", text, re.M)}
     return {package_of(path, "") for path in paths if path.startswith("/usr/lib/")}
 
 
 def foreign_files(root):
-    """{file of the page: checksum} of those that are not this project's."""
+    """Returns {file of the page: checksum} of the files from other projects."""
     own = {checksum(path) for path in (ROOT / "app/bridge/web/page").iterdir()}
     # Its texts are one file when it is installed, and each file has a compressed form of the same bytes, which the bridge compares.
     page = list(Path(root, PAGE).glob("*"))
@@ -102,7 +102,7 @@ def foreign_files(root):
 
 
 def facts(folder):
-    """{file: what it says of itself}, by the file's name: found in the files alone."""
+    """Returns {file: its facts}, by the file's name, read from the files alone."""
     found, own = {}, {field(path, "Package") for path in shipped(folder) if path.endswith(".deb")}
     for path in shipped(folder):
         name = os.path.basename(path)
@@ -144,7 +144,7 @@ def package(name, version, **more):
 
 
 def uplot(files):
-    """The plot library in the page, as scripts/web_assets pins it."""
+    """Returns the plot library in the page with the pins of scripts/web_assets."""
     name, paths = UPLOT
     version, pinned = re.search(rf"^bring {name} (\S+) (\S+)", (ROOT / "scripts/web_assets").read_text(), re.M).groups()
     told = "; ".join(f"{PAGE}/{file} is {paths[file]}, sha256 {files[file]}" for file in sorted(files) if file in paths)
@@ -174,11 +174,11 @@ class Bill:
             self.relations.append(row)
 
     def debian(self, name, version=None):
-        """The entry of a package of the distribution."""
+        """Returns the entry of a package of the distribution."""
         return self.others.setdefault(name, package(name, version or version_of(name), supplier="Organization: Debian"))["SPDXID"]
 
     def add(self, name, version, file, fact):
-        """One of ours with what its file says."""
+        """Returns the entry of a package of this project, with the facts of its file."""
         mine = package(
             name,
             version,
@@ -201,7 +201,7 @@ class Bill:
 
 
 def describe(folder, found):
-    """The document."""
+    """Returns the document."""
     bill, buildinfo = Bill(), glob.glob(f"{folder}/*.buildinfo")[0]
     debs = {file: os.path.join(folder, file) for file in found if file.endswith(".deb")}
     names = {field(path, "Package") for path in debs.values()}

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Sizes of the core on Cortex-M and of the STM32 images: writes docs/developer/sizes.md, or fails if the committed one is not true any more.
+"""Measures the core on Cortex-M and the STM32 images: writes docs/developer/sizes.md, or fails if the committed page has other sizes.
 
 usage: sizes.py --update|--check M0PLUS_BUILD_DIR M3_BUILD_DIR M4_BUILD_DIR
 
-A number may differ from the committed one by 2 % or 8 bytes, whichever is more. What is linked for a use must fit the limit in USES. The images are
+A number may differ from the committed one by 2 % or 8 bytes, whichever is more. The linked code of each use must fit the limit in USES. The images are
 those of the presets arm-m3 and arm, which listen, of the build next to arm that ends in -f446, and of the builds next to these that end in -demo and
--gateway. Their stack: an interrupt may come anywhere, and none interrupts another, so the worst handler and the registers that the CPU saves are on
-top of the main loop's deepest path; calls through the HAL go to each of its functions. Of an image that is optimised as one program, the graph is
-that of the linker's result and of the objects apart from it.
+-gateway. Their stack: an interrupt can occur anywhere, and no interrupt interrupts another, so the worst handler and the registers that the CPU saves
+are added to the main loop's deepest path; calls through the HAL go to each of its functions. For an image that is optimised as one program, the graph
+is that of the linker's result and of the objects outside it.
 
-Exit status 77 (skipped) if the committed table was made by another compiler. No tool does it: `size` and bloaty measure one file, not what is linked of a
-library for a use; -fstack-usage of gcc gives frames, not paths.
+Exit status 77 (skipped) if the committed table was made by another compiler. No tool does it: `size` and bloaty measure one file, not the part of a
+library that is linked for a use; -fstack-usage of gcc reports frames, not paths.
 """
 
 import re
@@ -25,7 +25,7 @@ from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph, short
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs/developer/sizes.md"
 CPUS = {"Cortex-M0+": "cortex-m0plus", "Cortex-M3": "cortex-m3", "Cortex-M4": "cortex-m4"}
-TEXT_GOAL = 6 * 1024  # What the design asks for, and what the core does not reach yet: told, not gated.
+TEXT_GOAL = 6 * 1024  # Goal of the design. The core does not reach it yet, so it is printed and not checked.
 TYPES = ("iw_gateway_t", "iw_config_t", "iw_wheel_t", "iw_force_t", "iw_permit_t", "iw_setpoint_t", "iw_confirmation_t", "iw_envelope_t")
 ROW = re.compile(r"^\| `?([^|`]+?)`? +\|(.*)\|$", re.MULTILINE)
 CODEC = "iw_codec_decode iw_codec_encode_setpoint"
@@ -37,7 +37,7 @@ GATEWAY = (
 )
 KNOWN = "iw_gateway_set_assumption iw_gateway_restore_offset iw_config_stop_budget"
 OBSERVATION = "iw_observation_init iw_observation_step"
-# What is used: its headers, its functions, and the most that it may cost on a Cortex-M4.
+# Uses of the core: headers, functions, and the largest size on a Cortex-M4.
 USES = {
     "codec": ("codec.h", CODEC, 350),
     "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 2900),
@@ -46,17 +46,17 @@ USES = {
     "all": ("gateway.h observation.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {OBSERVATION}", None),
 }
 SECTION = re.compile(r"^ \.(?:text|rodata)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) \S*libiwheel_core\.a\((\w+)\.c\S*\)$", re.MULTILINE)
-# Image, which build it is in, and how that one's name goes on.
+# Image, its build, and the ending of that build's name.
 BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
 HAL = ("brd_bxcan_send", "brd_bxcan_receive", "brd_bxcan_bus_state", "brd_bxcan_purge", "brd_estop_pressed")
 HANDLERS = ("brd_systick_handler", "brd_exti0_handler", "brd_can_transmit_handler", "brd_can_receive_handler", "brd_can_error_handler")
-# Of the image gateway alone; and how the functions are called that northbound's refusals reach through a table.
+# Only for the image gateway: names of the functions that northbound's refusals call through a table.
 SERIAL_HANDLERS, THROUGH_TABLE = ("brd_serial_usart_handler", "brd_serial_receive_handler", "brd_serial_transmit_handler"), ":say_"
 SAVED_BY_CPU = 36  # Eight registers and four bytes to align them.
 
 
 def linked(library, cpu, headers, functions):
-    """{module: bytes} of what is linked."""
+    """Returns {module: bytes} of the linked code."""
     with tempfile.TemporaryDirectory() as folder:
         source, memory_map = Path(folder) / "use.c", Path(folder) / "map"
         source.write_text(
@@ -92,7 +92,7 @@ def linked(library, cpu, headers, functions):
 
 
 def uses(builds):
-    """[(use, [bytes on each CPU])], [what is wrong], the share of each module in the gateway on a Cortex-M4."""
+    """Returns [(use, [bytes on each CPU])], [findings], and the share of each module in the gateway on a Cortex-M4."""
     rows, findings, shares = [], [], {}
     for use, (headers, functions, limit) in USES.items():
         sizes = [linked(next(Path(build).rglob("libiwheel_core.a")), cpu, headers, functions) for build, cpu in zip(builds, CPUS, strict=False)]
@@ -124,7 +124,7 @@ def core_stack(build):
 
 
 def linked_objects(build, image):
-    """All whose code is in the image: those that its map names, or of an archive that it names. Others are of an earlier configuration."""
+    """Returns the objects in the image: those in its map, or in an archive of its map. Other objects are from an earlier configuration."""
     table = next(Path(build).rglob(f"{image}.map"))
     loaded = {(table.parent / name).resolve() for name in re.findall(r"^LOAD (\S+)$", table.read_text(), re.MULTILINE)}
     archives = {f"{path.stem.removeprefix('lib')}.dir" for path in loaded if path.suffix == ".a"}
@@ -153,13 +153,13 @@ def image_stack(build, image):
 
 
 def stack_room(elf):
-    """What the linker's script leaves for the stack."""
+    """Returns the size of the stack in the linker's script."""
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
     return next(int(line.split()[0], 16) for line in run.stdout.splitlines() if line.endswith(" brd_link_stack_size"))
 
 
 def image_sizes(build, image):
-    """(flash, RAM without stack, worst stack); the latter must fit."""
+    """Returns (flash, RAM without stack, worst stack). Fails if the stack does not fit."""
     elf, used = next(Path(build).rglob(f"{image}.elf")), image_stack(build, image)
     room = stack_room(elf)
     if used > room:
@@ -173,14 +173,14 @@ def stacks_and_images(builds):
     """`builds`: those of Cortex-M0+, M3, M4."""
     rows = [
         "",
-        "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.",
+        "Worst stack of the core's functions in bytes, by call graph, without the stack of the port's HAL functions.",
         "",
         "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |",
         "|-----------------|-----------:|-----------:|-----------:|",
         "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |",
         "",
-        "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
-        "is the worst of main loop and interrupt, of the 1792 that sections.ld keeps for it; in emulation at least 256 of them stay unused.",
+        "Images per board, in bytes: listen only, demonstration profile, gateway for a host. RAM is without the stack. The stack is the worst of "
+        "main loop and interrupt; sections.ld reserves 1792 bytes, of which at least 256 stay unused in emulation.",
         "",
         "| image             |    flash   |     RAM    |    stack   |",
         "|-------------------|-----------:|-----------:|-----------:|",
@@ -198,7 +198,7 @@ def compiler():
 
 
 def type_sizes():
-    """{type: bytes} on a 32-bit ARM, asked of the compiler through the sizes of arrays."""
+    """Returns {type: bytes} on a 32-bit ARM; the compiler reports them as sizes of arrays."""
     probe = '#include "iwheel/gateway.h"\n' + "".join(f"char size_of_{name}[sizeof({name})];\n" for name in TYPES)
     command = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-I", str(ROOT / "core/include"), "-S", "-xc", "-", "-o", "-"]
     run = subprocess.run(command, input=probe, capture_output=True, text=True, check=True)
@@ -214,18 +214,18 @@ def render(builds):
         "",
         f"Made by `scripts/sizes.py --update` with arm-none-eabi-gcc {compiler()} -Os; `./check` compares.",
         "",
-        "Code and constants in bytes of what is linked for each use, without what is not called (`-ffunction-sections`, `--gc-sections`). The",
-        "core has no data and no bss.",
+        "Code and constants in bytes that are linked for each use, without functions that are not called (`-ffunction-sections`, `--gc-sections`).",
+        "The core has no data and no bss.",
         "",
-        "| what is used            | " + " | ".join(f"{cpu:>10}" for cpu in CPUS) + " |",
+        "| use                     | " + " | ".join(f"{cpu:>10}" for cpu in CPUS) + " |",
         "|-------------------------|" + "|".join("-----------:" for _ in CPUS) + "|",
     ]
     lines += [f"| {name:<23} | " + " | ".join(f"{value:>10}" for value in values) + " |" for name, values in rows]
-    lines += ["", "Where the bytes of the gateway are, on Cortex-M4:", "", "| module       |   bytes |", "|--------------|--------:|"]
+    lines += ["", "Bytes of the gateway by module, on Cortex-M4:", "", "| module       |   bytes |", "|--------------|--------:|"]
     lines += [f"| {name:<12} | {size:>7} |" for name, size in modules]
     lines += [
         "",
-        "RAM in bytes: `iw_gateway_t` holds everything, once per pair of wheels; the others are its parts.",
+        "RAM in bytes: `iw_gateway_t` has the whole state of a pair of wheels; the other types are its parts.",
         "",
         "| type              |     RAM    |",
         "|-------------------|-----------:|",
@@ -267,7 +267,7 @@ def main(arguments):
         changed = [*differences(numbers(committed), numbers(text))] if committed else []
         findings += changed
         if changed:
-            findings.append("the sizes changed: look at the reason, then ./check --update-sizes and commit docs/developer/sizes.md")
+            findings.append("the sizes changed: find the reason, then ./check --update-sizes and commit docs/developer/sizes.md")
     print(*findings, sep="\n")
     print(f"gateway on Cortex-M4: {total} B of code are linked (goal {TEXT_GOAL} B)")
     return 1 if findings else 0

@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Worst stack of every entry point of the core, or of another library of ours, from gcc's call graph; fails on recursion, variable stack or too much.
+"""Computes the worst stack of every entry point of the core, or of another library of this tree, from gcc's call graph. Fails on recursion, variable stack, or a
+stack over the limit.
 
 usage: stack_usage.py BUILD_DIR LIMIT_BYTES [LIBRARY]
        stack_usage.py --frames BUILD_DIR LIMIT_BYTES FOLDER...
 
-BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compiler's run-time library, which the graph does not
-know, are found through the relocations; they and mem* are charged a fixed amount. Calls through the HAL end here: a port adds its own.
+BUILD_DIR was configured with cmake/arm-none-eabi.cmake. The graph does not contain the functions of the compiler's run-time library: they are found
+through the relocations, and count with a fixed size, like mem*. Calls through the HAL are not followed: a port adds its own stack.
 
---frames: no function of these folders may take more than that by itself. BUILD_DIR is any that tells how it compiles
-(compile_commands.json); each source is compiled once more, to nothing. No tool does it: -Wstack-usage of gcc judges one function; avstack (Perl) and
-puncover (PyPI) add up, but know neither the run-time library nor what the linker optimised, and do not fail.
+--frames: no frame of a function in these folders may exceed the limit. BUILD_DIR is any build with compile_commands.json; each source is compiled
+once more, without output. No tool does it: -Wstack-usage of gcc judges one function; avstack (Perl) and puncover (PyPI) add up, but know neither the
+run-time library nor the results of the linker's optimisation, and do not fail.
 """
 
 import json
@@ -45,7 +46,7 @@ def read_graph(objects):
 
 
 def add_runtime_calls(objects, size, calls):
-    """Calls of libgcc appear only when code is emitted, after the graph is written; each function has its own section."""
+    """Adds the calls of libgcc, which gcc emits after it has written the graph. Each function has its own section."""
     for path in objects:
         section = None
         relocations = subprocess.run(["arm-none-eabi-readelf", "-rW", str(path)], capture_output=True, text=True, check=True)
@@ -61,20 +62,20 @@ def add_runtime_calls(objects, size, calls):
 
 
 def own_stack(size, name):
-    """Bytes of one function alone."""
+    """Returns the bytes of one function alone."""
     if name in size:
         return size[name]
     return 0 if name == INDIRECT else LIBC if name.startswith(("mem", "str")) else RUNTIME
 
 
 class Depth:
-    """Deepest path below each function."""
+    """Computes the deepest path below each function."""
 
     def __init__(self, size, calls):
         self.size, self.calls, self.known, self.open, self.cycles = size, calls, {}, [], []
 
     def of(self, name):
-        """(bytes, path) from this function down."""
+        """Returns (bytes, path) from this function down."""
         if name in self.open:
             self.cycles.append([*self.open[self.open.index(name) :], name])
             return 0, [name]
@@ -91,7 +92,7 @@ def short(name):
 
 
 def frames_of(entry, work):
-    """[(bytes, "file:function", how it is sized)] of the source of one entry of compile_commands.json."""
+    """Returns [(bytes, "file:function", kind of the size)] of the source of one entry of compile_commands.json."""
     words = [word for word in shlex.split(entry["command"]) if Path(word).name != "ccache"]
     out = work / entry["file"].replace("/", "_")
     words[words.index("-o") + 1] = f"{out}.o"
@@ -106,10 +107,10 @@ def frames(build, limit, folders):
         if any(Path(folder).resolve() in Path(entry["file"]).parents for folder in folders):
             entries[entry["file"]] = entry
     if not entries:
-        sys.exit(f"{build} compiles nothing of {' '.join(folders)}: configure it first")
+        sys.exit(f"{build} compiles no file of {' '.join(folders)}: configure it first")
     with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(os.cpu_count()) as pool:
         found = sorted((row for rows in pool.map(lambda entry: frames_of(entry, Path(work)), entries.values()) for row in rows), reverse=True)
-    findings = [f"{name}: {size} B on the stack, {limit} B allowed; what is that large is kept elsewhere" for size, name, _ in found if size > limit]
+    findings = [f"{name}: {size} B on the stack, {limit} B allowed; put large objects elsewhere" for size, name, _ in found if size > limit]
     findings += [f"{name}: its stack is {how}, must have a bound" for _, name, how in found if how == "dynamic"]
     for finding in findings:
         print(finding)

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Measures functions and files, and fails where a limit of the house style is passed, where a comment names what is not there, and where C that the
-compiler accepts in two forms is not written in the one of this tree:
+"""Measures functions and files. Fails if a limit of the house style is exceeded, if a comment contains a name that does not exist, or if C code with
+two valid forms does not have the form of this tree:
 
     i++;                            not ++i; where the value is not used
-    x = (a < b) ? y : z;            a condition that compares or combines stands in parentheses
+    x = (a < b) ? y : z;            a condition that compares or combines is in parentheses
     sizeof x, sizeof(type_t)        parentheses only around types
-    memset(...);                    mem* without (void): its result says nothing
+    memset(...);                    mem* without (void): its result has no information
     NAME_OF_FILE_H                  ends the include guard of name_of_file.h
 
 usage: style.py [--fix] [ROOT]      --fix writes that form
 
-Needs lizard (PyPI), which measures functions. Tried: clang-tidy and clang-format 14 have no check for any of this but the length of functions
-and their parameters, and clang-tidy does not compile the STM32 port.
+Needs lizard (PyPI), which measures functions. Tried: clang-tidy and clang-format 14 check only the length of functions and their parameters, and
+clang-tidy does not compile the STM32 port.
 """
 
 import re
@@ -28,15 +28,15 @@ GROUPS = {
     "northbound": (("lib/northbound",), 60, 15, 10),
     "ports and apps": (("port", "lib/begin", "lib/client", "lib/config", "lib/inspect", "lib/recording", "lib/sockets", "app"), 80, 25, 15),
 }
-FILE_LINES = 400  # Without lines of comment alone: saying why must not cost anything.
+FILE_LINES = 400  # Lines with only a comment do not count: a reason must not cost anything.
 TEST_FILE_LINES = 600  # Tables of cases may be longer than code.
 LINE = 120
 HEADERS = ("core/include", "lib/northbound/protocol/include")
-COMMENTED = ("core", "port")  # What these name in comments must be there, their lines are not longer than LINE ...
-COMMENT_SHARE = {"core/src": (5, 20), "port": (5, 20)}  # ... and so much of their sources' lines, in percent, says why.
+COMMENTED = ("core", "port")  # Names in the comments of these must exist, their lines are not longer than LINE ...
+COMMENT_SHARE = {"core/src": (5, 20), "port": (5, 20)}  # ... and this share of their sources' lines, in percent, are comments.
 CODE = ("core", "port", "lib", "app", "zephyr")
 PARAMETERS = 5
-IMPOSED = ("web_call_handle",)  # A library calls these: it says what they take.
+IMPOSED = ("web_call_handle",)  # A library calls these and defines their parameters.
 SPDX = "SPDX-License-Identifier: MIT"
 UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX)\b")
 STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
@@ -89,7 +89,7 @@ def file_findings(path, name, longest=FILE_LINES):
 
 
 def known_names(root):
-    """(identifiers of the code, names of files, rules of the safety case): what a comment may speak of."""
+    """Returns the names that a comment may contain: (identifiers of the code, names of files, rules of the safety case)."""
     paths = sources(root, CODE)
     code = "".join(STRING_OR_COMMENT.sub(" ", path.read_text()) for path in paths)
     documents = [str(path.relative_to(root)) for path in (root / "docs").rglob("*.md")]
@@ -99,7 +99,7 @@ def known_names(root):
 
 
 def dangling(path, name, known):
-    """Lines that are too long, and names in comments that nothing has: a comment that no longer holds misleads."""
+    """Yields lines that are too long, and names in comments that do not exist, because an outdated comment misleads."""
     identifiers, files, rules = known
     for number, line in enumerate(path.read_text().splitlines(), 1):
         if len(line) > LINE:
@@ -109,11 +109,11 @@ def dangling(path, name, known):
         gone += [found for found in FILE_NAMED.findall(comment) if found not in files and Path(found).name not in files]
         gone += [found for found in RULE_NAMED.findall(comment) if found not in rules]
         for found in gone:
-            yield f"{name}:{number}: names {found}, which is nowhere"
+            yield f"{name}:{number}: names {found}, which does not exist"
 
 
 def comment_share(paths):
-    """Percent of non-empty lines that are comments, over all files together; the licence says nothing."""
+    """Returns the percentage of non-empty lines that are comments, over all files together, without the line of the licence."""
     lines = [line.strip() for path in paths for line in path.read_text().splitlines() if line.strip() and SPDX not in line]
     comments = sum(line.startswith(("//", "/*")) or "///<" in line for line in lines)
     return 100 * comments / max(len(lines), 1)
@@ -124,7 +124,7 @@ def is_code(token):
 
 
 def condition_before(tokens, at):
-    """(first, last) index of the condition of the `?` at that index, and whether it compares or combines outside parentheses."""
+    """Returns (first, last) index of the condition of the `?` at that index, and whether it compares or combines outside parentheses."""
     depth, compares, first, last, i = 0, False, at, None, at - 1
     while i >= 0:
         token = tokens[i]
@@ -157,7 +157,7 @@ def parenthesised(text):
 
 
 def without_parentheses(found):
-    """Not in a macro, whose arguments need theirs."""
+    """Removes parentheses after sizeof. Not in a macro, whose arguments need them."""
     line = found.string[found.string.rfind("\n", 0, found.start()) + 1 : found.end()]
     before = found.string[: found.start() - len(line) + len(found[0])].rstrip("\n")
     in_macro = line.lstrip().startswith("#") or before.endswith("\\")

@@ -48,7 +48,7 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     }
     if (self->restart_us != 0U) {
         return IWN_REFUSE(&server->refusal, IWN_DENIED,
-                          "a configuration was committed: the gateway starts anew with it, then arm");
+                          "a configuration was committed: the gateway restarts with it, then arm");
     }
     return brd_pending_has_room(&self->pending, client->id, IWN_CMD_ARM) ||
            IWN_REFUSE(&server->refusal, IWN_BUSY,
@@ -63,7 +63,7 @@ bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const c
     (void)client;
     (void)key;
     return IWN_REFUSE(&server->refusal, IWN_NOT_HOLDER,
-                      "this gateway is a microcontroller, which gives no key; leave key out");
+                      "this gateway is a microcontroller and has no key; leave key out");
 }
 
 /// Returns the defect of a quote, or NULL if there is none. A stamp from before the channel was opened belongs to
@@ -93,7 +93,7 @@ static const char *stale(const brd_host_t *self, const brd_host_client_t *client
 }
 
 /// The lease runs from the stamp. If the line is delayed, the wheels still stop lease_ms after a time at which the
-/// command did not exist yet. If the gateway is not armed the core refuses the command with any quote.
+/// command did not exist yet. If the gateway is not armed, the core refuses the command with any quote.
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
     const brd_host_t *const self = brd_host_of(server);
     brd_host_client_t *const whose = (brd_host_client_t *)client;
@@ -103,7 +103,7 @@ bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_
     }
     const char *const why = stale(self, whose, quote);
     if (why != NULL) {
-        return IWN_REFUSE(&server->refusal, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
+        return IWN_REFUSE(&server->refusal, IWN_STALE_COMMAND, "this command is void: ", why);
     }
     whose->has_seq = true;
     whose->seq = quote->seq;

@@ -5,7 +5,7 @@
 
 #define STATE(item)  ((iw_assumption_state_t)((item)&15U))
 #define SOURCE(item) ((iw_source_t)((item) >> 4))
-/// Largest raw force that is not saturated (32766 cN), in mN: no zero of a wheel exceeds it.
+/// Largest raw force that is not saturated (32766 cN), in mN: no offset of a wheel exceeds it.
 #define ZERO_MAX_mN 327660
 
 const char *brd_assumptions_key(iw_assumption_item_t item) {
@@ -38,7 +38,8 @@ static iw_assumption_item_t unit_of(unsigned side) {
 
 brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window) {
     return (brd_assumptions_zero_t){.offset_mN = force->offset_mN,
-                                    .drift_mN = (int16_t)window->drift_mN, // It fits: a zero's window has little drift.
+                                    .drift_mN =
+                                        (int16_t)window->drift_mN, // It fits: the window of an offset has little drift.
                                     .deviation_mN = (uint16_t)window->deviation_mN,
                                     .from = (uint8_t)force->provenance};
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /// Learned facts about the wheels, from one run of the board to the next: entries of the assumption store, and the
-/// zeros of the forces. The rules are those of the daemon (docs/developer/ledger.md): facts that were found for other
-/// settings are dropped, a stored zero gives way to any zero that this run measures, and a tare only to a tare.
+/// offsets of the forces. The rules are those of the daemon (docs/developer/ledger.md): facts that were found for other
+/// settings are dropped, any offset that this run measures replaces a stored one, and only a tare replaces a tare.
 ///
 ///     start: record --> the core
 ///     run:   a fact changes --> nothing is sent for BRD_ASSUMPTIONS_PERIOD_US --> a record
 ///
-/// A repeated measurement of a figure, or a zero that moved by no more than BRD_ASSUMPTIONS_MOVED_mN, does not cause a
-/// record, because each record wears the flash.
+/// A repeated measurement of a figure, or an offset that moved by no more than BRD_ASSUMPTIONS_MOVED_mN, does not cause
+/// a record, because each record wears the flash.
 #ifndef BOARD_ASSUMPTIONS_H
 #define BOARD_ASSUMPTIONS_H
 
@@ -19,12 +19,12 @@
 #define BRD_ASSUMPTIONS_PERIOD_US 2000000U
 #define BRD_ASSUMPTIONS_MOVED_mN  500
 
-/// The zero of one wheel's force.
+/// The force offset of one wheel.
 typedef struct {
     int32_t offset_mN;
     int16_t drift_mN;      ///< Drift in the window of which it is the mean, with ESTIMATED and OPERATOR.
     uint16_t deviation_mN; ///< Deviation in that window.
-    uint8_t from;          ///< First source of the zero (iw_offset_provenance_t); IW_OFFSET_NONE: there is none.
+    uint8_t from;          ///< First source of the offset (iw_offset_provenance_t); IW_OFFSET_NONE if there is none.
 } brd_assumptions_zero_t;
 
 /// Layout in flash: new members go to the end. All zero: nothing was learned.
@@ -35,14 +35,14 @@ typedef struct {
     uint8_t item[IW_ASSUMPTION_ITEMS]; ///< State, with the source in the upper half; 0: none.
 } brd_assumptions_t;
 
-/// Returns the zero that this window gave.
+/// Returns the offset that results from this window.
 brd_assumptions_zero_t brd_assumptions_zero(const iw_force_t *force, const iw_force_quality_t *window);
 
-/// Writes to `*self` all facts about a gateway with these settings and zeros.
+/// Writes to `*self` all facts about a gateway with these settings and offsets.
 void brd_assumptions_note(brd_assumptions_t *self, const iw_snapshot_t *seen, const brd_settings_t *settings,
                           const brd_assumptions_zero_t zero[IW_SIDES]);
 
-/// Restores the facts directly after the init of the gateway. `out_zero` receives the zeros that were restored.
+/// Restores the facts directly after the init of the gateway. `out_zero` receives the restored offsets.
 void brd_assumptions_restore(const brd_assumptions_t *self, const brd_settings_t *settings, iw_gateway_t *gateway,
                              brd_assumptions_zero_t out_zero[IW_SIDES]);
 

@@ -23,7 +23,8 @@ static void observe_assumptions(brd_host_t *self, const iw_snapshot_t *seen) {
     }
 }
 
-/// Reports a change of the zero in force, and notes its source first. A tare was noted together with its window.
+/// Stores the source of the offset in force if it has changed, then reports the change. The source of a tare was stored
+/// together with its window.
 static void observe_offset(brd_host_t *self, unsigned side, const iw_force_t *force) {
     brd_host_reported_t *const told = &self->told;
     const iw_offset_provenance_t former = (iw_offset_provenance_t)told->provenance[side];

@@ -13,7 +13,7 @@ typedef struct {
 } brd_records_t;
 
 /// Call it directly after a start, before the watchdog runs. It counts a power-on; after another start it writes only
-/// if blank slots run short. Both may take as long as an erase, unless `is_urgent` is set, because the wheels may be
+/// if blank slots run short. Both may last as long as an erase, unless `is_urgent` is set, because the wheels may be
 /// turning.
 void brd_records_open(brd_records_t *self, bool power_on, bool is_urgent);
 

@@ -216,7 +216,7 @@ static void set_word(brd_settings_t *self, const row_t *row, unsigned word) {
 bool brd_settings_set(brd_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
     const row_t *const row = find(key);
     if (row == NULL) {
-        IWN_TEXT_JOIN(why, key, " is no key of a board: those of wheels, left, right, drive and limits are");
+        IWN_TEXT_JOIN(why, key, " is no key of a board; use keys of wheels, left, right, drive, limits");
         return false;
     }
     if (row->kind < WORDS) {
@@ -242,7 +242,7 @@ bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why) {
     case IW_CONFIG_STOP_BUDGET:
         iwn_text_add(why,
                      "lease_ms + period_ms + max_speed_mm_s / decel_mm_s2 exceeds 1000 ms, after which the wheels stop "
-                     "by themselves: lower one of the first three, or raise decel_mm_s2");
+                     "on their own: lower one of the first three, or raise decel_mm_s2");
         return false;
     case IW_CONFIG_REST_SPEED:
         iwn_text_add(why, "rest_rpm is more than 60 mm/s at a wheel of this radius and gear: set it to ");
@@ -256,7 +256,7 @@ bool brd_settings_check(const brd_settings_t *self, iwn_text_t *why) {
         iwn_text_add(why, "gear_ratio must lie within 1 and 100");
         return false;
     default:
-        iwn_text_add(why, "a value is outside its range; set it anew");
+        iwn_text_add(why, "a value is outside its range; set it again");
         return false;
     }
 }

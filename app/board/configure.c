@@ -15,7 +15,7 @@ static bool stage(brd_host_t *self, iwn_text_t *why) {
     return true;
 }
 
-/// Returns true if the request was executed, or there was nothing to do. Otherwise the cause is in `*out_error`.
+/// Returns true if the request was executed, or there was nothing to do. Otherwise writes the cause to `*out_error`.
 static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
     const iwn_request_t *const request = &self->server.request;
     *out_error = IWN_BAD_VALUE;
@@ -37,13 +37,13 @@ static bool configure(brd_host_t *self, iwn_text_t *why, iwn_error_t *out_error)
     if (!brd_host_is_silent(self)) {
         iwn_text_add(
             why,
-            "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
+            "the gateway writes the configuration only while it listens and sends nothing: stop, and wait for that");
         return false;
     }
     *out_error = IWN_INTERNAL;
     if (!brd_host_keep(&self->staged)) {
-        iwn_text_add(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
-                          "on, and try again");
+        iwn_text_add(why, "the flash did not accept it, and the old configuration stays; switch the board off and on, "
+                          "and try again");
         return false;
     }
     self->has_staged = false;

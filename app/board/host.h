@@ -6,12 +6,12 @@
 ///
 /// The board uses no content of a line before its CRC is right. It refuses a command that moves unless the command
 /// quotes this start of the board, a number that its channel has not had yet, and a stamp that is younger than the
-/// lease and than the channel. So a line that was delayed, doubled or stored does not feed the lease. The lease runs
-/// from that stamp, not from the arrival of the line.
+/// lease and than the channel. A line that was delayed, doubled or stored therefore does not extend the lease. The lease
+/// runs from that stamp, not from the arrival of the line.
 ///
 /// Output: replies have priority over events. A line that does not fit is dropped and counted. A snapshot is too long
 /// for the ring of small lines, so the DMA sends it from its own buffer, one at a time. A client that requests a
-/// snapshot meanwhile gets it later.
+/// snapshot meanwhile receives it later.
 ///
 /// No heap. There is one instance, all zero before `brd_host_init`. Only the main loop calls these functions.
 #ifndef BRD_HOST_H
@@ -30,7 +30,7 @@
 #define BRD_HOST_SMALL_BYTES 1664U
 /// Space in the send buffer that events leave free for replies.
 #define BRD_HOST_REPLY_ROOM 768U
-/// Periods of the event `link`. While a client is armed, the event also comes when no line was stamped for
+/// Periods of the event `link`. While a client is armed, the board also sends the event when no line was stamped for
 /// BRD_HOST_LINK_ARMED_US: a command cannot quote a younger stamp than its client has received.
 #define BRD_HOST_LINK_US       1000000U
 #define BRD_HOST_LINK_ARMED_US 25000U
@@ -59,7 +59,7 @@ typedef enum {
 
 /// Learned facts as last reported to watchers.
 typedef struct {
-    iw_time_us_t offset_us[IW_SIDES]; ///< Zero in force: its time, its value, its source.
+    iw_time_us_t offset_us[IW_SIDES]; ///< Offset in force: its time, its value, its source.
     int32_t offset_mN[IW_SIDES];
     uint8_t provenance[IW_SIDES]; ///< iw_offset_provenance_t.
     uint32_t assumed_changes;
@@ -99,7 +99,7 @@ typedef struct {
     uint8_t next_owed;        ///< Client that is next for the long line, so that all get their turn.
     bool has_staged;          ///< `staged` contains changes.
     brd_records_state_t records;
-    brd_assumptions_zero_t zero[IW_SIDES]; ///< Sources of the zeros in force.
+    brd_assumptions_zero_t zero[IW_SIDES]; ///< Sources of the offsets in force.
     brd_host_reported_t told;
     iwn_server_t server;
     brd_settings_t settings; ///< Settings in force.
@@ -120,7 +120,7 @@ typedef struct {
 void brd_host_init(brd_host_t *self, const brd_host_place_t *place, iw_time_us_t now_us);
 
 /// Call it directly before a step of the gateway. It closes all channels if the relay has sent nothing for
-/// IWN_LINE_SILENT_MS, and executes one line: a request can take milliseconds, and the loop must read the e-stop
+/// IWN_LINE_SILENT_MS, and executes one line: a request can need milliseconds, and the loop must read the e-stop
 /// between two of them. Returns true if more lines may wait: call it again immediately, after the step.
 bool brd_host_take(brd_host_t *self, iw_time_us_t now_us);
 
@@ -130,7 +130,7 @@ iw_time_us_t brd_host_tell(brd_host_t *self, const iw_snapshot_t *seen, bool est
 
 // For the files of this part.
 
-/// Reports to the client the number of its dropped lines, if there is room for that.
+/// Reports to the client the number of its dropped lines, if that line fits the ring.
 void brd_host_tell_lost(brd_host_t *self, brd_host_client_t *client);
 /// Sends the event `link`, which identifies the board, on the channel of the link.
 void brd_host_tell_link(brd_host_t *self);

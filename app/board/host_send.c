@@ -95,8 +95,7 @@ static void write_records(const brd_host_t *self, iwn_out_t *json) {
     iwn_out_text(json, "file", "flash");
     iwn_out_text(json, "state", states[self->records]);
     iwn_out_text(json, "reason",
-                 (self->records == BRD_RECORDS_FAILED) ? "it has no room left, or fails; switch the board off and on"
-                                                       : NULL);
+                 (self->records == BRD_RECORDS_FAILED) ? "it is full, or fails; switch the board off and on" : NULL);
     iwn_out_close(json, '}');
 }
 

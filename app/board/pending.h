@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Ids of requests whose replies wait: an arm for its TX confirmation, a status for the long line. All clients share
-/// one pool, because an id takes 88 bytes, and more than one arm rarely waits.
+/// one pool, because an id needs 88 bytes, and more than one arm rarely waits.
 ///
 /// Pure, no heap. All zero: no reply waits.
 #ifndef BRD_PENDING_H
@@ -10,7 +10,7 @@
 #include "iwheel_northbound/line.h"
 #include "iwheel_northbound/request.h"
 
-/// One status for every channel, and two arms: one that waits, and one that takes over the lease.
+/// One status for every channel, and two arms: one that waits, and one of a takeover.
 #define BRD_PENDING_ARMS 2U
 #define BRD_PENDING_MAX  (IWN_LINE_CHANNELS + BRD_PENDING_ARMS)
 
@@ -28,7 +28,7 @@ typedef struct {
 bool brd_pending_has_room(const brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd);
 
 /// Stores the id of a reply that waits. It replaces that of an earlier one to the same client and `cmd`. Call it only
-/// if there is room.
+/// if a place is free.
 void brd_pending_put(brd_pending_t *self, iw_client_t client, iwn_cmd_t cmd, const iwn_id_t *id);
 
 /// Removes a waiting reply and returns its id, which is valid until the next `brd_pending_put`. Returns an id of kind

@@ -56,7 +56,7 @@ static const verb_t verbs[] = {
     {VERB(confirm, verb_confirm), .choice = item_choice},
     {VERB(config, verb_config), .choice = config_choice},
     {VERB(doctor, verb_doctor)},
-    {VERB(bringup, verb_bringup), .no_json = "bringup talks with a person; it has no --json (doctor has)"},
+    {VERB(bringup, verb_bringup), .no_json = "bringup is interactive; it has no --json (doctor has)"},
     {VERB(why, verb_why)},
     {VERB(record, verb_record)},
     {VERB(decode, verb_decode)},
@@ -93,10 +93,10 @@ int help_unknown(const char *name) {
         IWN_TEXT_JOIN(&list, (i > 0) ? " " : "", verbs[i].name);
     }
     if (name[0] == '\0') {
-        return ctl_fail(CTL_USAGE, "no verb given; known are: %s", known);
+        return ctl_fail(CTL_USAGE, "the verb is missing; known verbs: %s", known);
     }
     return (best != NULL) ? ctl_fail(CTL_USAGE, "unknown verb \"%s\"; did you mean %s? All: iwheelctl help", name, best)
-                          : ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", name, known);
+                          : ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known verbs: %s", name, known);
 }
 
 /// Returns the part of the usage line that follows the verb's name, and its length.

@@ -32,7 +32,7 @@ static int take_option(arguments_t *self, int left, char **argument) {
         self->ctl->socket = argument[1];
         return 2;
     } else if (strcmp(argument[0], socket) == 0) {
-        (void)ctl_fail(CTL_USAGE, "--socket wants a path, such as --socket /run/iwheel/gateway.sock");
+        (void)ctl_fail(CTL_USAGE, "--socket needs a path, such as --socket /run/iwheel/gateway.sock");
         return -1;
     } else {
         return 0;
@@ -60,7 +60,7 @@ static bool take_arguments(arguments_t *self, int count, char **arguments) {
         i += (used == 0) ? 1 : used;
     }
     if (self->ctl->socket != NULL && self->ctl->socket[0] == '\0') {
-        (void)ctl_fail(CTL_USAGE, "--socket wants a path, such as --socket /run/iwheel/gateway.sock");
+        (void)ctl_fail(CTL_USAGE, "--socket needs a path, such as --socket /run/iwheel/gateway.sock");
         return false;
     }
     return true;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who plays in the demonstration beside gateway and simulator: the joystick program, and a sleeper that feels the machine."""
+"""Processes of the demonstration besides gateway and simulator: the joystick program, and a sleeper that measures the load of the machine."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from harness import as_a_service, die_with_parent
 
 
 class Sleeper(threading.Thread):
-    """Sleeps 5 ms over and over: how late it is woken tells how busy the machine is."""
+    """Sleeps 5 ms again and again. The lateness of its wake-ups shows how busy the machine is."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -33,7 +33,7 @@ def prepare():
 
 
 class Driver:
-    """The joystick program, a process of its own."""
+    """The joystick program, in a process of its own."""
 
     def __init__(self, rig, number):
         self.output = rig.path(f"driver{number}.out")
@@ -47,7 +47,7 @@ class Driver:
             self.child.stdin.write(f"{left} {right}\n".encode())
             self.child.stdin.flush()
         except BrokenPipeError as error:
-            raise RuntimeError("the joystick program has ended: " + (self.text().splitlines() or ["without a word"])[-1]) from error
+            raise RuntimeError("the joystick program has ended: " + (self.text().splitlines() or ["without output"])[-1]) from error
 
     def text(self):
         with open(self.output, encoding="utf-8") as file:

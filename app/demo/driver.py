@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A small driving program, as a joystick's would be: arms, then repeats the last "LEFT RIGHT" line of its input 20 times a second.
+"""A small client that drives, like a joystick program: arms, then repeats the last "LEFT RIGHT" line of its input 20 times a second.
 
 Usage: driver.py SOCKET      ends when it is refused, printing the reason
 Prints one line per answered command: the events of test/system/judge_log.py.

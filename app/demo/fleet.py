@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Three simulated machines at one broker, and the console that shows them, what stopped and its recording. See ./demo --help."""
+"""Three simulated machines at one broker, and the console with their states, stops and recordings. See ./demo --help."""
 
 import argparse
 import os
@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "test/system"))
 
 from harness import Process, Rig, find_program
 
-# As in the other demonstration: for any machine, however busy.
+# As in the other demonstrations: wide limits for a busy machine.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 
 
@@ -36,7 +36,7 @@ def listens(process, name, port):
 
 
 def broker(rig, port):
-    """A nats-server, which keeps a history, on this port and the next; without one a mosquitto. What the console is told beside the port."""
+    """Starts a nats-server, which stores a history, on this port and the next one; without it a mosquitto. Returns more configuration for the console."""
     server = shutil.which("nats-server") or "/usr/sbin/nats-server"
     if os.path.exists(server):
         config = write(
@@ -67,7 +67,7 @@ def bridge(rig, name, port):
 
 
 def tell(rigs, console, keeps, iwheelctl):
-    """What a console shows while one machine is stopped and another one dies; then the history, and why, from the machine itself. An exit code."""
+    """Shows the console while one machine is stopped and the gateway of another one is killed, then the history and the recording. Returns an exit code."""
     with subprocess.Popen([*console, "--for", "6"], stdout=subprocess.PIPE, text=True) as watching:
         time.sleep(3)
         rigs[0].sim.ask("estop press")
@@ -75,7 +75,7 @@ def tell(rigs, console, keeps, iwheelctl):
         text = watching.communicate()[0]
     print(text)
     told = f"{len(rigs)} machines, {len(rigs) - 1} online" in text and "estop_line" in text
-    print("walker-1 was stopped by its button, the last one's gateway was killed" + ("" if told else ": NOT TOLD"))
+    print("walker-1 was stopped by its button, the last one's gateway was killed" + ("" if told else ": NOT REPORTED"))
     frames = rigs[0].path("fetched.log")
     for words in (
         [*console, "history", "--last", "5min"] if keeps else None,

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The demonstration: the real gateway drives two simulated wheels, and everything told is checked. See ./demo --help."""
+"""The demonstration: the real gateway drives two simulated wheels, and each statement is checked. See ./demo --help."""
 
 import signal
 
-signal.signal(signal.SIGINT, signal.SIG_DFL)  # Before anything is there that has to be taken away again.
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Until the first file and process exist, which must be removed again.
 
 import argparse
 import os
@@ -14,17 +14,17 @@ from harness import Rig, find_program
 from screen import choose
 from story import TOTAL, Failed, Story
 
-# For any machine, however busy: the wheels are simulated by a process that may have to wait for its turn.
+# Wide limits for a busy machine, because the process that simulates the wheels may have to wait for the processor.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 700}}
 STALL_S, QUIET_S = 0.1, 0.005
 
 
 def keep(rig):
-    """Leaves everything running and says what to try."""
+    """Leaves all processes running and prints commands to try."""
     tool = os.path.relpath(find_program(rig.build, "iwheelctl"))
     sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
     print(f"""
-Gateway and simulator go on running. In another terminal, in this folder:
+Gateway and simulator continue to run. In another terminal, in this folder:
 
     export IWHEEL_SOCKET={rig.path("gateway.sock")}
     {tool} status
@@ -71,8 +71,8 @@ def tell(story, view, sleeper, interrupts):
     if late and not judge.bus_stalls() and sleeper.worst_s < QUIET_S:
         raise Failed(f"the judge of the bus log: {late[0].rule}: {late[0].text}")
     print(
-        f"\nEverything happened as told, in {story.elapsed_s():.0f} s. {len(judge.frames)} frames were on the bus, "
-        f"{len(judge.setpoints)} of them\nsetpoints, judged one by one: no rule was broken; "
+        f"\nEvery step had the expected result, in {story.elapsed_s():.0f} s. {len(judge.frames)} frames were on the bus, "
+        f"{len(judge.setpoints)} of them\nsetpoints, judged one by one: no rule was violated; "
         f"longest gap {judge.gap_max_us / 1000:.0f} ms."
         + (f"\n(Timing was not judged: this machine stalled for up to {sleeper.worst_s * 1000:.0f} ms.)" if late else "")
     )
@@ -81,7 +81,7 @@ def tell(story, view, sleeper, interrupts):
 def report(story, rig, error, sleeper):
     said = rig.gateway.text().splitlines()[-12:] if rig.gateway else []
     text = str(error) if isinstance(error, Failed) else f"{type(error).__name__}: {error}"
-    print("\nThe gateway's last words:\n" + "\n".join(said), file=sys.stderr)
+    print("\nThe gateway's last log lines:\n" + "\n".join(said), file=sys.stderr)
     print(f"\nFAILED in step {story.number} of {TOTAL}: {text}", file=sys.stderr)
     if sleeper.worst_s > STALL_S:
         stall_ms = sleeper.worst_s * 1000
@@ -89,8 +89,8 @@ def report(story, rig, error, sleeper):
 
 
 class Interrupts:
-    """Ctrl-C and the signals that end a program: they count while `with` lasts, once, and wait before and behind it, so that what is
-    being made or taken away is made or taken away whole."""
+    """Ctrl-C and the signals that end a program. Within `with` the first one raises KeyboardInterrupt. Outside it they wait, so that files
+    and processes are created and removed completely."""
 
     def __init__(self):
         self.listens, self.came, self.pid = False, False, os.getpid()
@@ -98,7 +98,7 @@ class Interrupts:
             signal.signal(number, self.take)
 
     def take(self, _number, _frame):
-        if os.getpid() != self.pid:  # A child that is not another program yet.
+        if os.getpid() != self.pid:  # A child before its exec.
             os._exit(130)
         self.came = True
         if self.listens:
@@ -119,7 +119,7 @@ def run(options, interrupts):
     try:
         rig = Rig(options.build, CONFIG)
     except (OSError, RuntimeError) as error:
-        if interrupts.came:  # A terminal tells all of us: the simulator may have ended first.
+        if interrupts.came:  # A terminal sends the signal to all processes: the simulator may have ended first.
             raise KeyboardInterrupt from error
         print(f"FAILED: the simulator does not start: {error}", file=sys.stderr)
         return 1

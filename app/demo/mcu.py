@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""./demo --mcu: the real STM32 image `gateway` on an emulated CPU, its serial port on a pseudo terminal, the relay, and iwheelctl, which turns wheels."""
+"""./demo --mcu: the real STM32 image `gateway` on an emulated CPU, a pseudo terminal as its serial port, the relay, and iwheelctl, which turns wheels."""
 
 import argparse
 import os
@@ -18,11 +18,11 @@ BUILD_S, READY_S = 300, 30
 
 
 class Failed(Exception):
-    """Something did not happen as told."""
+    """A step did not have the expected result."""
 
 
 class Story:
-    """Emulator and relay; each writes a file that is read on."""
+    """Emulator and relay. Each writes its output to a file, which this program reads."""
 
     def __init__(self, build, folder):
         self.build, self.folder, self.begin = build, Path(folder), time.monotonic()
@@ -40,7 +40,7 @@ class Story:
         return output
 
     def wait(self, output, pattern, seconds):
-        """The match in what that program says, or Failed."""
+        """Returns the match in the output of the program, or raises Failed."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             text = output.read_text(errors="replace")
@@ -51,7 +51,7 @@ class Story:
                 if process.poll() is not None:
                     raise Failed(f"{name} ended: {where.read_text(errors='replace')[-600:]}")
             time.sleep(0.1)
-        raise Failed(f"{pattern!r} was not said within {seconds} s; the last: {text[-400:]}")
+        raise Failed(f"{pattern!r} was not printed within {seconds} s; the last output: {text[-400:]}")
 
     def ctl(self, *words):
         self.tell("$ iwheelctl " + " ".join(words))
@@ -62,7 +62,7 @@ class Story:
             raise Failed(f"iwheelctl {words[0]} ended with {done.returncode}")
 
     def play(self):
-        self.tell("building the image gateway, as it is flashed (seconds)")
+        self.tell("building the image gateway (some seconds)")
         bus = self.start("emulator", [ROOT / "app/demo/emulate", "--image", "gateway", "--every", "0.5"])
         port = self.wait(bus, r"serial port is (/dev/pts/\d+)", BUILD_S)[1]
         self.tell(f"an emulated CPU runs it; its serial port is {port}")
@@ -70,14 +70,14 @@ class Story:
         settings.write_text("[northbound]\ngroup = none\n", encoding="ascii")
         relay = self.start("relay", [self.build / "app/bridge/serial/iwheel-serial", "-c", settings, "--port", port, "--socket", self.socket])
         said = self.wait(relay, r"board on \S+: start (\w+), version (\S+)", READY_S)
-        self.tell(f"iwheel-serial meets it: start {said[1]}, version {said[2]}")
+        self.tell(f"iwheel-serial has connected: start {said[1]}, version {said[2]}")
         self.ctl("drive", "200", "200", "--for", "2s")
         turned = [float(speed) for speed in re.findall(r"left (-?\d+) mm/s", bus.read_text(errors="replace"))]
         if max(turned) < 100:
             raise Failed(f"the wheels did not turn: {turned}")
-        self.tell(f"the bus saw the left wheel at {max(turned):.0f} mm/s")
+        self.tell(f"largest speed of the left wheel on the bus: {max(turned):.0f} mm/s")
         self.ctl("why")
-        self.tell("no Linux decided any of it: lease, ramps and stop are the board's. docs/user/serial.md: the same with a Nucleo")
+        self.tell("the board decided lease, ramps and stop, not Linux. docs/user/serial.md: the same with a Nucleo")
 
     def end(self):
         for _, process, _ in reversed(self.processes):
@@ -95,7 +95,7 @@ def main():
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if shutil.which("arm-none-eabi-gcc") is None:
-        sys.exit("demo: arm-none-eabi-gcc is missing; scripts/install_tools mcu brings it")
+        sys.exit("demo: arm-none-eabi-gcc is missing; install it: scripts/install_tools mcu")
     with tempfile.TemporaryDirectory(prefix="iwheel-") as folder:
         story = Story(options.build, folder)
         try:

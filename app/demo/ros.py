@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""./demo --ros: the real gateway and its bridge to ROS 2 drive two simulated wheels round a square, told by DDS messages from outside.
+"""./demo --ros: the real gateway and its bridge to ROS 2 drive two simulated wheels round a square, commanded by DDS messages of another process.
 
 Everything is on the loopback interface of this machine; no ROS, no CAN and no wheels are needed.
 """
@@ -21,15 +21,15 @@ from peer import Peer
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 400, "max_speed_mm_s": 700}}
 SIDE_M, SPEED, TURN, NEAR_M = 1.0, 0.4, 0.8, 0.25
 WIDTH, HEIGHT, SPAN_M = 48, 17, 1.5
-DRIFT = 0.8  # m/s² and rad/s² by which it slows down towards each corner
+DRIFT = 0.8  # Deceleration towards each corner, in m/s² and rad/s².
 
 
 class Failed(Exception):
-    """Something did not happen as told."""
+    """A step did not have the expected result."""
 
 
 class View:
-    """Draws the way on a terminal; writes a line now and then elsewhere."""
+    """Draws the path on a terminal. Without one it prints a line from time to time."""
 
     def __init__(self, plain):
         self.drawn = not plain and sys.stdout.isatty() and shutil.get_terminal_size().lines >= HEIGHT + 5
@@ -58,7 +58,7 @@ class View:
 
 
 class Drive:
-    """A node of its own: reads odom, publishes cmd_vel at 20 Hz."""
+    """A separate node: reads odom, publishes cmd_vel at 20 Hz."""
 
     def __init__(self, peer, view):
         self.peer, self.view = peer, view
@@ -71,7 +71,7 @@ class Drive:
     def look(self, words=""):
         message = self.odom.wait(seconds=2)
         if message is None:
-            raise Failed("no odometry came for two seconds")
+            raise Failed("no odometry arrived for two seconds")
         for _, newer, _ in self.odom.take():
             message = newer
         pose = message.pose.pose
@@ -81,12 +81,12 @@ class Drive:
         self.view.pose(self.x_m, self.y_m, self.yaw, words)
 
     def until(self, left, command, words, seconds=20):
-        """Drives until `left()` is nothing, slower towards the end."""
+        """Drives until `left()` is zero, slower towards the end."""
         due = end = time.monotonic()
         end += seconds
         while left() > 0.01:
             if time.monotonic() > end:
-                raise Failed(f"{words}: not there after {seconds} s")
+                raise Failed(f"{words}: not reached after {seconds} s")
             self.writer.write(command(math.sqrt(2 * DRIFT * 0.3 * left()) + 0.05))
             due += 0.05
             self.look(words)
@@ -108,7 +108,7 @@ class Drive:
 def tell(rig, peer, view):
     state = peer.reader("iwheel/state", "std_msgs/msg/String", kept=True)
     if state.wait(lambda message: '"gateway":"up"' in message.data, 10) is None:
-        raise Failed("the bridge does not meet the gateway")
+        raise Failed("the bridge does not connect to the gateway")
     drive = Drive(peer, view)
     answer = None
     end = time.monotonic() + 5
@@ -121,14 +121,14 @@ def tell(rig, peer, view):
         drive.side(number)
         drive.corner(number)
     off_m = math.hypot(drive.x_m, drive.y_m)
-    view.tell("nothing is published any more: the wheels stop by the lease")
+    view.tell("no more commands are published: the wheels stop, because the lease ends")
     stopped = state.wait(lambda message: "lease_lost" in message.data, 3)
     if off_m > NEAR_M or stopped is None:
-        raise Failed(f"{off_m:.2f} m off its beginning; stopped: {stopped}")
+        raise Failed(f"{off_m:.2f} m from its starting point; stopped: {stopped}")
     time.sleep(0.5)
     pose = rig.client().request("status")["pose"]
     print(
-        f"\nA square of {SIDE_M:g} m, back within {100 * off_m:.0f} cm by odom; the wheel's own odometry says {pose['x_mm'] / 1000:.2f} {pose['y_mm'] / 1000:.2f} m."
+        f"\nA square of {SIDE_M:g} m, back within {100 * off_m:.0f} cm by odom; by the wheel's own pose {pose['x_mm'] / 1000:.2f} {pose['y_mm'] / 1000:.2f} m."
     )
 
 
@@ -147,7 +147,7 @@ def main():
         bridge = Process([os.path.join(options.build, "app/bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
         rig.processes.append(bridge)
         tell(rig, Peer(domain), view)
-        print("The page: docs/user/ros2.md")
+        print("See docs/user/ros2.md")
         return 0
     except (Failed, OSError, RuntimeError, TimeoutError) as error:
         print(f"\nFAILED: {error}", file=sys.stderr)

@@ -49,7 +49,7 @@ def number(value):
 
 
 class Glyphs:
-    """What to draw with; plain ASCII where the terminal cannot do more."""
+    """Characters of the drawing; plain ASCII if the terminal has only that."""
 
     def __init__(self, unicode):
         self.full, self.empty, self.middle = ("█", "·", "│") if unicode else ("#", ".", "|")
@@ -63,7 +63,7 @@ def tint(text, *codes):
 
 
 class Screen:
-    """Draws the whole picture anew at each snapshot; leaves the terminal as it was."""
+    """Draws the whole picture again at each snapshot, and restores the terminal at the end."""
 
     def __init__(self, out):
         self.out = out
@@ -125,7 +125,7 @@ class Screen:
             return " starting"
         state, lease, estop = self.status["state"], self.status["lease"], self.status["estop"]["state"]
         colour = {"listening": 36, "armed": 32, "stopping": 33, "latched": 31}[state]
-        remaining = "nobody may drive" if lease["holder"] is None else f"{lease['name']} may drive for {number(lease['remaining_ms']):>4} ms"
+        remaining = "no lease holder" if lease["holder"] is None else f"lease holder {lease['name']}, {number(lease['remaining_ms']):>4} ms"
         lamp = tint(f"{self.glyphs.lamp} e-stop released", 32) if estop == "released" else tint(f" {self.glyphs.lamp} E-STOP {estop.upper()} ", 41, 97, 1)
         return f" state {tint(f'{state.upper():<10}', colour, 1)}  {remaining:<32}  " + lamp
 
@@ -135,8 +135,8 @@ class Screen:
             wheel = (self.status or {}).get(side)
             rows += [
                 tint(f" {side} wheel", 1) + " " * (53 - 7 - len(side)),
-                self._bar("told", wheel and wheel["applied_mm_s"], 36),
-                self._bar("does", wheel and wheel["speed_mm_s"], 32),
+                self._bar("appl", wheel and wheel["applied_mm_s"], 36),
+                self._bar("meas", wheel and wheel["speed_mm_s"], 32),
                 self._values(wheel),
                 " " * 53,
             ]
@@ -160,7 +160,7 @@ class Screen:
         return f"       {metres}   {volts}   force {force}".ljust(53)
 
     def _map(self):
-        """The way so far, seen from above, forward is up."""
+        """Returns the path so far, from above, forward is up."""
         points = [(-y, x) for x, y, _ in self.path] or [(0, 0)]
         span = max(MIN_SPAN_MM, *(max(p[axis] for p in points) - min(p[axis] for p in points) for axis in (0, 1))) * 1.1
         middle = [(max(p[axis] for p in points) + min(p[axis] for p in points)) / 2 for axis in (0, 1)]
@@ -187,12 +187,12 @@ class Screen:
 
 
 def choose(out, plain):
-    """Lines unless there is a terminal that is large enough."""
+    """Returns the drawing if the terminal is large enough, otherwise plain lines."""
     size = shutil.get_terminal_size()
     if plain or not out.isatty():
         return Lines(out)
     if size.columns < 80 or size.lines < 24:
-        print(f"this terminal has {size.columns} x {size.lines} characters; drawn from 80 x 24 on, so here come plain lines", file=out)
+        print(f"this terminal has {size.columns} x {size.lines} characters; the drawing needs 80 x 24, so plain lines follow", file=out)
         return Lines(out)
     return Screen(out)
 

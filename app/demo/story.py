@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The steps of the demonstration. Each tells what will be seen, does it, and requires that it happened."""
+"""The steps of the demonstration. Each announces what will happen, does it, and checks the result."""
 
 import subprocess
 import time
@@ -12,7 +12,7 @@ TOTAL = 9
 
 
 class Failed(Exception):
-    """Something did not happen as told."""
+    """A step did not have the expected result."""
 
 
 class Story:
@@ -26,7 +26,7 @@ class Story:
         self.status = None
         self.drivers = []
 
-    # Telling -----------------------------------------------------------------------------------------------------------
+    # Output ------------------------------------------------------------------------------------------------------------
 
     def elapsed_s(self):
         return time.monotonic() - self.begin
@@ -36,13 +36,13 @@ class Story:
         self.view.step(self.elapsed_s(), self.number, TOTAL, title, text)
 
     def require(self, condition, fact, otherwise=None):
-        """Tells the fact if it is one; ends the story if not."""
+        """Shows the fact if the condition is true; otherwise ends the story."""
         if not condition:
             raise Failed(f"this did not happen: {otherwise or fact}")
         self.view.fact(self.elapsed_s(), fact.replace(f"unix:{self.rig.folder}/", ""))
 
     def watch(self, seconds, until=None):
-        """Shows what the gateway tells for that long, or until the condition holds for a snapshot; then True."""
+        """Shows the snapshots of the gateway for this time. Ends earlier and returns True when the condition holds for a snapshot."""
         end = time.monotonic() + seconds
         while True:
             self.client.collect(0.04)
@@ -84,20 +84,20 @@ class Story:
         self.why()
 
     def find_wheels(self):
-        self.step("Finding the wheels", "Simulator and gateway start. The gateway only listens: it sends nothing until somebody arms it.")
+        self.step("Finding the wheels", "Simulator and gateway start. The gateway only listens: it sends nothing until a client arms.")
         answered_ms = self.rig.start_gateway(wheels=False)
         self.client = self.rig.client("demo")
         self.client.request("watch", topics=["state"], rate_hz=20)
         heard = self.watch(5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released")
         self.require(answered_ms < 3000, f"the gateway answers {answered_ms:.0f} ms after its start")
-        self.require(heard, "both wheels are heard and stand still, the e-stop is released")
+        self.require(heard, "both wheels are online and at standstill, the e-stop is released")
         self.watch(1.2)
         self.require(not self.rig.bus.setpoints(), "nothing was sent to the wheels")
 
     def learn_offsets(self):
         self.step(
-            "Learning the force sensors' zero",
-            "Each wheel takes the mean force of its first two seconds as its zero and sends it for a minute. Nobody leans on the handles, so it is a good one.",
+            "Learning the force offsets",
+            "Each wheel uses the mean force of its first two seconds as its offset and sends it for a minute. No load is on the handles, so it is valid.",
         )
         known = self.watch(6, lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None for side in ("left", "right")))
         offsets = [self.status[side]["force_offset_mN"] for side in ("left", "right")]
@@ -107,20 +107,20 @@ class Story:
         net = [self.status[side]["force_net_mN"] for side in ("left", "right")]
         self.require(
             all(value is not None and 50_000 < value < 70_000 for value in net),
-            f"somebody leans on it with 60 N per side: {net[0] / 1000:.1f} N and {net[1] / 1000:.1f} N measured",
+            f"a load of 60 N on each side: net force {net[0] / 1000:.1f} N and {net[1] / 1000:.1f} N",
             f"60 N measured as {net} mN",
         )
         self.rig.sim.ask("load both 0")
         self.watch(0.8)
 
     def arm(self):
-        self.step("Arming", "A joystick program asks for the right to drive. From now on both wheels hear a setpoint every 20 ms; zero, so far.")
+        self.step("Arming", "A joystick program requests the lease. From now on both wheels receive a setpoint every 20 ms, still zero.")
         driver = self.driver()
         self.require(True, f"armed; {self.status['lease']['name']} holds the lease")
         budget = self.status["budget"]
         self.require(
             budget["client_lost_ms"] <= 1000,
-            f"if it falls silent, the machine stands within {budget['client_lost_ms']} ms and {budget['client_lost_mm'] / 1000:.2f} m",
+            f"without its commands the machine stops within {budget['client_lost_ms']} ms and {budget['client_lost_mm'] / 1000:.2f} m",
         )
         driver.want(0, 0)
         self.watch(2.0)
@@ -131,14 +131,14 @@ class Story:
         return driver
 
     def forward(self, driver):
-        self.step("Driving forward", "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is what the wheels measure.")
+        self.step("Driving forward", "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is the measured speed.")
         driver.want(400, 400)
         self.watch(3.0)
         left, right = self.measured()
         self.require(self.near(400, 400), f"left {left} and right {right} mm/s measured", f"400/400 mm/s, measured {left}/{right}")
 
     def turn(self, driver):
-        self.step("A turn to the left", "The right wheel is told to run faster than the left one. Both change together, so the curve is smooth.")
+        self.step("A turn to the left", "The right wheel is commanded to run faster than the left one. Both change together, so the curve is smooth.")
         driver.want(180, 480)
         before = self.status["pose"]["psi_mrad"]
         self.watch(3.2)
@@ -152,7 +152,7 @@ class Story:
     def client_dies(self, driver):
         self.step(
             "The joystick program dies",
-            "kill -9 in the middle of it. Nobody feeds the lease any more: the gateway ramps down, holds zero for 1.5 s, then falls silent.",
+            "kill -9 while it drives. No command renews the lease any more: the gateway ramps down, sends zeros for 1.5 s, then sends nothing.",
         )
         killed_us = now_us()
         self.rig.timeline.append(Event(killed_us, "gone"))
@@ -164,11 +164,11 @@ class Story:
         self.require(stopped and slower_ms < 100, f"the first slower setpoint was on the bus after {slower_ms:.0f} ms", f"ramp after {slower_ms:.0f} ms")
         self.require(zero_ms < 900, f"zero after {zero_ms:.0f} ms, without a jerk", f"zero after {zero_ms:.0f} ms")
         silent = self.watch(4, lambda s: s["state"] == "listening")
-        self.require(silent and self.near(0, 0), "the wheels stand, the gateway is silent")
+        self.require(silent and self.near(0, 0), "the wheels are at standstill, the gateway sends nothing")
         self.watch(1.0)
 
     def press(self):
-        self.step("E-stop", "Another drive at 500 mm/s, and somebody presses the button. Now there is no ramp: zero at once, and it stays.")
+        self.step("E-stop", "Another drive at 500 mm/s, and the button is pressed. Now there is no ramp: zero immediately, and the gateway latches.")
         driver = self.driver()
         driver.want(500, 500)
         if not self.watch(4, lambda s: self.near(500, 500, s)):
@@ -180,15 +180,15 @@ class Story:
             next(((t - pressed_us) / 1000 for t, name, speed in self.rig.bus.setpoints(pressed_us) if name == wanted and speed == 0), 9999)
             for wanted in (266, 298)
         ]
-        self.require(latched and max(zeros) < 50, f"both wheels were told zero {max(zeros):.1f} ms after the press", f"zero after {max(zeros):.1f} ms")
+        self.require(latched and max(zeros) < 50, f"both wheels received zero {max(zeros):.1f} ms after the press", f"zero after {max(zeros):.1f} ms")
         self.watch(0.4)
         self.require("refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(), "the joystick program is refused from then on")
         stands = self.watch(3, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
-        self.require(stands, "the wheels stand")
+        self.require(stands, "the wheels are at standstill")
         self.watch(1.0)
 
     def reset(self):
-        self.step("Reset, too early and in time", "A reset leads back to listening, not to motion. It is refused as long as something speaks against it.")
+        self.step("Reset, too early and in time", "A reset leads back to listening, not to motion. It is refused while its cause is present.")
         reply = self.client.request("reset")
         self.require(not reply["ok"] and reply["error"] == "estop_pressed", f"refused: {reply.get('message')}", f"reset while pressed: {reply}")
         self.watch(2.2)
@@ -206,7 +206,7 @@ class Story:
         self.require(not self.rig.bus.setpoints(quiet_us), "and nothing is sent: motion needs arm and a fresh command")
 
     def why(self):
-        self.step("Why did it stop?", "The gateway remembers. `iwheelctl why` asks it.")
+        self.step("Why did it stop?", "The gateway stores the last stop. `iwheelctl why` shows it.")
         tool = subprocess.run(
             [find_program(self.rig.build, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "why"],
             stdout=subprocess.PIPE,
@@ -219,7 +219,7 @@ class Story:
         self.watch(2.5)
 
     def judge(self):
-        """The same judge as in the system tests looks at every frame that was on the bus."""
+        """The judge of the system tests checks every frame that was on the bus."""
         for driver in self.drivers:
             for line in driver.text().splitlines():
                 words = line.split()

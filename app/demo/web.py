@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The web page of two simulated wheels, to look at and to drive. See ./demo --help."""
+"""The web page of two simulated wheels, to watch and to drive. See ./demo --help."""
 
 import argparse
 import os
@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "test/sys
 
 from harness import Process, Rig, find_program
 
-# As in the other demonstration: for any machine, however busy.
+# As in the other demonstrations: wide limits for a busy machine.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 
 
@@ -28,7 +28,7 @@ def bridge(rig, port, lan):
         encoding="utf-8",
     )
     program = find_program(rig.build, "iwheel-web")
-    print("\nThe page of two simulated wheels, which may be driven from it:\n", flush=True)
+    print("\nThe page of two simulated wheels, which can drive them:\n", flush=True)
     process = Process([program, "-c", settings, *(["--lan"] if lan else [])], rig.path("web.out"), **({"stdout": None} if lan else {}))
     rig.processes.append(process)
     time.sleep(0.5)
@@ -51,7 +51,7 @@ def main():
         bridge(rig, options.port, options.lan)
         sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
         phone = (
-            "The browser warns once, because this machine made its certificate itself."
+            "The browser warns once, because this machine has created its own certificate."
             if options.lan
             else f"From a phone: ./demo --web --lan, or  ssh -L {options.port}:127.0.0.1:{options.port} THIS-MACHINE"
         )

@@ -4,7 +4,7 @@
 #include "start/start_report.h"
 
 _Static_assert(SOCK_PATH_SIZE >= GATEWAY_PATH_SIZE && SOCK_ADDRESS_SIZE >= GATEWAY_ADDRESS_SIZE,
-               "what can be configured has room");
+               "every configurable text fits");
 
 void gw_daemon_compose(gw_daemon_t *self) {
     const gateway_config_t *config = &self->config;

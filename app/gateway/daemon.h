@@ -4,10 +4,10 @@
 ///
 /// One cycle of the loop (loop.c) has one of two orders:
 ///
-///     usual:   wait -> signals -> step of the core (bus, e-stop) -> what changed -> lines of clients
-///              -> step again if they asked for something -> new clients -> flush -> store assumptions -> watchdog
-///     driving: wait -> signals -> lines of the lease holder -> step of the core -> what changed -> lines of the others
-///              -> as above
+///     usual:   wait -> signals -> step of the core (bus, e-stop) -> report changes -> lines of clients
+///              -> step again after a request -> new clients -> flush -> store assumptions -> watchdog
+///     driving: wait -> signals -> lines of the lease holder -> step of the core -> report changes -> lines of the
+///              others -> as above
 ///
 /// so that the wheels precede all clients. The loop uses the second order while the wheels are driven, the holder has
 /// sent something, and neither a step nor an edge of the e-stop is due. The reading of bus and e-stop that follows then
@@ -15,7 +15,7 @@
 /// is on the bus (2.16 instead of 2.23 per frame of docs/developer/speed.md, with 20 commands/s). The work per cycle is
 /// limited in each of these places.
 ///
-/// A board has one order, because a request takes milliseconds there: step -> request -> step
+/// A board has one order, because a request needs milliseconds there: step -> request -> step
 /// (port/stm32_stub/main.c).
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
@@ -47,7 +47,7 @@ typedef enum { GW_PACE_RESTING, GW_PACE_ALERT, GW_PACE_DRIVING } gw_pace_t;
 typedef struct {
     gw_loop_phase_t phase;
     gw_pace_t pace;
-    bool frames_wait; ///< The bus does not wake the loop. Watchers and a silent bus prevent it at any pace.
+    bool frames_wait; ///< The bus does not wake the loop. Watchers, and a bus without frames, prevent it at any pace.
     int signal_fd;
     iw_client_t holder;        ///< Lease holder after the last step; it is served first.
     iw_time_us_t suspended_us; ///< Suspended time of the machine, as last read.

@@ -137,7 +137,7 @@ static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     if (daemon->loop.mark_us == 0U) {
         sock_log(
             &daemon->log, SOCK_LOG_WARNING,
-            "cannot change the crash marker %s: %s; until that works the wheels would keep their last command for a "
+            "cannot change the crash marker %s: %s; until that works the wheels would follow their last command for a "
             "second after a crash",
             daemon->runtime.marker_path, strerror(errno));
     }
@@ -181,7 +181,7 @@ static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
                         : evenly(seen->at_us, daemon->wheels.step_us, echo_waits ? ECHO_LOOK_US : LOOK_US);
 }
 
-/// Reads one clock, in which a suspend appears as lateness. After a lateness, and periodically, it reads both.
+/// Reads one clock, in which a suspend appears as lateness. Reads both after a lateness, and periodically.
 static void read_clock(gw_daemon_t *daemon) {
     const iw_time_us_t now_us = iwl_clock_awake_us(daemon->loop.suspended_us);
     if (now_us < daemon->loop.awaited_us + ASLEEP_US && now_us < daemon->loop.clocks_us) {

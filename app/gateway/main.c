@@ -56,8 +56,8 @@ static void listen_to_watchers(gw_daemon_t *daemon) {
     *watch = (sock_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
     if (strcmp(wanted.path, "none") != 0 &&
         (sock_listener_prepare(watch, &wanted, stderr) != 0 || sock_listener_open(watch, &daemon->log, stderr) != 0)) {
-        sock_log(&daemon->log, SOCK_LOG_WARNING,
-                 "nobody can watch on %s (see above); who may drive is served all the same", wanted.path);
+        sock_log(&daemon->log, SOCK_LOG_WARNING, "no client can watch on %s (see above); clients that drive are served",
+                 wanted.path);
     }
 }
 
@@ -80,7 +80,7 @@ static int serve(gw_daemon_t *daemon) {
     listen_to_watchers(daemon);
     result = start_core(daemon);
     if (result == 0 && gw_loop_open(daemon) != 0) {
-        (void)fputs("iwheel-gateway: cannot make the descriptors for the event loop; raise the limit of open files\n",
+        (void)fputs("iwheel-gateway: cannot create the descriptors for the event loop; raise the limit of open files\n",
                     stderr);
         result = EX_UNAVAILABLE;
     }

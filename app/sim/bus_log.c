@@ -32,7 +32,7 @@ void sim_bus_log_flush(sim_bus_log_t *self) {
         if (written > 0) {
             done += (size_t)written;
         } else if (errno != EINTR) {
-            (void)fprintf(stderr, "iwheel-sim: the log ends here, it cannot be written: %s\n", strerror(errno));
+            (void)fprintf(stderr, "iwheel-sim: the log ends here, because it cannot be written: %s\n", strerror(errno));
             self->fd = -1;
         }
     }

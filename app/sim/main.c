@@ -39,7 +39,7 @@ static int receive(int fd, bool help) {
 }
 
 /// Sends one command to a running simulator and prints the answer. Returns the exit code: 0 ok, 1 refused, 69 no
-/// simulator there, 75 no answer.
+/// simulator, 75 no answer.
 static int tell(const char *control_path, const char *command) {
     char line[SIM_LINE_BYTES + 1U];
     struct timeval const limit = {.tv_sec = ANSWER_WITHIN_S};

@@ -114,7 +114,7 @@ static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, sim_ca
     if (reason == SIM_USAGE) {
         const char *usage = "";
         const int length = usage_of(command->name, &usage);
-        (void)snprintf(self->answer, sizeof self->answer, "error that is not right; usage: %.*s\n", length, usage);
+        (void)snprintf(self->answer, sizeof self->answer, "error wrong arguments; usage: %.*s\n", length, usage);
         return SIM_REFUSED;
     }
     if (reason != NULL) {
@@ -142,7 +142,7 @@ sim_outcome_t sim_panel_execute(sim_panel_t *self, iw_time_us_t now_us, const ch
     }
     const sim_command_t *const command = find(words.word[0]);
     if (command == NULL) {
-        return refuse(self, "unknown command; help lists the commands; this is none: ", words.word[0]);
+        return refuse(self, "unknown command (help lists the commands): ", words.word[0]);
     }
     sim_call_t call = {self, self->world, now_us, &words, SIM_BOTH, {0}};
     return run(self, command, &call);

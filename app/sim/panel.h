@@ -37,7 +37,7 @@ typedef enum {
     SIM_CHANGED, ///< The command was executed; it must be logged.
 } sim_outcome_t;
 
-/// Executes one command. Before the call, all that is due before `now_us` must have been read from the world.
+/// Executes one command. Before the call, all frames that are due before `now_us` must have been read from the world.
 sim_outcome_t sim_panel_execute(sim_panel_t *self, iw_time_us_t now_us, const char *line);
 
 /// Writes one line of JSON about both wheels, the bus and the button. Returns its length, at most `size` - 1.

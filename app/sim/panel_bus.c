@@ -7,7 +7,7 @@
 
 #define PULSE_MAX_milli_ms 60000000
 #define STATUS_BYTES       4096U
-/// Value of an argument that was not given.
+/// Value of an absent argument.
 #define UNTOLD INT64_MIN
 /// Value of `once`; on and off are 1 and 0.
 #define BUT_ONCE 2
@@ -143,7 +143,7 @@ static result_t set_contact(const sim_call_t *call) {
         return SIM_USAGE;
     }
     if (hooks->button != NULL && hooks->second == NULL) {
-        return "the button has one contact; give the simulator --estop2 PATH for another";
+        return "the button has one contact; start the simulator with --estop2 PATH for another";
     }
     return (button != NULL) ? obey(&config, button) : NULL;
 }

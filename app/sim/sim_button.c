@@ -4,8 +4,8 @@
 #include <errno.h>
 #include <sys/socket.h>
 
-/// Sends the state to a client. A client that does not read this byte cannot be informed any more: it is disconnected,
-/// and a lost connection means pressed.
+/// Sends the state to a client. Disconnects a client that does not read this byte, because it cannot be informed any
+/// more; a lost connection means pressed.
 static void tell(const sim_button_t *self, sim_watch_t *client) {
     char const state = self->pressed ? '1' : '0';
     if (send(client->fd, &state, 1U, MSG_DONTWAIT | MSG_NOSIGNAL) != 1) {

@@ -22,7 +22,7 @@ typedef struct {
     const char *word;
     const char *other;
     const char *also; ///< A word that means `value`; NULL: none.
-    int64_t value;    ///< Also the value of an optional argument that is not given.
+    int64_t value;    ///< Also the value of an absent optional argument.
     bool optional;
 } sim_argument_t;
 

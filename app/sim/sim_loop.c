@@ -106,14 +106,15 @@ static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
         return errno == ENOENT || refuse(out_reason, path, strerror(errno));
     }
     if (!S_ISSOCK(there.st_mode)) {
-        return refuse(out_reason, path, "exists and is no socket; remove it or choose another path");
+        return refuse(out_reason, path, "exists and is not a socket; remove it or choose another path");
     }
     int const fd = sim_listener_connect(path, type);
     if (fd >= 0 || errno != ECONNREFUSED) {
         if (fd >= 0) {
             (void)close(fd);
         }
-        return refuse(out_reason, path, "somebody listens there; end the other iwheel-sim or choose another path");
+        return refuse(out_reason, path,
+                      "another process listens there; end the other iwheel-sim or choose another path");
     }
     return unlink(path) == 0 || refuse(out_reason, path, strerror(errno));
 }

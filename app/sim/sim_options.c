@@ -109,7 +109,7 @@ static int set_option(sim_options_t *options, int option, const char *value) {
         (void)fputs(sim_help, stdout);
         return EX_OK;
     case '?':
-        return complain("the command line is not right", "");
+        return complain("wrong arguments", "");
     default:
         return set_number(options, option, value);
     }

@@ -23,7 +23,7 @@ bool sim_socketcan_open(sim_socketcan_t *self, const char *interface, const sim_
     int const error = iwl_bus_open(&self->bus, interface);
     if (error == ENOTSUP) {
         (void)snprintf(out_reason->text, sizeof out_reason->text,
-                       "--can %s: not an interface's name, or libmnl was missing when this was built; apt-get install "
+                       "--can %s: not an interface's name, or this build has no libmnl; apt-get install "
                        "libmnl-dev, configure and build again, or use --can unix:PATH",
                        interface);
         return false;

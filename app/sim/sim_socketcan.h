@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The simulated wheels as a node on a CAN interface of this machine.
 ///
-/// Frames of the wheels and of the other simulated nodes are sent on the interface. Frames that other nodes send there
-/// take part in the simulated bus like frames of one more adapter, so they reach the wheels later by the duration of a
-/// frame. Faults of adapters and of the medium are those of the interface: commands for them are refused.
+/// Frames of the wheels and of the other simulated nodes are sent on the interface. Frames of other nodes there pass
+/// through the simulated bus like frames of one more adapter, so they reach the wheels later by the duration of a frame.
+/// Faults of adapters and of the medium are those of the interface: commands for them are refused.
 #ifndef SIM_SOCKETCAN_H
 #define SIM_SOCKETCAN_H
 
@@ -27,11 +27,11 @@ bool sim_socketcan_open(sim_socketcan_t *self, const char *interface, const sim_
                         sim_reason_t *out_reason);
 void sim_socketcan_close(sim_socketcan_t *self);
 
-/// Reopens an interface that was gone, and submits its frames to the simulated bus. Returns true if the interface came
-/// up, went down, or changed its state otherwise: see `state`.
+/// Reopens an interface that was absent, and submits its frames to the simulated bus. Returns true if the state of the
+/// interface has changed: see `state`.
 bool sim_socketcan_step(sim_socketcan_t *self, iw_time_us_t now_us);
 
-/// Returns the time at which sim_socketcan_step has something to do without a frame; IW_NEVER if it has not.
+/// Returns the time at which sim_socketcan_step must run even without a frame; IW_NEVER if it need not.
 iw_time_us_t sim_socketcan_next_us(const sim_socketcan_t *self);
 
 /// Sends a frame of the simulated bus on the interface, unless it came from the interface.

@@ -95,7 +95,7 @@ static int load_script(sim_simulator_t *self, const char *path) {
     return EX_DATAERR;
 }
 
-/// Reads all frames that were on the bus by now from the world and passes them on.
+/// Reads all frames that were on the bus by now from the world, and passes them to the clients.
 static void catch_up(sim_simulator_t *self) {
     sim_delivery_t delivery;
     while (sim_world_step(&self->world, self->now_us, &delivery)) {
@@ -125,7 +125,7 @@ static void awake(void *context) {
         iw_time_us_t const pause_us = now_us - self->wake_us;
         self->skipped_us += pause_us;
         now_us -= pause_us;
-        say(self, "this process stood still for %" PRIu64 " ms, and the wheels with it", pause_us / IW_US_PER_MS);
+        say(self, "this process was stopped for %" PRIu64 " ms, and the wheels with it", pause_us / IW_US_PER_MS);
     }
     self->now_us = now_us;
     catch_up(self);

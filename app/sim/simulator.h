@@ -37,7 +37,7 @@ typedef struct {
     char command[SIM_LINE_BYTES]; ///< Command for a running simulator; empty: run the simulator.
 } sim_options_t;
 
-/// Reads the command line. Returns -1 if the program must go on, otherwise the exit code; all messages for the user
+/// Reads the command line. Returns -1 if the program must continue, otherwise the exit code; all messages for the user
 /// have been printed.
 int sim_options_read(sim_options_t *out_options, int argc, char **argv);
 
@@ -68,7 +68,7 @@ typedef struct {
     bool ended;
 } sim_simulator_t;
 
-/// Creates all parts. Returns -1, or the exit code after it has printed the cause and undone everything.
+/// Creates all parts. Returns -1, or the exit code after it has printed the cause and removed all parts again.
 int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options);
 
 /// Runs until a command or a signal ends it.

@@ -100,7 +100,7 @@ static iw_window_t judge_quality(const iw_force_t *self, const iw_force_quality_
 }
 
 /// The ring is full, so `next` is the index of the oldest sample and the first half is the older one. A saturated
-/// sample takes precedence over every other fault.
+/// sample precedes every other fault.
 static void measure(const iw_force_t *self, iw_force_quality_t *out_quality) {
     const int32_t scale = scale_mN(self);
     bool any_saturated = false;
@@ -137,7 +137,7 @@ static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) 
     return iw_abs(difference) * 100 <= whole * percent;
 }
 
-/// At rest, raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
+/// At standstill, raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
 /// since each is narrower than the gap to the next. A ratio outside all of them is unclear.
 static iw_unit_observation_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_abs(offset_dN);

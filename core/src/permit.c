@@ -67,7 +67,7 @@ static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, uint32_t span_us
     self->lease_until_us = now_us + span_us;
 }
 
-/// Gives the lease to `client`: ARMED begins, or the lease is taken over.
+/// Makes `client` the lease holder: ARMED begins, or the lease moves from another client.
 static IW_APART void begin_driving(iw_permit_t *self, iw_time_us_t now_us) {
     self->armed_us = now_us;
     grant_lease(self, now_us, IW_FIRST_LEASE_US);

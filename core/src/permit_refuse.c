@@ -20,7 +20,7 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
     return iw_cause_refusal(iw_permit_present(self, now_us));
 }
 
-/// The button takes precedence: no reset helps while it is pressed, and it is the only fix that the user can see.
+/// The button comes first: no reset helps while it is pressed, and it is the only cause that the user can see.
 static iw_refusal_t refuse_latched(iw_refusal_t present) {
     return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
 }

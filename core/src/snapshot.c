@@ -20,7 +20,7 @@ bool iw_gateway_is_sending(const iw_gateway_t *self) {
 }
 
 /// Returns true if the operator has decided the unit or the offset against the observation. Then the wheel's offset
-/// cannot be right, and only a tare gives a valid force.
+/// cannot be right, and only a tare makes the force valid.
 static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
     const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
     if (!judged) {

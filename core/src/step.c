@@ -211,8 +211,8 @@ static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
     }
 }
 
-/// Receives everything before any age is judged (R7), but with a limit: a babbling node must not keep the step from
-/// ending.
+/// Receives everything before any age is judged (R7), but with a limit: a babbling node must not prevent the end of the
+/// step.
 static IW_APART void receive(iw_gateway_t *self) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
@@ -260,7 +260,7 @@ static IW_APART int ask_back(iw_gateway_t *self) {
 }
 
 /// A missing echo latches. The zeros of that stop would wait after the stuck frame, so the core calls `purge`, once per
-/// stop, because a purge may take the link down. (After IW_CAUSE_SEND_STALLED there are only zeros to send.)
+/// stop, because a purge may set the link down. (After IW_CAUSE_SEND_STALLED there are only zeros to send.)
 static void watch_echo(iw_gateway_t *self) {
     const uint32_t waited_us = overdue_us(self);
     if (waited_us == 0U) {
@@ -321,7 +321,7 @@ static IW_APART void watch_rolling(iw_gateway_t *self) {
     iw_rolling_step(&self->rolling, self->now_us, alone && (turns(self, IW_LEFT) || turns(self, IW_RIGHT)));
 }
 
-/// Returns the time for which both wheels have been at rest; 0 if one turns. Both wheels must be online.
+/// Returns the time for which both wheels have been at standstill; 0 if one turns. Both wheels must be online.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
     const iw_time_us_t left_us = self->wheel[IW_LEFT].rest_since_us;
     const iw_time_us_t right_us = self->wheel[IW_RIGHT].rest_since_us;
@@ -364,8 +364,8 @@ static void judge_wheels(iw_gateway_t *self) {
     iw_permit_step(&self->permit, self->now_us);
 }
 
-/// Takes the pair that is due and sends it. R5 (both or none): after a pair of which the port refused one frame, both
-/// wheels receive zeros.
+/// Sends the pair that is due. R5 (both or none): if the port refused one frame of a pair, both wheels receive zeros
+/// next.
 static iw_send_result_t send_pair(iw_gateway_t *self) {
     if (!iw_setpoint_due(&self->setpoint, self->now_us)) {
         return IW_SEND_DONE;

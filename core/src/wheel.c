@@ -59,7 +59,8 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// Rest is a run of messages without a gap: one message at rest after a gap says nothing about the time between.
+/// Standstill needs a run of messages without a gap: one message after a gap does not show that the wheel did not move
+/// in between.
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
@@ -119,7 +120,7 @@ void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kin
 }
 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
-    // One excuse per fresh message: a run of late steps must not keep a dead wheel online.
+    // One excuse per fresh message: a run of late steps must not make a dead wheel appear online.
     if (self->received_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;

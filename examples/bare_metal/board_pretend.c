@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A board for qemu's mps2-an386 (Cortex-M4): pretended wheels, and a clock that moves when the program sleeps. After
-// five seconds of it the result goes to the debugger (semihosting), and the emulation ends.
+// A board for qemu's mps2-an386 (Cortex-M4): pretended wheels, and a clock that advances while the program sleeps. After
+// five seconds of that clock the program sends the result to the debugger (semihosting), and the emulation ends.
 #include "board.h"
 #include "pretend_wheels.h"
 
@@ -25,7 +25,7 @@ static void semihost(uint32_t operation, uintptr_t argument) {
 }
 
 static void end(bool good) {
-    semihost(SYS_WRITE0, (uintptr_t)(good ? "drove at 200 mm/s and stands\n" : "did not drive and stop\n"));
+    semihost(SYS_WRITE0, (uintptr_t)(good ? "drove at 200 mm/s and stopped\n" : "did not drive and stop\n"));
     semihost(SYS_EXIT, good ? EXIT_OK : EXIT_BAD);
 }
 

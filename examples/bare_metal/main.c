@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The smallest complete program around the core without an operating system: this file is all of it.
+// The smallest complete program with the core and without an operating system.
 #include "board.h"
 #include "first_drive.h"
 

@@ -254,10 +254,10 @@ class OverTheSocket(WithRig):
     def test_other_file_is_not_asked_for(self):
         code, _, err = self.away("replay", "/nowhere/other.log")
         self.assertEqual(65, code)
-        self.assertIn("there is no such file", err)
+        self.assertIn("the file does not exist", err)
         code, _, err = self.away("replay", "/nowhere/stop-000099-estop_line.log")
         self.assertEqual(65, code)
-        self.assertIn("there is no such file", err)
+        self.assertIn("the file does not exist", err)
 
 
 class Pieces(WithRig):
@@ -405,7 +405,7 @@ class ShortBox(WithRig):
         stream.stop()
         _, out, err = self.ctl("replay", self.wait_whole(1) + ".log")
         self.assertEqual("", err)
-        self.assertIn("its state is taken over", out)
+        self.assertIn("its state is restored", out)
         self.assertIn("pressed while driving 300/-200 mm/s", out)
         self.assertRegex(out, r"stops: (\d+) of \1 as recorded")
         self.assertRegex(out, r"answers to requests: (\d+) of \1 as recorded")
@@ -468,7 +468,7 @@ class Record(WithRig):
         path = self.rig.path("four.log")
         code, _, err = self.ctl("record", path, "--can", "unix:/nonexistent", "--for", "1s")
         self.assertEqual(69, code)
-        self.assertIn("is the simulator running", err)
+        self.assertIn("start it: iwheel-sim", err)
         self.assertFalse(os.path.exists(path))
 
 
@@ -500,7 +500,7 @@ class Learn(WithRig):
             "always 8 bytes",
             "setpoint_type = 9",
             "setpoint_dlc = 8",
-            "- left force at rest / offset",
+            "- left force at standstill / offset",
             "force_unit = dN",
             "LEAST significant byte first",
             "another gear (rpm_of, gear_ratio)",

@@ -106,8 +106,8 @@ class Bringup(unittest.TestCase):
 
     def look_at_signs(self, operator, mirrored):
         for side in ("left", "right"):
-            operator.answer(f"Look at the {side} wheel", "")
-            operator.answer("r: again)", "b" if side in mirrored else "f")
+            operator.answer(f"Watch the {side} wheel", "")
+            operator.answer("r: repeat)", "b" if side in mirrored else "f")
         operator.answer("Now both", "")
         operator.answer("straight ahead?", "y")
 
@@ -129,7 +129,7 @@ class Bringup(unittest.TestCase):
             self.wait_until_stands()
             operator.type("\n")
         if take:
-            operator.answer("Take that?", take)
+            operator.answer("Use that?", take)
 
     def turn_around(self, operator, *commands, turns=3):
         """The machine as a whole; by other commands, if it does not go as it should."""
@@ -206,10 +206,10 @@ class Bringup(unittest.TestCase):
         self.weigh(operator, "left", 5)
         self.weigh(operator, "right", 5)
         self.push(operator, 5, mirrored=("left",))
-        operator.answer("Take the mean?", "y")
+        operator.answer("Use the mean?", "y")
         self.turn_around(operator)
-        operator.expect("Configured were 540 mm")
-        operator.answer("Take that?", "y")
+        operator.expect("The configured track is 540 mm")
+        operator.answer("Use that?", "y")
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
         found = {
@@ -247,7 +247,7 @@ class Bringup(unittest.TestCase):
             text = file.read()
         self.assertAlmostEqual(620, int(self.value("wheels", "track_mm")), delta=8)
         self.assertEqual(9, text.count(", confirmed: "), text)
-        self.assertIn(f"The ledger in {self.records}", operator.text)
+        self.assertIn(f"The confirmed results are stored in {self.records}", operator.text)
         self.assertEqual(["mine.conf", "mine.conf.from", "records"], sorted(os.listdir(self.folder.name)))
         self.gateway_takes_it()
         self.ledger_knows_it()
@@ -285,7 +285,7 @@ class Bringup(unittest.TestCase):
             ("track", r"3 full turns by hand: left -?\d+, right -?\d+ ticks"),
             ("wheel_radius", r"5\.00 m pushed: left -?\d+, right -?\d+ ticks"),
             ("gear_ratio", r"\d+ and \d+ ticks in 3 turns by hand"),
-            ("setpoint_type", "told 100 mm/s, measured"),
+            ("setpoint_type", "commanded 100 mm/s, measured"),
             ("force_unit_left", r"5\.00 kg changed"),
             ("mount_sign_left", "saw it turn backwards with invert = no"),
             ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together did"),
@@ -325,7 +325,7 @@ class Bringup(unittest.TestCase):
 
     def test_wheel_that_runs_away_before_bringup_looks_is_found_out_by_the_stop(self):
         operator = self.held_during_the_tries()
-        operator.expect("Nothing may turn")
+        operator.expect("Neither wheel may turn")
         self.rig.sim.ask("unblock both")
         operator.expect("any key stops it")
         operator.process.send_signal(signal.SIGSTOP)  # Hangs, while the gateway sees a wheel run away.
@@ -345,7 +345,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Did both wheels turn", "y")
         operator.expect("any key stops it")
         self.rig.sim.ask("mute left")
-        self.assertRegex(operator.expect("Once more?"), "left wheel (is )?(not heard|sent no telemetry)")
+        self.assertRegex(operator.expect("Try again?"), "left wheel (is )?(offline|not heard|sent no telemetry)")
         self.rig.sim.ask("unmute left")
         operator.type("y\n")
         operator.expect("it is a setpoint")
@@ -369,7 +369,7 @@ class Bringup(unittest.TestCase):
         with open(recording, "w", encoding="utf-8") as file:
             file.writelines(f"({at * 0.02:.6f}) can0 10A#0300000000\n" for at in range(50))
         operator = self.begin("--learn", recording)
-        operator.expect("there is no setpoint with a speed")
+        operator.expect("has no setpoint with a speed")
         operator.expect("types to try [0-7] ")
         operator.type("q\n")
         self.assertEqual(1, operator.wait())
@@ -387,7 +387,7 @@ class Bringup(unittest.TestCase):
         operator.expect("STOPPED: a key was pressed")
         late = [frame for frame in self.moving() if frame[0] > pressed_us + 150_000]
         self.assertFalse(late, "nonzero setpoints after the key")
-        operator.answer("Once more?", "q")
+        operator.answer("Try again?", "q")
         self.assertEqual(1, operator.wait())
 
     def test_no_type_that_moves_asks_again_and_takes_none(self):
@@ -406,8 +406,8 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         operator.answer("Did both wheels turn", "y")
         operator.answer("current_role", "limit")
-        operator.answer("Look at the left wheel", "")
-        operator.answer("r: again)", "o")
+        operator.answer("Watch the left wheel", "")
+        operator.answer("r: repeat)", "o")
         operator.expect("exchange the wheels")
         self.assertEqual(1, operator.wait())
 
@@ -417,9 +417,9 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         operator.answer("Did both wheels turn", "y")
         operator.answer("current_role", "limit")
-        operator.answer("Look at the left wheel", "")
-        operator.answer("r: again)", "f")
-        operator.answer("Look at the right wheel", "")
+        operator.answer("Watch the left wheel", "")
+        operator.answer("r: repeat)", "f")
+        operator.answer("Watch the right wheel", "")
         operator.expect("measures the opposite")
         self.assertEqual(1, operator.wait())
 
@@ -429,7 +429,7 @@ class Bringup(unittest.TestCase):
         operator.expect("any key stops it")
         time.sleep(0.5)
         operator.type("\x03")
-        operator.answer("Once more?", "q")
+        operator.answer("Try again?", "q")
         self.assertEqual(1, operator.wait())
         self.assertIn("STOPPED", operator.text)
         time.sleep(0.3)
@@ -470,7 +470,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("mute right")
         operator = self.start()
         operator.answer("finger on the e-stop?", "y")
-        operator.expect("Mend what failed")
+        operator.expect("Fix the failed checks")
         self.assertEqual(1, operator.wait())
         hold(not self.rig.bus.setpoints(), "setpoints without the checks")
 
@@ -493,7 +493,7 @@ class Bringup(unittest.TestCase):
         with open(self.out + ".old", encoding="utf-8") as file:
             self.assertEqual("; precious\n", file.read())
         self.assertEqual("192", self.value("wheels", "radius_mm"))
-        self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: somebody saw it turn forwards with invert = no'", operator.text)
+        self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: the operator saw it turn forwards with invert = no'", operator.text)
 
     # --- what was not seen is not concluded -----------------------------------------------------------------------
 
@@ -514,22 +514,22 @@ class Bringup(unittest.TestCase):
     def test_gear_is_not_concluded_from_the_other_wheel_from_back_and_forth_or_from_none(self):
         operator = self.begin(gear=True)
         operator.answer("Turn the wheels by hand?", "y")
-        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "make no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
+        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "are no gear"), (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
             operator.expect("press Enter ...")
             for push in pushes:
                 self.rig.sim.ask(push)
                 self.wait_until_stands()
             operator.type("\n")
             operator.expect("The right wheel counted" if told == "RIGHT" else told)
-            operator.answer("Once more?", "y" if told != "back and forth" else "n")
-        operator.expect("The gear stays as it was")
+            operator.answer("Try again?", "y" if told != "back and forth" else "n")
+        operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
         self.assertEqual(1, operator.wait())
 
     def test_gear_that_differs_from_wheel_to_wheel_is_none(self):
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192, turns=(3, 4), take=None)
-        operator.expect("The gear stays as it was")
+        operator.expect("The gear is unchanged")
         operator.answer("types to try", "q")
         self.assertEqual(1, operator.wait())
 
@@ -538,13 +538,13 @@ class Bringup(unittest.TestCase):
             self.rig.sim.ask(command)
         operator = self.begin(gear=True)
         self.turn_by_hand(operator, 192)
-        self.assertIn("whose turns the rpm count was not to be seen", operator.text.replace("\n", " "))
+        self.assertIn("whether rpm counts the wheel or the rotor was not measured", operator.text.replace("\n", " "))
         self.rig.sim.ask("rpm left wheel")
         self.drive_through(operator)
         operator.answer("Distance in m", "")
         operator.answer("How many full turns", "")
         found = self.write(operator)
-        self.assertRegex(found["gear_ratio"], "^noted: .* ticks in 3 turns by hand; whose turns the rpm count was not seen$")
+        self.assertRegex(found["gear_ratio"], "^noted: .* ticks in 3 turns by hand; whether rpm counts the wheel or the rotor was not measured$")
         self.assertIsNone(found["rpm_of"])
         self.assertEqual("4", self.value("wheels", "gear_ratio"))
 
@@ -574,7 +574,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block both")
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
-        operator.expect("both wheels must turn, or nothing is known")
+        operator.expect("unless both wheels turn, there is no result")
         operator.expect("Now no wheel turned")
         self.rig.sim.ask("unblock both")
         self.assertEqual("?", self.offered(operator, "current_role"))
@@ -595,7 +595,7 @@ class Bringup(unittest.TestCase):
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
         operator.expect("The current alone turned the left wheel")
-        operator.expect("not seen of both")
+        operator.expect("only one wheel showed it")
         self.rig.sim.ask("unblock right")
         operator.answer("current_role", "")
         self.look_at_signs(operator, mirrored=())
@@ -609,13 +609,13 @@ class Bringup(unittest.TestCase):
         operator = self.begin()
         self.drive_through(operator, signs=False)
         for side in ("left", "right"):
-            operator.answer(f"Look at the {side} wheel", "")
-            operator.answer("r: again)", "f")
+            operator.answer(f"Watch the {side} wheel", "")
+            operator.answer("r: repeat)", "f")
         operator.expect("Now both")
         self.rig.sim.ask("block left")
         operator.seen -= len("Now both")
         operator.answer("Now both", "")
-        operator.expect("does not say that both went forwards")
+        operator.expect("By the bus not both turned forwards")
         self.rig.sim.ask("unblock left")
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "q")
@@ -624,10 +624,10 @@ class Bringup(unittest.TestCase):
     def test_wheel_that_turns_untold_ends_the_signs(self):
         operator = self.begin()
         self.drive_through(operator, signs=False)
-        operator.expect("Look at the left wheel")
+        operator.expect("Watch the left wheel")
         self.rig.sim.ask("runaway right on 80")
-        operator.seen -= len("Look at the left wheel")
-        operator.answer("Look at the left wheel", "")
+        operator.seen -= len("Watch the left wheel")
+        operator.answer("Watch the left wheel", "")
         operator.expect("BOTH wheels turned")
         self.assertEqual(1, operator.wait())
 
@@ -642,7 +642,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("raw left 32767")
         operator.type("\n")
         operator.expect("at the end of its range")
-        operator.answer("Once more?", "n")
+        operator.answer("Try again?", "n")
         operator.answer("put on the right handle", "5")
         operator.answer("off both handles", "")
         operator.expect("put the mass on")
@@ -652,7 +652,7 @@ class Bringup(unittest.TestCase):
         time.sleep(0.7)
         self.rig.sim.ask("load right 250")
         operator.expect("The force swayed")
-        operator.answer("Once more?", "n")
+        operator.answer("Try again?", "n")
         operator.answer("Distance in m", "q")
         self.assertEqual(1, operator.wait())
 
@@ -661,9 +661,9 @@ class Bringup(unittest.TestCase):
         self.drive_through(operator)
         self.push(operator, 3, mirrored=())
         operator.expect("if the gear is as configured: it was not measured")
-        operator.answer("Take the mean?", "y")
+        operator.answer("Use the mean?", "y")
         self.turn_around(operator)
-        operator.answer("Take that?", "y")  # By the distance: whatever the gear is, a tick is so long.
+        operator.answer("Use that?", "y")  # By the distance: whatever the gear is, a tick is so long.
         found = self.write(operator)
         self.assertRegex(found["radius_mm"], r"^noted: 3\.00 m pushed: .* ticks; the gear is assumed$")
         self.assertRegex(found["track_mm"], r"^confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks$")
@@ -681,10 +681,10 @@ class Bringup(unittest.TestCase):
         self.wait_until_stands()
         operator.type("\n")
         operator.expect("it was a curve")
-        operator.answer("Take the mean?", "y")
+        operator.answer("Use the mean?", "y")
         self.turn_around(operator)
         operator.expect("if the radius is as configured: no distance was measured")
-        operator.answer("Take that?", "y")
+        operator.answer("Use that?", "y")
         found = self.write(operator)
         self.assertRegex(found["radius_mm"], "^noted: .* ticks; not straight$")
         self.assertRegex(found["track_mm"], "^noted: 3 full turns by hand: .* ticks; the radius is assumed$")
@@ -695,21 +695,21 @@ class Bringup(unittest.TestCase):
         self.drive_through(operator)
         operator.answer("Distance in m", "")
         for turns, commands, told in (
-            (3, ("push both 2",), "rolled the same way"),
+            (3, ("push both 2",), "rolled in the same direction"),
             (3, ("turn 0.5",), "Too few ticks"),
             (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
-            (3, ("push right 4", "push left -1.5"), "wandered off"),
+            (3, ("push right 4", "push left -1.5"), "moved away"),
             (20, ("turn 1",), "no track between 200"),
         ):
             self.turn_around(operator, *commands, turns=turns)
             operator.expect(told)
         operator.answer("How many full turns", "2.5")
-        operator.expect("Full turns only")
+        operator.expect("a number of full turns")
         self.turn_around(operator, "turn 3", turns=2)  # Counted wrongly.
-        operator.expect("None was configured. A tape")
-        operator.answer("Take that?", "")
+        operator.expect("No track was configured. A tape")
+        operator.answer("Use that?", "")
         operator.answer("How many full turns", "")
-        operator.expect("Without a track no machine is armed: set track_mm under [wheels]")
+        operator.expect("Without a track the gateway refuses arm: set track_mm under [wheels]")
         self.assertNotIn("track_mm", self.write(operator))
         with open(self.out, encoding="utf-8") as file:
             self.assertIn("\n;track_mm = ?", file.read())
@@ -729,15 +729,15 @@ class Bringup(unittest.TestCase):
             self.freeze(children(operator.process.pid)["iwheel-gateway"] if gateway else operator.process.pid, 0.8)
             self.wait_until_stands()
             operator.type("\n")
-            self.assertRegex(operator.expect("None was configured"), r"in 3\s+turns: the\s+track\s+is 5[34]\d\s+mm")
-            operator.answer("Take that?", "n")
+            self.assertRegex(operator.expect("No track was configured"), r"in 3\s+turns: the\s+track\s+is 5[34]\d\s+mm")
+            operator.answer("Use that?", "n")
         self.begin_to_turn(operator)
         self.rig.sim.ask("mute left")
         time.sleep(1.5)
         self.rig.sim.ask("unmute left")
         self.wait_until_stands()
         operator.type("\n")
-        operator.expect("The wheels were not heard all the time")
+        operator.expect("The wheels were offline for a while")
         self.begin_to_turn(operator)
         self.freeze(operator.process.pid, 2.5)
         self.wait_until_stands()
@@ -788,7 +788,7 @@ class Bringup(unittest.TestCase):
         operator.expect("measuring for 2 s")
         operator.type("\x03")
         self.ends_soon(operator)
-        self.assertNotIn("not heard", operator.text)
+        self.assertNotIn("were offline", operator.text)
 
     def test_signals_that_end_programs_end_it_in_order(self):
         for number in (signal.SIGTERM, signal.SIGHUP):

@@ -55,7 +55,7 @@ class Grammar(unittest.TestCase):
                 code, out, err = run("--socket", "/nonexistent", *words, wrong)
                 told = f"; write: {words[-1]} {cure}" if cure else ""
                 self.assertEqual(
-                    (64, "", f'iwheelctl: {words[-1]} wants a time with its unit, such as 500ms, 1.5s, 2min or 1h, not "{wrong}"{told}\n'),
+                    (64, "", f'iwheelctl: {words[-1]} needs a time with its unit, such as 500ms, 1.5s, 2min or 1h, not "{wrong}"{told}\n'),
                     (code, out, err),
                     words,
                 )

@@ -176,7 +176,7 @@ class CarriedOut(unittest.TestCase):
     HANDS = {
         "release the e-stop button": "estop release",
         "release the button": "estop release",
-        "see that nobody is in the way": None,
+        "check that no person is in the way": None,
         "switch the wheels on": "normal",
         "find out why a wheel lost power": None,
         "check the wheels' power and the cable": "normal",
@@ -470,7 +470,7 @@ class Check(unittest.TestCase):
     def test_mode_that_lets_everybody_drive(self):
         for mode in ("0777", "0666", "0662"):
             self.set("northbound", mode=mode)
-            _, text = self.only("warn", f"socket mode {mode}: everybody")
+            _, text = self.only("warn", f"socket mode {mode}: every user of this machine")
         key, value = re.search(r"\[northbound\] (\w+) = (\w+)", text).groups()
         self.set("northbound", **{key: value})
         self.assertEqual(0, self.gone("warn", "mode"))
@@ -484,7 +484,7 @@ class Check(unittest.TestCase):
         code, text = self.only("warn", "record: directory")
         self.assertEqual(0, code)
         self.assertIn("No such file or directory", text)
-        self.assertIn("stops are not recorded", text)
+        self.assertIn("the gateway starts, but records no stop", text)
         self.assertFalse(os.path.exists(self.rig.path("a")), "--check makes nothing")
         self.rig.start_gateway()
         self.rig.kill_gateway(signal.SIGTERM)
@@ -609,7 +609,7 @@ class Check(unittest.TestCase):
         for missing, error in (("setpoint_type", "type_not_set"), ("current_role", "type_not_set"), ("track_mm", "track_not_set")):
             del self.rig.settings["wheels"][missing]
             self.rig.write_config()
-            code, text = self.only("warn", f"{missing} not configured: it starts and listens, arm will be refused")
+            code, text = self.only("warn", f"{missing} not configured: the gateway starts and listens, arm will be refused")
             self.assertEqual(0, code)
             self.assertIn("set it under [wheels]", text)
             code, found, done = self.check("--listen-only")

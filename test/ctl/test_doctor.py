@@ -132,7 +132,7 @@ class Doctor(unittest.TestCase):
             self.rig.write_config()
             self.rig.start_gateway()
             code, checks, _ = self.doctor()
-            self.assertEqual((0, [f"{key} not configured: arm is refused"]), (code, [finding["text"] for finding in checks["config"]]))
+            self.assertEqual((0, [f"{key} not configured: the gateway refuses arm"]), (code, [finding["text"] for finding in checks["config"]]))
             self.assertIn("iwheelctl bringup finds it", checks["config"][0]["cure"])
             self.rig.kill_gateway(signal.SIGTERM)
             self.rig.settings["wheels"][key] = right
@@ -220,9 +220,9 @@ class Doctor(unittest.TestCase):
 
     def test_wrong_words(self):
         for words, about in (
-            (("--listen",), "--listen wants"),
+            (("--listen",), "--listen needs"),
             (("--listen", "0s"), "200ms to 1min"),
-            (("--estop",), "wants a value"),
+            (("--estop",), "needs a value"),
             (("a", "b"), "does not understand"),
             (("--frobnicate",), "does not understand"),
             (("eth0/..",), "IFACE"),

@@ -165,7 +165,7 @@ class Matrix(unittest.TestCase):
         """The recording with which it was found."""
         code, out, _ = learn(Story(phases=("forward",)))
         self.assertEqual(0, code)
-        self.assertIn("? current role: not told to both wheels often enough: speed 0, backwards; ", out)
+        self.assertIn("? current role: not commanded to both wheels often enough: speed 0, backwards; ", out)
         self.assertNotIn("current_role =", out)
 
 
@@ -291,7 +291,7 @@ class Lacks(unittest.TestCase):
     def test_learn_sign_is_told_only_of_the_direction_that_was_seen(self):
         for phase, word in (("forward", "positive"), ("backward", "negative")):
             _, out, _ = learn(Story(phases=("rest", phase)))
-            self.assertIn(f"+ left: a {word} setpoint is measured as a {word} speed (the other direction: not seen)", out)
+            self.assertIn(f"+ left: a {word} setpoint is measured as a {word} speed (the other direction: not recorded)", out)
 
     def test_learn_signs_that_are_swapped_or_mixed_speak_against_it(self):
         self.differs({"feedback_sign right": (AGAINST, "no"), "pair": (AGAINST, None)}, signs=(1, -1))

@@ -122,7 +122,7 @@ class Interfaces(unittest.TestCase):
     def test_interface_that_is_not_in_it_is_refused(self):
         code, _, err = run("learn", "-", "--interface", "can9", text=self.TWO)
         self.assertEqual(code, 65)
-        self.assertIn("there is no frame of interface can9 in it", err)
+        self.assertIn("it has no frame of interface can9", err)
 
     def test_replay_wants_one_interface(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -349,8 +349,8 @@ class Decode(unittest.TestCase):
         for words, code, part in (
             (("--nonsense",), 64, "does not understand"),
             (("a", "b"), 64, '"b"'),
-            (("--config",), 64, "--config wants"),
-            (("/nonexistent",), 65, "no such file"),
+            (("--config",), 64, "--config needs"),
+            (("/nonexistent",), 65, "does not exist"),
             (("--config", "/nonexistent"), 78, "cannot be opened"),
             (("/",), 65, "directory"),
         ):
@@ -361,7 +361,7 @@ class Decode(unittest.TestCase):
     def test_empty_recording_is_told(self):
         code, _, err = self.decode("")
         self.assertEqual(65, code)
-        self.assertIn("there is no frame in it", err)
+        self.assertIn("it has no frame", err)
 
     def test_huge_recording_is_streamed_in_constant_memory(self):
         def resident_kB(blocks):
@@ -479,9 +479,9 @@ class Replay(unittest.TestCase):
         os.remove(os.path.join(self.folder, "estop.jsonl"))
         code, out, _ = self.replay()
         self.assertEqual(0, code)
-        self.assertIn("frames only: nobody arms", out)
+        self.assertIn("frames only: no client arms", out)
         self.assertIn("listening, 0 stops", out)
-        self.assertIn("left heard", out)
+        self.assertIn("left online", out)
         os.remove(os.path.join(self.folder, "estop.conf"))
         code, _, err = self.replay()
         self.assertEqual(64, code)
@@ -499,7 +499,7 @@ class Replay(unittest.TestCase):
         self.change("log", lambda text: text[: len(text) * 2 // 3])
         code, out, err = self.replay()
         self.assertEqual(65, code)
-        self.assertIn("not whole", out)
+        self.assertIn("incomplete", out)
         self.assertIn("not a JSON object", err)
         self.assertIn("may be cut", err)
 
@@ -531,9 +531,9 @@ class Replay(unittest.TestCase):
 
     def test_wrong_words_are_told(self):
         for words, code, part in (
-            ((), 64, "wants a recording"),
+            ((), 64, "needs a recording"),
             (("--x",), 64, "does not understand"),
-            (("/nonexistent.log",), 65, "no such file"),
+            (("/nonexistent.log",), 65, "does not exist"),
             (("a", "b"), 64, '"b"'),
         ):
             got, out, err = run("replay", *words)
@@ -634,11 +634,11 @@ class Learn(unittest.TestCase):
     def test_current_that_fits_neither_is_not_suggested(self):
         out = self.learn(current=lambda speed: 100 if speed else 50)
         self.assertIn("? current role: the currents fit neither", out)
-        self.assertNotIn("current_role =", out.split("For the configuration")[1])
+        self.assertNotIn("current_role =", out.split("for the configuration")[1])
 
     def test_different_types_left_and_right_are_counter_evidence(self):
         out = self.learn(types=(1, 2))
-        self.assertIn("- setpoint type: several, or different ones", out)
+        self.assertIn("- setpoint type: setpoints with a speed have several types, or different ones", out)
         self.assertNotIn("setpoint_type =", out)
 
     def test_wheel_that_turns_against_its_command_is_told(self):
@@ -648,12 +648,12 @@ class Learn(unittest.TestCase):
 
     def test_units_of_force_are_weighed_against_the_document(self):
         out = self.learn(raw=(20, 200), offset=(20, 20))
-        self.assertIn("- left force at rest / offset = 1.00: dN per count, if nothing pressed it (the document says cN)", out)
-        self.assertIn("- right force at rest / offset = 10.00: cN per count, if nothing pressed it (the document says dN)", out)
+        self.assertIn("- left force at standstill / offset = 1.00: dN per count, if nothing pressed the handle (document: cN)", out)
+        self.assertIn("- right force at standstill / offset = 10.00: cN per count, if nothing pressed the handle (document: dN)", out)
         self.assertIn("[left]\nforce_unit = dN\n[right]\nforce_unit = cN", out)
         out = self.learn(raw=(0, 80), offset=(20, 20))
-        self.assertIn("- left force at rest / offset = 0.00: the wheel subtracts the offset itself", out)
-        self.assertIn("- right force at rest / offset = 4.00: neither", out)
+        self.assertIn("- left force at standstill / offset = 0.00: the wheel subtracts the offset itself", out)
+        self.assertIn("- right force at standstill / offset = 4.00: neither", out)
         self.assertNotIn("force_unit =", out)
         self.assertIn("? left force unit: needs", self.learn(offset=(None, 5)))
 
@@ -689,7 +689,7 @@ class Learn(unittest.TestCase):
     def test_without_setpoints_the_answer_is_no(self):
         code, out, _ = run("learn", "-", text=lines("100#00000000"))
         self.assertEqual(1, code)
-        self.assertIn("? setpoint type and current role: no setpoint", out)
+        self.assertIn("? setpoint type and current role: the recording has no setpoint", out)
 
     def test_wrong_words_are_told(self):
         for words, code in (((), 64), (("--x",), 64), (("a", "b"), 64), (("/nonexistent",), 65)):

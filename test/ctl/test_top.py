@@ -101,7 +101,7 @@ class WithWheels(unittest.TestCase):
             process = self.drive(300, -150)
             while process.poll() is None:
                 rows = top.look()
-                if any("does" in row and "│███" in row for row in rows) and any("300 mm/s" in row for row in rows):
+                if any("meas" in row and "│███" in row for row in rows) and any("300 mm/s" in row for row in rows):
                     return top.look(0.5)
         raise AssertionError("it never drove:\n" + "\n".join(rows))
 
@@ -111,8 +111,8 @@ class WithWheels(unittest.TestCase):
         self.assertEqual(24, len(rows))
         for text in (
             "e-stop released (SIMULATED)",
-            "LEFT   told",
-            "RIGHT  told",
+            "LEFT   appl",
+            "RIGHT  appl",
             "force",
             "24.8 V",
             "BUS     active",
@@ -195,7 +195,7 @@ class WithWheels(unittest.TestCase):
             self.assertFalse(cut and not any(text.endswith(row.strip()) for text in whole), row)
         self.rig.sim.ask("estop press")
         top.wait_for("LATCHED")
-        self.assertIn("release the e-stop button (or mend its wire), then: iwheelctl reset", " ".join(" ".join(top.look(0.5)).split()))
+        self.assertIn("release the e-stop button (or fix its wire), then: iwheelctl reset", " ".join(" ".join(top.look(0.5)).split()))
         self.assertEqual(0, top.end())
 
     @staticmethod
@@ -243,7 +243,7 @@ class WithWheels(unittest.TestCase):
         top.look(2.0)
         before = self.dots(top, (begin, begin + 17), (8, 98))
         self.rig.kill_gateway(signal.SIGKILL)
-        top.wait_for("waiting for it to come back")
+        top.wait_for("waiting for its return")
         top.look(3.0)
         self.rig.start_gateway()
         top.wait_for("LEFT speed")
@@ -256,7 +256,7 @@ class WithWheels(unittest.TestCase):
         top = self.top()
         top.wait_for("LEDGER")
         self.rig.kill_gateway(signal.SIGKILL)
-        top.wait_for("waiting for it to come back")
+        top.wait_for("waiting for its return")
         rows = top.look(0.3)
         self.assertFalse(any("mm/s" in row for row in rows), "no old speeds")
         self.assertEqual(" #   #  ###", top.blocks(1)[:11])  # N O
@@ -358,7 +358,7 @@ class WithoutWheels(unittest.TestCase):
         self.assertIn("iwheelctl status", done.stderr)
         operator = Operator([find_program(BUILD, "iwheelctl"), "top"], environment(TERM="no-such-thing"))
         self.addCleanup(operator.close)
-        operator.expect("nothing can be drawn on this terminal")
+        operator.expect("this terminal cannot draw")
         self.assertEqual(64, operator.wait())
 
     def test_dumb_terminal_is_told_what_works_there_and_nothing_is_drawn(self):

@@ -454,8 +454,8 @@ class Watchers(Rights):
         done = subprocess.run(
             [self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"], capture_output=True, text=True, check=False
         )
-        self.assertIn(f"by {self.socket} you may watch, stop and estop, but not drive", done.stderr)
-        self.assertIn(f"who may drive uses {self.driving} and is in group daemon", done.stderr)
+        self.assertIn(f"{self.socket} allows watch, stop and estop, but not drive", done.stderr)
+        self.assertIn(f"clients that drive use {self.driving} and are in group daemon", done.stderr)
         self.assertNotEqual(done.returncode, 0)
 
     def test_a_crowd_that_asks_without_end_costs_who_drives_no_gap_and_no_slot(self):

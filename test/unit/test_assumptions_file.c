@@ -171,11 +171,11 @@ TEST(test_assumptions_file_other_bus_version_or_format_is_refused) {
     forge("{\"format\":\"iwheel-ledger\",\"version\":2,\"bus\":\"can0\",\"items\":{},\"offsets\":{}}\n");
     refused("another version");
     forge("{\"format\":\"something\",\"version\":1}\n");
-    refused("no ledger");
+    refused("not the ledger");
     forge("not even JSON\n");
-    refused("no ledger");
+    refused("not the ledger");
     forge("[1,2,3]\n");
-    refused("no ledger");
+    refused("not the ledger");
     forge("");
     refused("damaged");
 }
@@ -221,7 +221,7 @@ TEST(test_assumptions_file_one_invalid_member_refuses_the_file) {
     };
     for (size_t i = 0; i < sizeof bodies / sizeof bodies[0]; i++) {
         forge(bodies[i]);
-        refused("no gateway has measured");
+        refused("no gateway can have measured");
     }
     forge(HEAD
           "\"items\":{},\"offsets\":{\"left\":{\"from\":\"wheel\",\"unit\":\"cN\",\"offset_mN\":100,\"drift_mN\":0,"

@@ -44,7 +44,7 @@ TEST(test_duration_option_out_of_range_prints_the_range) {
     TEST_ASSERT_EQUAL_STRING("--for 19ms is out of range; write 20ms to 10min", why);
     TEST_ASSERT_FALSE(duration_option("--for", "600001ms", range, &us, why));
     TEST_ASSERT_FALSE(duration_option("--for", NULL, range, &us, why));
-    TEST_ASSERT_EQUAL_STRING("--for wants a time with its unit, such as 500ms, 1.5s, 2min or 1h, not \"\"", why);
+    TEST_ASSERT_EQUAL_STRING("--for needs a time with its unit, such as 500ms, 1.5s, 2min or 1h, not \"\"", why);
     TEST_ASSERT_EQUAL_INT64(20000, us);
 }
 
@@ -69,7 +69,7 @@ TEST(test_duration_option_without_unit_prints_the_correct_form) {
         char wanted[DURATION_WHY_SIZE];
         int64_t us = 77;
         (void)snprintf(wanted, sizeof wanted,
-                       "--for wants a time with its unit, such as " DURATION_FORM ", not \"%s\"%s", cases[i].text,
+                       "--for needs a time with its unit, such as " DURATION_FORM ", not \"%s\"%s", cases[i].text,
                        cases[i].meant);
         TEST_ASSERT_FALSE(duration_option("--for", cases[i].text, range, &us, why));
         TEST_ASSERT_EQUAL_STRING(wanted, why);

@@ -263,9 +263,9 @@ TEST(test_bus_facts_are_recorded_once_per_change) {
 }
 
 TEST(test_purge_by_the_port_is_logged_once) {
-    static const char *const words[] = {[IWL_LINK_PURGE_DONE] = "taken down and up again",
+    static const char *const words[] = {[IWL_LINK_PURGE_DONE] = "set down and up again",
                                         [IWL_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
-                                        [IWL_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
+                                        [IWL_LINK_PURGE_FAILED] = "could not be emptied; check it: ip"};
     daemon_rig_keep_log();
     for (unsigned purge = IWL_LINK_PURGE_DONE; purge <= IWL_LINK_PURGE_FAILED; purge++) {
         daemon_rig.link.purge = (iwl_link_purge_t)purge;

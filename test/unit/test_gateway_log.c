@@ -62,7 +62,7 @@ TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget) {
     assert_line("angle budget, ramp: a wheel coasting 40.4 degrees, at 700 mm/s2 assumed, not measured; late by 100 ms "
                 "10.6\n");
     assert_line(
-        "angle budget, unbounded: a wheel running on 106.1 degrees a second; up to 12.5 a second are not noticed\n");
+        "angle budget, unbounded: a wheel running on 106.1 degrees a second; up to 12.5 a second are not detected\n");
     TEST_ASSERT_NULL(strstr(written(), "track_mm"));
     assert_line("iwheel-gateway: warning: setpoint_type or current_role is not configured: arm will be refused; set "
                 "both under [wheels]\n");

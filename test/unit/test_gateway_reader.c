@@ -241,7 +241,7 @@ TEST(test_reader_file_that_changes_between_pieces_is_reported) {
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, 10));
     TEST_ASSERT_EQUAL(0, unlink(path_of(LOG)));
     TEST_ASSERT_EQUAL(IWN_DENIED, ask(LOG, 10));
-    assert_says("is not there");
+    assert_says("does not exist");
 }
 
 TEST(test_reader_list_has_recordings_only_oldest_first) {

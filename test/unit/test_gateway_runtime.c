@@ -316,7 +316,7 @@ TEST(test_lock_without_its_file_excludes_by_the_next_name) {
     TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "cannot be locked (Not a directory)"), said);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "is noticed by its name only"), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "is detected by its name only"), said);
     TEST_ASSERT_EQUAL_INT(1, first.lock.names.place);
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     assert_said_pid(getpid());

@@ -31,8 +31,8 @@ static void expect_said(const char *text, const char *what) {
 
 TEST(test_help_names_the_configuration_that_is_read) {
     expect_said(gateway_help, "configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n");
-    expect_said(help_doctor, "else " GATEWAY_CONFIG_PATH ", if it is there\n");
-    expect_said(help_bringup, "else " GATEWAY_CONFIG_PATH ", if");
+    expect_said(help_doctor, "default " GATEWAY_CONFIG_PATH ", if it exists\n");
+    expect_said(help_bringup, GATEWAY_CONFIG_PATH ", if it exists)\n");
     expect_said(mqtt_help, "configuration (" MQTT_SETTINGS_PATH ", if it exists)\n");
     expect_said(mqtt_fleet_help, "(" FLEET_SETTINGS_PATH ", if it exists)\n");
     expect_said(help_fleet, FLEET_SETTINGS_PATH);
@@ -69,7 +69,7 @@ TEST(test_help_of_each_key_is_in_its_configuration_file) {
 
 TEST(test_help_durations_have_the_form_that_is_parsed) {
     expect_said(help_drive, "--for TIME       " DURATION_FORM ";");
-    expect_said(help_record, "--for TIME  " DURATION_FORM ";");
+    expect_said(help_record, "--for TIME  " DURATION_FORM " (");
 }
 
 /// Returns the verb at that place in the page of the program, or a null pointer after the last one.

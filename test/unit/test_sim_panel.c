@@ -386,7 +386,7 @@ TEST(test_panel_help_lists_exactly_the_commands) {
 
 TEST(test_panel_usage_longer_than_its_column_is_not_cut) {
     expect_refused("contact 1");
-    TEST_ASSERT_EQUAL_STRING("error that is not right; usage: contact 1|2 press|release|pulse MS|unplug|plug\n",
+    TEST_ASSERT_EQUAL_STRING("error wrong arguments; usage: contact 1|2 press|release|pulse MS|unplug|plug\n",
                              panel.answer);
 }
 

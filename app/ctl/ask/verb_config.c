@@ -35,7 +35,7 @@ static json_t *compose(int count, char **words, const char **out_only) {
     const bool sets = strcmp(what, "set") == 0;
     const bool commits = strcmp(what, "commit") == 0;
     if (!sets && !commits && strcmp(what, "show") != 0 && strcmp(what, "discard") != 0) {
-        (void)ctl_fail(CTL_USAGE, "config \"%s\": no such thing; write show, set KEY VALUE, commit or discard", what);
+        (void)ctl_fail(CTL_USAGE, "config \"%s\": unknown action; write show, set KEY VALUE, commit or discard", what);
         return NULL;
     }
     if (sets && count != 3) {
@@ -72,9 +72,9 @@ int verb_config(ctl_t *self, int count, char **words) {
         return code;
     }
     if (json_is_true(json_object_get(reply, "restarts"))) {
-        (void)puts("committed: the board starts anew with it, and closes its clients; they come again");
+        (void)puts("committed: the board restarts with it and closes its clients, which connect again");
     } else if (count > 0 && strcmp(words[0], "discard") == 0) {
-        (void)puts("what was staged is forgotten");
+        (void)puts("discarded: the staged values are dropped");
     } else {
         print_keys(reply, only);
     }

@@ -14,7 +14,7 @@
 
 #define LINE 512U
 
-/// Adds the sentences of the daemon to the figures of a board, which has no room for sentences.
+/// Adds the sentences of the daemon to the figures of a board, which has no memory for sentences.
 static void explain(const char *name, json_t *entry) {
     char text[INSPECT_SOURCE_SIZE];
     iw_assumption_item_t item;
@@ -34,7 +34,7 @@ static void explain(const char *name, json_t *entry) {
     }
     inspect_assumption_source(item, &known, &(inspect_word_t){"", ""}, text);
     if (known.source == IW_SOURCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
-        (void)snprintf(text, sizeof text, "the bus showed it");
+        (void)snprintf(text, sizeof text, "measured on the bus");
     }
     (void)json_object_set_new(entry, "reason", json_string(text));
     if (known.state == IW_CONTRADICTED) {
@@ -50,7 +50,7 @@ void ctl_explain_assumptions(json_t *assumptions) {
     }
 }
 
-/// Prints "force_unit_left = cN: at rest, raw / offset is ...", and what a contradiction disables.
+/// Prints "force_unit_left = cN: ..." with the reason, and the effect of a contradiction.
 static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
     char line[LINE];
     const char *disabled = json_string_value(json_object_get(entry, "disabled"));
@@ -107,7 +107,7 @@ static json_t *compose(int count, char **words, const char **out_item) {
     for (int i = 0; i < count; i++) {
         if (strcmp(words[i], "--how") == 0) {
             if (i + 1 == count) {
-                (void)ctl_fail(CTL_USAGE, "--how wants a text; see: iwheelctl confirm --help");
+                (void)ctl_fail(CTL_USAGE, "--how needs a text; see: iwheelctl confirm --help");
                 return NULL;
             }
             how = words[++i];
@@ -119,7 +119,7 @@ static json_t *compose(int count, char **words, const char **out_item) {
         return NULL;
     }
     if (plains == 0) {
-        (void)ctl_fail(CTL_USAGE, "confirm needs the name of an item; see them: iwheelctl ledger");
+        (void)ctl_fail(CTL_USAGE, "confirm needs the name of an item; to list them: iwheelctl ledger");
         return NULL;
     }
     json_t *request =

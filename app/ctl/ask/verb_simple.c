@@ -17,16 +17,16 @@ static void print_line(const char *text) {
     (void)putchar('\n');
 }
 
-/// Prints the present state of the gateway and its meaning, unless --json is given.
+/// Prints the present state of the gateway and its meaning. With --json it prints nothing.
 static void tell_state(const ctl_t *self, const json_t *reply) {
     static const struct {
         const char *state;
         const char *meaning;
     } meanings[] = {
         {"listening", "listening: nothing is sent; in silence the wheels may roll"},
-        {"armed", "armed: somebody drives"},
-        {"stopping",
-         "stopping: ramp to zero, zeros until both wheels are at rest, then silence, or zeros with after_stop = hold"},
+        {"armed", "armed: a client drives"},
+        {"stopping", "stopping: ramp to zero, zeros until both wheels are at standstill, then silence, or zeros with "
+                     "after_stop = hold"},
         {"latched", "latched: zero; only a reset leaves this state (see: iwheelctl status)"},
     };
     if (!self->json) {
@@ -118,7 +118,7 @@ int verb_tare(ctl_t *self, int count, char **words) {
         return CTL_USAGE;
     }
     if (side != NULL && strcmp(side, "left") != 0 && strcmp(side, "right") != 0) {
-        return ctl_fail(CTL_USAGE, "tare \"%s\": no such wheel; write left, right, or nothing for both", side);
+        return ctl_fail(CTL_USAGE, "tare \"%s\": unknown wheel; write left, right, or nothing for both", side);
     }
     json_t *request =
         (side != NULL) ? json_pack("{s:s,s:s}", "cmd", "tare", "side", side) : json_pack("{s:s}", "cmd", "tare");
@@ -131,7 +131,7 @@ int verb_tare(ctl_t *self, int count, char **words) {
     return code;
 }
 
-/// Starts the program of another package in place of this one: it knows its own configuration and output.
+/// Starts the program of another package in place of this one, because that program has its own configuration and output.
 static int become(char **words, const char *package) {
     (void)execvp(words[0], words);
     return ctl_fail(CTL_UNAVAILABLE, "%s cannot be started (%s); install it: apt-get install ./%s_*.deb", words[0],

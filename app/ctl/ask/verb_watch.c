@@ -48,13 +48,13 @@ static bool parse_words(int count, char **words, json_t *list, int *out_rate_hz)
         if (strcmp(words[i], "--rate") == 0) {
             i++;
             if (!parse_rate((i < count) ? words[i] : NULL, out_rate_hz)) {
-                (void)ctl_fail(CTL_USAGE, "--rate wants a number of events per second, 1..%d", RATE_MAX_HZ);
+                (void)ctl_fail(CTL_USAGE, "--rate needs a number of events per second, 1..%d", RATE_MAX_HZ);
                 return false;
             }
         } else if (is_topic(words[i])) {
             (void)json_array_append_new(list, json_string(words[i]));
         } else {
-            (void)ctl_fail(CTL_USAGE, "no topic \"%s\"; known are: state bus estop lease stop force frame", words[i]);
+            (void)ctl_fail(CTL_USAGE, "unknown topic \"%s\"; use: state bus estop lease stop force frame", words[i]);
             return false;
         }
     }
@@ -78,8 +78,8 @@ static json_t *compose(int count, char **words) {
 
 typedef enum { OUTPUT_OPEN = 0, OUTPUT_SIGNAL, OUTPUT_CLOSED, OUTPUT_BROKEN } output_t;
 
-/// Checks, or waits if `wanted`, that stdout accepts data. While it does not, its reader is slow: events that come in
-/// this time are reduced to the latest values, so the reader never gets a backlog.
+/// Checks, or waits if `wanted`, that stdout accepts data. While it does not, its reader is slow: events that arrive in
+/// this time are reduced to the latest values, so that the reader never has a backlog.
 static output_t await_output(const client_t *client, bool wanted) {
     const struct timespec none = {0, 0};
     for (bool slow = false;; slow = true) {
@@ -117,7 +117,7 @@ static output_t write_text(const client_t *client, const char *text, size_t size
     return OUTPUT_OPEN;
 }
 
-/// Writes the number of events that were left out before this one, in the form that the gateway uses.
+/// Writes the number of events that were dropped before this one, in the form that the gateway uses.
 static output_t write_lost(client_t *client) {
     char line[64];
     const uint64_t count = client->skipped;
@@ -126,7 +126,7 @@ static output_t write_lost(client_t *client) {
     return (count > 0U) ? write_text(client, line, (size_t)length) : OUTPUT_OPEN;
 }
 
-/// Writes the line as it came, but escapes characters that control a terminal.
+/// Writes the received line, but escapes characters that control a terminal.
 static output_t write_line(const client_t *client) {
     char piece[PIPE_BUF];
     size_t length;
@@ -139,7 +139,7 @@ static output_t write_line(const client_t *client) {
     return (state == OUTPUT_OPEN) ? write_text(client, "\n", 1) : state;
 }
 
-/// Prints events until a signal comes, or the output or the gateway closes.
+/// Prints events until a signal arrives, or the output or the gateway closes.
 static int pump(ctl_t *self) {
     output_t output = OUTPUT_OPEN;
     while (output == OUTPUT_OPEN) {
@@ -158,7 +158,7 @@ static int pump(ctl_t *self) {
             output = write_line(&self->client);
         }
     }
-    return (output == OUTPUT_BROKEN) ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno))
+    return (output == OUTPUT_BROKEN) ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; free some space", strerror(errno))
                                      : CTL_OK;
 }
 

@@ -7,7 +7,7 @@
 /// current), so the core's limits, lease and e-stop apply here as they do later. Each step stores its result in
 /// `config`, and the way it was found in a note. A value that is not found stays as it was, and is reported as assumed.
 /// An error, and an operator who wants to quit, end the program at that place (`bringup_fail`, `bringup_quit`). A value
-/// is confirmed only if everything that its sentence claims was seen, on both wheels if it is about both.
+/// is confirmed only if everything that its sentence claims was observed, on both wheels if it is about both.
 #ifndef BRINGUP_H
 #define BRINGUP_H
 
@@ -114,7 +114,7 @@ __attribute__((format(printf, 1, 2))) void talk_say(const char *format, ...);
 /// Prints the heading of a step.
 void talk_step(unsigned number, const char *title);
 
-/// Asks a question and reads a line; input from before the question is discarded. An empty line means `otherwise`. Ends
+/// Asks a question and reads a line. Discards input from before the question. An empty line means `otherwise`. Ends
 /// bringup if the operator wants to quit (q, end of input, Ctrl-C).
 void talk_ask(bringup_t *self, const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]);
 
@@ -198,7 +198,7 @@ void bringup_write(bringup_t *self);
 /// Ends the program because the operator wants to quit or there is no input any more: stops the trial gateway, removes
 /// its folder and writes nothing.
 _Noreturn void bringup_quit(bringup_t *self);
-/// Ends the program in the same way because it cannot go on; the reason has been printed.
+/// Ends the program in the same way because it cannot continue; the reason has been printed.
 _Noreturn void bringup_fail(bringup_t *self);
 
 /// Returns a burst of both wheels forwards, with current, to try the setpoint type.

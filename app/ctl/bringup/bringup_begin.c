@@ -35,7 +35,7 @@ void bringup_checks(bringup_t *self) {
     }
     doctor_print(doctor, 0);
     if (good && doctor->findings.total[INSPECT_FAIL] > 0U) {
-        talk_say("Mend what failed (each line tells how), then start bringup again.");
+        talk_say("Fix the failed checks (each line has the fix), then start bringup again.");
         good = false;
     }
     doctor_close(doctor);
@@ -68,9 +68,9 @@ static bool await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
 }
 
 static void go_without(bringup_t *self) {
-    talk_say("There is NO e-stop line. Then only the keyboard, the wheels' own one-second watchdog and their power "
-             "switch stop them. Better: wire a button, name it with --estop LINE, and begin again.");
-    if (!talk_yes(self, "Go on without one?", false)) {
+    talk_say("There is NO e-stop line. Only the keyboard, the wheels' own one-second watchdog and their power switch "
+             "stop them. Better: wire a button, name it with --estop LINE, and begin again.");
+    if (!talk_yes(self, "Continue without an e-stop?", false)) {
         bringup_quit(self);
     }
     bringup_note(self, "estop", "line", NULL, "there was no e-stop");
@@ -96,14 +96,14 @@ void bringup_estop(bringup_t *self) {
     if (!await_estop(self, "released", RELEASED_US)) {
         talk_say(
             "The e-stop reads as pressed already. Release it now; if it is not pressed, its wire is cut or [estop] "
-            "active is the wrong way round ...");
+            "active has the wrong value ...");
         need_edge(self, "released", "release", "");
     }
     talk_say("Press the e-stop button now ...");
     need_edge(self, "pressed", "press", "[estop] line and ");
     talk_say("Seen. Release it ...");
     need_edge(self, "released", "release", "");
-    talk_say("Seen. It will stop the wheels in everything that follows, and so does any key.");
+    talk_say("Seen. In all later steps this button stops the wheels, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",
                  (strncmp(self->config.estop.line, "unix:", 5U) == 0) ? " (a SIMULATED button)" : "");
     bringup_store_wiring(self);

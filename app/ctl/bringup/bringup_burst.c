@@ -195,7 +195,7 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
     } else if (end == BURST_DONE && run->unknown > 0) {
         end = fail(run, BURST_STOPPED, "the speed of a wheel was not known");
     } else if (end == BURST_DONE && !run->enough && run->in_force < IN_FORCE_MIN) {
-        end = fail(run, BURST_STOPPED, "the command was hardly in force; this machine is too busy");
+        end = fail(run, BURST_STOPPED, "the command was in force for too short a time; this machine is too busy");
     }
     json_decref(why);
     return end;
@@ -283,7 +283,7 @@ bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
             return true;
         }
         talk_say("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "It did not begin" : "STOPPED", out_outcome->why);
-    } while (talk_yes(self, "Once more?", false));
+    } while (talk_yes(self, "Try again?", false));
     return false;
 }
 

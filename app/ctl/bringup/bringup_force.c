@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Unit of the normal force (the document gives cN on the left and dN on the right), and its sign.
+// Unit of the normal force (in the document cN on the left and dN on the right), and its sign.
 //
 // Only a known mass shows the unit. Without a mass the unit stays assumed.
 #include "bringup.h"
@@ -88,7 +88,7 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
     const char *word = cn ? "cN" : "dN";
     const iw_force_unit_t before = self->config.core.force_unit[side];
     if (!cn && !dn) {
-        talk_say("  %.1f counts per newton are neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
+        talk_say("  %.1f counts per newton fit neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
                  "mass on this handle?",
                  per_N);
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN",
@@ -97,7 +97,7 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
     }
     self->config.core.force_unit[side] = cn ? IW_FORCE_CN : IW_FORCE_DN;
     talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
-             (self->config.core.force_unit[side] == before) ? "" : ", other than configured until now",
+             (self->config.core.force_unit[side] == before) ? "" : ", which is not the configured one",
              (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
     bringup_note(self, text_side(side), "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
                  "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
@@ -111,22 +111,22 @@ static void tell_press(bringup_t *self, iw_side_t side, double counts) {
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: pressing the handle changed nothing");
         return;
     }
-    talk_say("  Pressing changed the raw force by %.0f counts. Its unit stays assumed: only a known mass tells it.",
+    talk_say("  Pressing changed the raw force by %.0f counts. The unit stays assumed: only a known mass shows it.",
              counts);
     bringup_note(self, text_side(side), "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
                  counts);
 }
 
 static void tell_deaf(bringup_t *self, iw_side_t side) {
-    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", text_side(side));
-    bringup_note(self, text_side(side), "force_unit", NULL, "assumed: no force was heard");
+    talk_say("  Force frames of the %s wheel were missing; its unit stays assumed.", text_side(side));
+    bringup_note(self, text_side(side), "force_unit", NULL, "assumed: force frames were missing");
 }
 
 /// Returns true if the forces are steady and not at the end of their range. Otherwise they do not show the unit; prints
 /// the reason.
 static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, const force_t *loaded) {
     if (is_at_its_end(free) || is_at_its_end(loaded)) {
-        talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Take less mass.",
+        talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Use less mass.",
                  loaded->low, loaded->high);
         bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force was at the end of its range");
         return false;
@@ -167,15 +167,15 @@ static bool measure(bringup_t *self, iw_side_t side) {
     } else if (is_usable(self, side, &free, &loaded)) {
         keep_unit(self, side, loaded.mean - free.mean, mass_kg);
     } else {
-        return talk_yes(self, "Once more?", true);
+        return talk_yes(self, "Try again?", true);
     }
     return false;
 }
 
 void bringup_force(bringup_t *self) {
     talk_step(7, "the force (nothing turns)");
-    talk_say("The document gives cN for the left and dN for the right handle, a factor of ten. A mass that you know "
-             "(a bag of %.1f kg or more) settles it.",
+    talk_say("In the document the unit is cN for the left and dN for the right handle, a factor of ten. A known mass "
+             "(a bag of %.1f kg or more) shows the right one.",
              MASS_MIN_kg);
     trial_start(self, &self->config);
     const bool wanted = talk_yes(self, "Measure the force?", true);

@@ -22,7 +22,7 @@ typedef struct {
 /// Turns that the rpm count, as far as both wheels showed it.
 typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 
-/// Returns true after it has printed why the turns have no result; otherwise false.
+/// Returns true after it has printed why the turns have no result, otherwise false.
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
     const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
     const char *name = text_side(side);
@@ -34,10 +34,10 @@ static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turne
                  "exchanged?",
                  text_side(other), hand->ticks[other], name, hand->ticks[side]);
     } else if (!hand_went_one_way(hand, side)) {
-        talk_say("  The %s wheel was turned back and forth: %lld ticks there, %lld in all.", name, hand->ticks[side],
+        talk_say("  The %s wheel was turned back and forth: %lld ticks forwards, %lld in all.", name, hand->ticks[side],
                  hand->way[side]);
     } else if (turned->gear < 1.0 - GEAR_PERCENT / 100.0 || turned->gear > GEAR_MAX) {
-        talk_say("  %lld ticks of the %s wheel in %d turns make no gear between 1 and %.0f.", hand->ticks[side], name,
+        talk_say("  %lld ticks of the %s wheel in %d turns are no gear between 1 and %.0f.", hand->ticks[side], name,
                  TURNS, GEAR_MAX);
     } else {
         return false;
@@ -45,7 +45,7 @@ static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turne
     return true;
 }
 
-/// Measures one wheel. Returns false if the operator gives up.
+/// Measures one wheel. Returns false if the operator does not want to try again.
 static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     char prompt[96];
     hand_t hand;
@@ -59,7 +59,7 @@ static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
         if (!is_no_turn(&hand, side, out_turned)) {
             return true;
         }
-    } while (talk_yes(self, "Once more?", true));
+    } while (talk_yes(self, "Try again?", true));
     return false;
 }
 
@@ -90,9 +90,9 @@ static void note_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool gea
     const bool whole = !geared || rpm != RPM_UNSEEN;
     bringup_note(self, "wheels", "gear_ratio", whole ? "gear_ratio" : NULL, "%lld and %lld ticks in %d turns by hand%s",
                  turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS,
-                 whole ? "" : "; whose turns the rpm count was not seen");
+                 whole ? "" : "; whether rpm counts the wheel or the rotor was not measured");
     if (geared && rpm != RPM_UNSEEN) {
-        bringup_note(self, "wheels", "rpm_of", NULL, "rpm summed up over these turns make %.2f and %.2f of the rotor's",
+        bringup_note(self, "wheels", "rpm_of", NULL, "the sum of rpm over these turns is %.2f and %.2f of the rotor's",
                      turned[IW_LEFT].share, turned[IW_RIGHT].share);
     }
 }
@@ -103,8 +103,8 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     iw_config_t core = self->config.core;
     if (fabs(turned[IW_LEFT].gear - turned[IW_RIGHT].gear) > gear * 2.0 * GEAR_PERCENT / 100.0) {
         talk_say(
-            "  The left wheel makes %.2f turns of its rotor per turn, the right one %.2f: were both turned exactly "
-            "%d times? The gear stays as it was.",
+            "  The left rotor makes %.2f turns per turn of its wheel, the right one %.2f: were both turned exactly "
+            "%d times? The gear is unchanged.",
             turned[IW_LEFT].gear, turned[IW_RIGHT].gear, TURNS);
         return;
     }
@@ -116,10 +116,10 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
              turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
              !geared               ? "no gear: rotor and wheel turn together"
-             : (rpm == RPM_UNSEEN) ? "whose turns the rpm count was not to be seen (turn faster to see it)"
-             : (rpm == RPM_ROTOR)  ? "the rpm count the rotor's turns"
-                                   : "the rpm count the wheel's turns");
-    if (talk_yes(self, "Take that?", true)) {
+             : (rpm == RPM_UNSEEN) ? "whether rpm counts the wheel or the rotor was not measured (turn faster)"
+             : (rpm == RPM_ROTOR)  ? "rpm counts the rotor's turns"
+                                   : "rpm counts the wheel's turns");
+    if (talk_yes(self, "Use that?", true)) {
         self->config.core = core;
         bringup_fit_rest(&self->config.core);
         note_gear(self, turned, geared, rpm);
@@ -129,8 +129,8 @@ static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
 void bringup_gear(bringup_t *self) {
     turned_t turned[IW_SIDES];
     talk_step(3, "the gear (nothing is sent; you turn)");
-    talk_say("The wheels count %u ticks per turn of the rotor. Whether the rotor turns faster than the wheel, the "
-             "document does not say. Mark each tyre, so that a turn can be seen.",
+    talk_say("The wheels count %u ticks per turn of the rotor. The document does not state whether the rotor turns "
+             "faster than the wheel. Mark each tyre, so that you see a full turn.",
              IW_TICKS_PER_TURN);
     if (!talk_yes(self, "Turn the wheels by hand?", true)) {
         return;
@@ -139,6 +139,6 @@ void bringup_gear(bringup_t *self) {
     if (turn(self, IW_LEFT, &turned[IW_LEFT]) && turn(self, IW_RIGHT, &turned[IW_RIGHT])) {
         judge_gear(self, turned);
     } else {
-        talk_say("  The gear stays as it was.");
+        talk_say("  The gear is unchanged.");
     }
 }

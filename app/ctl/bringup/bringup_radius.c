@@ -9,7 +9,7 @@
 #define TICKS_MIN    60
 #define DISTANCE_MIN 1.0
 #define DISTANCE_MAX 100.0
-/// If the radii of both wheels differ by less, the machine went straight.
+/// If the radii of both wheels differ by less, the machine moved straight ahead.
 #define ALIKE_PERCENT 3.0
 
 /// Returns the radius in mm from a distance and the ticks of a wheel; 0 without ticks.
@@ -26,13 +26,13 @@ static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
         const bool forwards = (hand->ticks[side] > 0) != self->config.core.invert[side];
         if (!forwards) {
             talk_say(
-                "  The %s wheel counted backwards while the machine went forwards. Either it was pushed backwards, "
+                "  The %s wheel counted backwards while the machine moved forwards. Either it was pushed backwards, "
                 "or the sign of step 6 is wrong: begin again if you are not sure.",
                 text_side(side));
             return false;
         }
         if (!hand_went_one_way(hand, (iw_side_t)side)) {
-            talk_say("  The %s wheel went back and forth: %lld ticks forwards, %lld in all. Once more, please.",
+            talk_say("  The %s wheel moved back and forth: %lld ticks forwards, %lld in all. Please push again.",
                      text_side(side), llabs(hand->ticks[side]), hand->way[side]);
             return false;
         }
@@ -52,8 +52,8 @@ static bool is_usable(const bringup_t *self, const hand_t *hand) {
     return counts_forwards(self, hand);
 }
 
-/// Stores the radius that the operator accepted. Only a straight way with a known gear confirms the radius; a straight
-/// way alone gives the distance per tick.
+/// Stores the radius that the operator accepted. A straight path with a known gear confirms the radius; a straight path
+/// alone results only in the distance per tick.
 static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, double mean, bool straight) {
     const bool geared = bringup_is_confirmed(self, "gear_ratio");
     const double ticks = (double)(llabs(hand->ticks[IW_LEFT]) + llabs(hand->ticks[IW_RIGHT])) / 2.0;
@@ -78,14 +78,15 @@ static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m)
     talk_say("  Left %.1f mm, right %.1f mm; mean %.0f mm%s.", left, right, mean,
              bringup_is_confirmed(self, "gear_ratio") ? "" : ", if the gear is as configured: it was not measured");
     if (!straight) {
-        talk_say("  They differ by more than %.0f %%: it was a curve, or the tyres differ. Better once more, straight.",
-                 ALIKE_PERCENT);
+        talk_say(
+            "  They differ by more than %.0f %%: it was a curve, or the tyres differ. Better push again, straight.",
+            ALIKE_PERCENT);
     }
     if (mean < range.min || mean > range.max) {
         talk_say("  That is no radius between %u and %u mm: was the distance in metres?", range.min, range.max);
         return false;
     }
-    const bool taken = talk_yes(self, "Take the mean?", straight);
+    const bool taken = talk_yes(self, "Use the mean?", straight);
     if (taken) {
         keep_radius(self, hand, distance_m, mean, straight);
     }
@@ -97,14 +98,15 @@ void bringup_radius(bringup_t *self) {
     double distance_m = 0.0;
     hand_t hand;
     talk_step(8, "the radius (nothing is sent; you push)");
-    talk_say("The document says approximately 192 mm. Put the machine on the ground, mark a straight distance of 3 m "
-             "or more, and push the machine along it with its wheels rolling.");
+    talk_say(
+        "In the document it is approximately 192 mm. Put the machine on the ground, mark a straight distance of 3 m "
+        "or more, and push the machine along it with its wheels rolling.");
     trial_start(self, &self->config);
     do {
-        if (!talk_number(self, "Distance in m (Enter: leave it out)", DISTANCE_MIN, DISTANCE_MAX, &distance_m)) {
+        if (!talk_number(self, "Distance in m (Enter: skip this step)", DISTANCE_MIN, DISTANCE_MAX, &distance_m)) {
             return;
         }
         talk_ask(self, "Stand at the start, then Enter", "go", answer);
-        hand_follow(self, "Push it forwards to the end mark, let it stand, then press Enter ...", &hand);
+        hand_follow(self, "Push it forwards to the end mark, let it stop, then press Enter ...", &hand);
     } while (!judge_radius(self, &hand, distance_m));
 }

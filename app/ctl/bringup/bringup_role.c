@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Meaning of the current next to the speed: tries with only one of the two, and a last try with both. Without the last
-// try, wheels that cannot turn at all would look like a limit.
+// Role of the current in a setpoint: tries with only current or speed, and a last try with both. Without the last try,
+// wheels that cannot turn at all would count as a limit.
 //
 //     current alone turns both           -> setpoint
 //     neither alone, nor 0 with current,
 //         but both together turn both    -> limit
-//     any other result                   -> not seen; the operator may know
+//     any other result                   -> not measured; the operator may know
 #include "bringup.h"
 
 #include <stdio.h>
@@ -22,7 +22,7 @@
 /// Result of the tries.
 typedef struct {
     const char *role; ///< "limit", "setpoint", or "?".
-    bool seen;        ///< Everything that shows this role was seen, on both wheels.
+    bool seen;        ///< All results that show this role were observed, on both wheels.
     char how[BRINGUP_NOTE_SIZE];
 } role_t;
 
@@ -53,8 +53,8 @@ static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
     (void)snprintf(found->how, sizeof found->how, "%d mA without speed turned %s", current_mA, wheels(sides));
     if (!found->seen) {
         talk_say(
-            "Only %s: the other one may be held. A current that turns a wheel by itself is no limit, but it was not "
-            "seen of both.",
+            "Only %s: the other one may be held. A current that turns a wheel without a speed is no limit, but only "
+            "one wheel showed it.",
             wheels(sides));
     }
 }
@@ -65,7 +65,7 @@ static unsigned try_zero(bringup_t *self) {
     gateway_config_t config = self->config;
     const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
     config.core.current_role = IW_ROLE_LIMIT;
-    talk_say("Now a zero as that role has it, speed 0 with %d mA. Nothing may turn.", self->current_mA);
+    talk_say("Now a zero of that role, speed 0 with %d mA. Neither wheel may turn.", self->current_mA);
     trial_start(self, &config);
     return try_burst(self, &zero);
 }
@@ -80,7 +80,7 @@ static void try_limit(bringup_t *self, role_t *found) {
         find_setpoint(found, sides, self->current_mA);
         return;
     }
-    talk_say("Nothing turned. Last, speed and current together once more: both wheels must turn, or nothing is known.");
+    talk_say("Neither wheel turned. Last, speed and current together: unless both wheels turn, there is no result.");
     bringup_start_with(self, self->config.core.setpoint_type);
     sides = try_burst(self, &together);
     found->seen = sides == BOTH;
@@ -89,11 +89,11 @@ static void try_limit(bringup_t *self, role_t *found) {
         (void)snprintf(found->how, sizeof found->how,
                        "%d mA alone and %d mm/s alone turned no wheel, both together did", self->current_mA,
                        BRINGUP_SPEED_MM_S);
-        talk_say("They turn with both, and with neither alone: the current is a limit.");
+        talk_say("The wheels turn with both together, and with neither alone: the current is a limit.");
     } else {
         talk_say(
-            "Now %s turned: something holds the wheels, so that they did not turn before means nothing. Let them turn "
-            "freely and begin again, or answer from what you know.",
+            "Now %s turned: something holds the wheels, so the tries before have no result. Let them turn freely and "
+            "begin again, or answer from other information.",
             wheels(sides));
     }
 }
@@ -111,11 +111,11 @@ static void find_role(bringup_t *self, role_t *found) {
         find_setpoint(found, by_current, current_mA);
     } else if (by_speed != 0U) {
         talk_say(
-            "The speed without current turned %s, the current alone none: the current seems to mean nothing. Ask the "
-            "maker; limit is the usual word for that.",
+            "The speed without current turned %s, the current alone none: the current seems to have no effect. Ask the "
+            "maker; limit is the usual role then.",
             wheels(by_speed));
     } else {
-        talk_say("Neither turned a wheel: the current may be a limit.");
+        talk_say("Neither alone turned a wheel: the current may be a limit.");
         try_limit(self, found);
     }
 }
@@ -124,7 +124,7 @@ static void keep_role(bringup_t *self, const role_t *found) {
     char answer[BRINGUP_ANSWER_SIZE];
     talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
     while (strcmp(answer, "limit") != 0 && strcmp(answer, "setpoint") != 0) {
-        talk_say("limit or setpoint, please: nothing can be driven without one of them (q ends bringup).");
+        talk_say("Please write limit or setpoint: without one of them the wheels cannot be driven (q ends bringup).");
         talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
     }
     const bool same = strcmp(answer, found->role) == 0;
@@ -135,10 +135,12 @@ static void keep_role(bringup_t *self, const role_t *found) {
 
 void bringup_role(bringup_t *self) {
     role_t found = {.role = "?"};
-    talk_step(5, "what the current means (WHEELS MAY TURN, in the air)");
-    talk_say("Beside the speed a setpoint has a current. Either it limits the motor's current, or it is a setpoint of "
-             "its own. Two to four short tries tell: first %d mA without a speed, then %d mm/s without a current.",
-             self->current_mA / 2, BRINGUP_SPEED_MM_S);
+    talk_step(5, "the role of the current (WHEELS MAY TURN, in the air)");
+    talk_say(
+        "A setpoint has a speed and a current. The current is either a limit of the motor's current, or a "
+        "setpoint of its own. Two to four short tries show it: first %d mA without a speed, then %d mm/s without a "
+        "current.",
+        self->current_mA / 2, BRINGUP_SPEED_MM_S);
     bringup_start_with(self, self->config.core.setpoint_type);
     find_role(self, &found);
     keep_role(self, &found);

@@ -25,26 +25,26 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
     const int told = outcome->mean_mm_s[side];
     const int other = outcome->mean_mm_s[(side == IW_LEFT) ? IW_RIGHT : IW_LEFT];
     if (abs(told) < MOVES_MM_S && abs(other) >= MOVES_MM_S) {
-        talk_say("The bus says that the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
+        talk_say("By the bus the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
                  "exchange the wheels (or their plugs), then begin again.");
         return false;
     }
     if (abs(other) >= MOVES_MM_S) {
         talk_say(
-            "The bus says that BOTH wheels turned (%d and %d mm/s), though only the %s one was told to: what turned "
-            "the other? Nothing can be said of a sign so.",
+            "By the bus BOTH wheels turned (%d and %d mm/s), although only the %s one was commanded. Find out what "
+            "turned the other one: until then no sign can be found.",
             told, other, text_side(side));
         return false;
     }
     if (told <= -MOVES_MM_S) {
-        talk_say("The %s wheel measures the opposite of what it is told. No key mends that, and the gateway would stop "
-                 "for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
-                 text_side(side));
+        talk_say(
+            "The %s wheel measures the opposite of its command. No configuration key corrects that, and the gateway "
+            "would stop for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
+            text_side(side));
         return false;
     }
     if (told < MOVES_MM_S) {
-        talk_say("The %s wheel did not turn by itself. Is something in its way? If it needs more current: --current "
-                 "(now %d mA).",
+        talk_say("The %s wheel did not turn. Is it blocked? If it needs more current: --current (now %d mA).",
                  text_side(side), self->current_mA);
         return false;
     }
@@ -57,7 +57,7 @@ static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
         *invert = !*invert;
     }
     bringup_note(self, text_side(side), "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
-                 "somebody saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
+                 "the operator saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
                  (forward ? *invert : !*invert) ? "yes" : "no");
 }
 
@@ -68,7 +68,7 @@ static bool look_at(bringup_t *self, iw_side_t side) {
     outcome_t outcome;
     const burst_t burst =
         turn(self, (side == IW_LEFT) ? BRINGUP_SPEED_MM_S : 0, (side == IW_RIGHT) ? BRINGUP_SPEED_MM_S : 0);
-    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", text_side(side),
+    (void)snprintf(question, sizeof question, "Watch the %s wheel. Enter turns it for %.1f s", text_side(side),
                    TURN_MS / 1e3);
     talk_ask(self, question, "go", answer);
     burst_insist(self, &burst, &outcome);
@@ -76,7 +76,7 @@ static bool look_at(bringup_t *self, iw_side_t side) {
         bringup_fail(self);
     }
     for (;;) {
-        talk_ask(self, "It would take the machine f forwards, b backwards (o: other wheel, r: again)", "r", answer);
+        talk_ask(self, "It would move the machine f forwards, b backwards (o: other wheel, r: repeat)", "r", answer);
         if (strcmp(answer, "r") == 0) {
             return false;
         }
@@ -89,7 +89,7 @@ static bool look_at(bringup_t *self, iw_side_t side) {
             keep_sign(self, side, answer[0] == 'f');
             return true;
         }
-        talk_say("f, b, o or r, please.");
+        talk_say("Please write f, b, o or r.");
     }
 }
 
@@ -99,21 +99,21 @@ static bool verify(bringup_t *self) {
     outcome_t outcome;
     const burst_t burst = turn(self, BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S);
     trial_start(self, &self->config);
-    talk_ask(self, "Now both. Enter turns them as for straight ahead", "go", answer);
+    talk_ask(self, "Now both. Enter turns them for straight ahead", "go", answer);
     burst_insist(self, &burst, &outcome);
     if (outcome.mean_mm_s[IW_LEFT] < MOVES_MM_S || outcome.mean_mm_s[IW_RIGHT] < MOVES_MM_S) {
         talk_say(
-            "The bus does not say that both went forwards. Something held a wheel, or a sign was not seen rightly: "
-            "each wheel once more.");
+            "By the bus not both turned forwards. Something held a wheel, or a direction was seen wrongly: each wheel "
+            "again.");
         return false;
     }
-    return talk_yes(self, "Would the machine have gone straight ahead?", false);
+    return talk_yes(self, "Would the machine have moved straight ahead?", false);
 }
 
 void bringup_signs(bringup_t *self) {
-    talk_step(6, "which way each wheel turns (WHEELS TURN, in the air)");
-    talk_say("Stand behind the machine, where its user will. Each wheel turns alone and slowly; tell which way it "
-             "would have taken the machine on the ground.");
+    talk_step(6, "the direction of each wheel (WHEELS TURN, in the air)");
+    talk_say("Stand behind the machine, like its user. Each wheel turns alone and slowly; answer in which direction it "
+             "would have moved the machine on the ground.");
     do {
         trial_start(self, &self->config);
         for (unsigned side = 0; side < IW_SIDES;) {

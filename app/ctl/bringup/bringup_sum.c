@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Sum of the wheels' counts, from answers of the gateway that may come late or not at all.
+// Sum of the wheels' counts, from answers of the gateway that may be late or missing.
 #include "bringup.h"
 
 #include <stdlib.h>
 
-/// Way back of a hand that aims at a mark: a number of ticks, or one part in BACK_SHARE of the way.
+/// Backward motion of a hand that aims at a mark: a number of ticks, or one part in BACK_SHARE of the whole motion.
 #define BACK_TICKS 6
 #define BACK_SHARE 20
 
@@ -58,11 +58,11 @@ void hand_add(hand_t *self, const hand_look_t *now, int64_t now_us) {
 bool hand_is_complete(const hand_t *hand) {
     switch (hand->gap) {
     case HAND_OFFLINE:
-        talk_say("  The wheels were not heard all the time: check their power and cables, then once more.");
+        talk_say("  The wheels were offline for a while: check their power and cables, then try again.");
         break;
     case HAND_RESTARTED:
-        talk_say("  A wheel restarted or was away from the bus: not all of its ticks were counted. Check its power "
-                 "and cable, then once more.");
+        talk_say("  A wheel restarted or left the bus: not all of its ticks were counted. Check its power and cable, "
+                 "then try again.");
         break;
     case HAND_UNSEEN:
         talk_say("  This computer was too busy to follow the wheels for %d s: see what else runs on it, then once "

@@ -123,7 +123,7 @@ bool talk_number(bringup_t *self, const char *question, double low, double high,
         if (end != answer && *end == '\0' && *out_number >= low && *out_number <= high) {
             return true;
         }
-        talk_say("A number from %g to %g, please, without its unit.", low, high);
+        talk_say("Please write a number from %g to %g, without its unit.", low, high);
     }
 }
 

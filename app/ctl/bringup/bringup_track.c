@@ -36,14 +36,16 @@ static bool is_turn(const bringup_t *self, const hand_t *hand) {
         talk_say("  Too few ticks (left %lld, right %lld): both wheels must stand on the ground and roll.",
                  hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
     } else if ((left > 0.0) == (right > 0.0)) {
-        talk_say("  Both wheels rolled the same way (left %.2f m, right %.2f m): that was no turn on the spot. If it "
-                 "was, a sign of step 6 is wrong: begin again.",
-                 left / 1e3, right / 1e3);
+        talk_say(
+            "  Both wheels rolled in the same direction (left %.2f m, right %.2f m): that was no turn on the spot. "
+            "If it was, a sign of step 6 is wrong: begin again.",
+            left / 1e3, right / 1e3);
     } else if (!hand_went_one_way(hand, IW_LEFT) || !hand_went_one_way(hand, IW_RIGHT)) {
-        talk_say("  It was turned back and forth (left %lld of %lld ticks, right %lld of %lld): only one way, please.",
-                 llabs(hand->ticks[IW_LEFT]), hand->way[IW_LEFT], llabs(hand->ticks[IW_RIGHT]), hand->way[IW_RIGHT]);
+        talk_say(
+            "  It was turned back and forth (left %lld of %lld ticks, right %lld of %lld): turn it in one direction.",
+            llabs(hand->ticks[IW_LEFT]), hand->way[IW_LEFT], llabs(hand->ticks[IW_RIGHT]), hand->way[IW_RIGHT]);
     } else if (fabs(left + right) > (fabs(left) + fabs(right)) * WANDER_PERCENT / 100.0) {
-        talk_say("  Left rolled %.2f m, right %.2f m: the machine wandered off while it turned. Turn it on the spot, "
+        talk_say("  Left rolled %.2f m, right %.2f m: the machine moved away while it turned. Turn it on the spot, "
                  "about the middle between its wheels.",
                  left / 1e3, right / 1e3);
     } else {
@@ -62,11 +64,11 @@ static void keep_track(bringup_t *self, const hand_t *hand, int turns, double tr
 
 /// Reports that the configuration does not confirm the count.
 static void tell_off(const bringup_t *self) {
-    char configured[40] = "None was configured";
+    char configured[40] = "No track was configured";
     if (self->config.core.track_mm != 0U) {
-        (void)snprintf(configured, sizeof configured, "Configured were %u mm", self->config.core.track_mm);
+        (void)snprintf(configured, sizeof configured, "The configured track is %u mm", self->config.core.track_mm);
     }
-    talk_say("  %s. A tape from the middle of one tyre to the middle of the other tells whether the turns were counted "
+    talk_say("  %s. A tape from the middle of one tyre to the middle of the other shows whether the turns were counted "
              "rightly.",
              configured);
 }
@@ -83,8 +85,8 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     }
     if (track_mm < TRACK_MIN || track_mm > TRACK_MAX) {
         talk_say(
-            "  Left rolled %.2f m, right %.2f m in %d turns: that is no track between %d and %d mm. Were the turns "
-            "counted rightly?",
+            "  Left rolled %.2f m, right %.2f m in %d turns: that is no track between %d and %d mm. Was the number of "
+            "turns right?",
             left / 1e3, right / 1e3, turns, TRACK_MIN, TRACK_MAX);
         return false;
     }
@@ -93,29 +95,30 @@ static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     if (!near) {
         tell_off(self);
     }
-    const bool taken = talk_yes(self, "Take that?", near);
+    const bool taken = talk_yes(self, "Use that?", near);
     if (taken) {
         keep_track(self, hand, turns, track_mm);
     }
     return taken;
 }
 
-/// Asks for a whole number of turns. Returns 0 if the operator leaves the step out.
+/// Asks for a whole number of turns. Returns 0 if the operator skips the step.
 static int ask_turns(bringup_t *self) {
     double turns = 0.0;
-    while (talk_number(self, "How many full turns (3 is good; Enter: leave it out)", 1.0, TURNS_MAX, &turns)) {
+    while (talk_number(self, "How many full turns (3 is good; Enter: skip this step)", 1.0, TURNS_MAX, &turns)) {
         if (turns == floor(turns)) {
             return (int)turns;
         }
-        talk_say("Full turns only: 1, 2, 3 ...");
+        talk_say("Please write a number of full turns: 1, 2, 3 ...");
     }
     return 0;
 }
 
 static void tell_left_out(const bringup_t *self) {
     if (self->config.core.track_mm == 0U) {
-        talk_say("Without a track no machine is armed: set track_mm under [wheels], from the middle of one tyre to the "
-                 "middle of the other, in mm.");
+        talk_say(
+            "Without a track the gateway refuses arm: set track_mm under [wheels], from the middle of one tyre to the "
+            "middle of the other, in mm.");
     }
 }
 
@@ -125,10 +128,9 @@ void bringup_track(bringup_t *self) {
     int turns = 0;
     hand_t hand;
     talk_step(9, "the track (nothing is sent; you turn the machine)");
-    talk_say(
-        "The track is the distance between the two wheels; it decides how far a twist turns the machine. Leave the "
-        "machine on the ground and mark on the floor which way it points. You will turn it on the spot, one way "
-        "only, until it has pointed at the mark so many times.");
+    talk_say("The track is the distance between the two wheels; it determines how far a twist turns the machine. Leave "
+             "the machine on the ground and mark on the floor where it points. You will turn it on the spot, in one "
+             "direction, until it has pointed at the mark that many times.");
     trial_start(self, &self->config);
     do {
         turns = ask_turns(self);
@@ -136,7 +138,7 @@ void bringup_track(bringup_t *self) {
             tell_left_out(self);
             return;
         }
-        (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",
+        (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, stop it at the mark, then press Enter ...",
                        turns, (turns == 1) ? "" : "s");
         talk_ask(self, "Point it at the mark, then Enter", "go", answer);
         hand_follow(self, prompt, &hand);

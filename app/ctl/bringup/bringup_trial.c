@@ -35,7 +35,7 @@ static int remove_one(const char *path, const struct stat *status, int kind, str
     (void)status;
     (void)kind;
     (void)place;
-    (void)remove(path); // A file that cannot be removed now is tried again.
+    (void)remove(path); // If it cannot be removed now, the caller tries again.
     return 0;
 }
 
@@ -97,7 +97,7 @@ static bool make_folder(trial_t *trial) {
     if (made && start_guard(trial)) {
         return true;
     }
-    (void)ctl_fail(CTL_UNAVAILABLE, "cannot make a folder like %s: %s", trial->folder, strerror(errno));
+    (void)ctl_fail(CTL_UNAVAILABLE, "cannot create a folder like %s: %s", trial->folder, strerror(errno));
     if (made) {
         (void)rmdir(trial->folder);
     }
@@ -105,8 +105,8 @@ static bool make_folder(trial_t *trial) {
     return false;
 }
 
-/// Makes the trial configuration: slow limits, and the folder of the session for everything that belongs to a real
-/// gateway. `with_records` leaves the directory of the records.
+/// Makes the trial configuration: slow limits, and the folder of the session for all files of a real gateway.
+/// `with_records` leaves the directory of the records unchanged.
 static void slow_down(const bringup_t *self, const gateway_config_t *config, bool with_records,
                       gateway_config_t *out_trial) {
     *out_trial = *config;
@@ -151,7 +151,7 @@ static bool write_config(const bringup_t *self, const gateway_config_t *config, 
     return fclose(file) == 0;
 }
 
-/// Finds the gateway's program: as given, next to this program, in the folder of the build, or in PATH.
+/// Finds the gateway's program: by --gateway, next to this program, in the folder of the build, or in PATH.
 static void find_program(trial_t *trial) {
     char self[400];
     const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1U);
@@ -286,7 +286,7 @@ void trial_close(bringup_t *self) {
     while (waitpid(trial->guard, &status, 0) < 0 && errno == EINTR) {
     }
     if (status != 0) {
-        talk_say("%s could not be removed; please do.", trial->folder);
+        talk_say("%s could not be removed; remove it by hand.", trial->folder);
     }
     trial->folder[0] = '\0';
 }
@@ -301,11 +301,11 @@ static const char *missing(const json_t *status) {
     const json_t *right = json_object_get(status, "right");
     const char *estop = text_word(json_object_get(status, "estop"), "state");
     if (status == NULL) {
-        return "the session's gateway does not answer";
+        return "the gateway of this session does not answer";
     }
     if (!json_is_true(json_object_get(left, "heard")) || !json_is_true(json_object_get(right, "heard"))) {
-        return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is not heard (power, cable)"
-                                                             : "the right wheel is not heard (power, cable)";
+        return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is offline (power, cable)"
+                                                             : "the right wheel is offline (power, cable)";
     }
     if (!json_is_true(json_object_get(left, "at_rest")) || !json_is_true(json_object_get(right, "at_rest"))) {
         return "a wheel turns";
@@ -314,9 +314,9 @@ static const char *missing(const json_t *status) {
         return "the e-stop is pressed or cannot be read";
     }
     if (json_array_size(json_object_get(status, "present")) > 0) {
-        return "a fault that was seen just now stays";
+        return "a recent fault is still present";
     }
-    return (strcmp(text_word(status, "state"), "listening") == 0) ? NULL : "the gateway does not come to rest";
+    return (strcmp(text_word(status, "state"), "listening") == 0) ? NULL : "the gateway does not return to listening";
 }
 
 bool trial_wait_ready(bringup_t *self) {

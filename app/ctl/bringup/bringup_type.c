@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Byte 0 of a setpoint: the first of the two facts that the document leaves out and without which no wheel can be
+// Byte 0 of a setpoint: the first of the two facts that are not in the document and without which no wheel can be
 // driven.
 //
 // While the role of the current is unknown, bringup drives wheels as if the current were a setpoint: its zero is 0 mm/s
@@ -65,13 +65,13 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
     self->config.core.setpoint_type = (uint8_t)type;
     self->config.core.setpoint_type_set = true;
     bringup_note(self, "wheels", "setpoint_type", followed ? "setpoint_type" : NULL,
-                 "both wheels turned with it%s: told %d mm/s, measured %d and %d",
+                 "both wheels turned with it%s: commanded %d mm/s, measured %d and %d",
                  followed ? "" : ", but at another speed", BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT],
                  outcome->mean_mm_s[IW_RIGHT]);
     if (!followed) {
         talk_say(
-            "Told %d mm/s, measured %d and %d: a gear that was not measured, or this type means something else than "
-            "speed. It is taken, and noted as not confirmed.",
+            "Commanded %d mm/s, measured %d and %d: a gear that was not measured, or this type does not mean speed. "
+            "It is used, and noted as not confirmed.",
             BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT], outcome->mean_mm_s[IW_RIGHT]);
     }
 }
@@ -138,7 +138,7 @@ static bool try_types(bringup_t *self, const bool *wanted) {
         }
     }
     talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
-             "%d mA); or they do not take commands at all: is their enable switch on?",
+             "%d mA); or they accept no commands at all: is their enable switch on?",
              self->current_mA);
     return false;
 }
@@ -183,10 +183,10 @@ static void take_length(bringup_t *self, const learn_t *learn) {
     if (both && low == high && low > DLC_MIN && low <= DLC_MAX) {
         self->config.core.setpoint_dlc = (uint16_t)low;
         bringup_note(self, "wheels", "setpoint_dlc", NULL, "every setpoint of the recording has %d bytes", low);
-        talk_say("All of them have %d bytes, so ours get as many (setpoint_dlc).", low);
+        talk_say("All of them have %d bytes, so the gateway will send as many (setpoint_dlc).", low);
     } else if (high > DLC_MIN) {
-        talk_say("They have %d to %d bytes, or only one wheel got any: the length stays %u (setpoint_dlc).", low, high,
-                 self->config.core.setpoint_dlc);
+        talk_say("They have %d to %d bytes, or only one wheel received any: the length stays %u (setpoint_dlc).", low,
+                 high, self->config.core.setpoint_dlc);
     }
 }
 
@@ -203,16 +203,18 @@ static void learn_from_recording(bringup_t *self, char *out_types, size_t size) 
         (void)recording_close(&study->recording);
         const uint64_t frames = list_types(&study->learn, out_types, size);
         if (frames > 0U) {
-            talk_say("In %s %" PRIu64 " setpoints have a speed, with type %s. That is what was sent, no proof that the "
-                     "wheels turned by it (iwheelctl learn tells).",
+            talk_say("In %s %" PRIu64
+                     " setpoints have a speed, with type %s. They were sent; that is no proof that the wheels "
+                     "followed (see: iwheelctl learn).",
                      self->recording, frames, out_types);
             if (study->learn.setpoint[IW_LEFT].sent + study->learn.setpoint[IW_RIGHT].sent > 0U) {
-                talk_say("Some are marked as sent by the program that recorded them: if that was this gateway, they "
-                         "repeat its configuration.");
+                talk_say(
+                    "Some are marked as sent by the program that recorded them: if that was this gateway, they only "
+                    "repeat its configuration.");
             }
             take_length(self, &study->learn);
         } else {
-            talk_say("In %s there is no setpoint with a speed: it suggests nothing.", self->recording);
+            talk_say("%s has no setpoint with a speed, so it suggests no type.", self->recording);
         }
     }
     free(study);
@@ -230,9 +232,9 @@ void bringup_type(bringup_t *self) {
     if (self->recording != NULL) {
         learn_from_recording(self, suggestion, sizeof suggestion);
     }
-    talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the one you "
-             "know (from the maker, or from a recording: --learn FILE), or the ones to try, such as 0-7 or 1,4. Each "
-             "is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
+    talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the type that "
+             "you know (from the maker, or from a recording: --learn FILE), or the types to try, such as 0-7 or 1,4. "
+             "Each is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
              BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
     while (!found) {
         talk_ask(self, "Setpoint type, or types to try", suggestion, answer);

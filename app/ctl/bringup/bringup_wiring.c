@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Names of the e-stop lines whose button was seen to work.
+// Names of the e-stop lines whose button was tested.
 #include "bringup.h"
 
 #include <stdio.h>
@@ -29,7 +29,7 @@ static void store_contact(bringup_t *self, size_t contact, const char *line, FIL
     for (size_t i = 0; i < sizeof found / sizeof found[0]; i++) {
         const char *key = keys[contact][i];
         if (found[i][0] != '\0' && set(self, key, found[i], nowhere) == 0) {
-            bringup_note(self, "estop", key, NULL, "of the line whose press and release were seen");
+            bringup_note(self, "estop", key, NULL, "of the line on which press and release were seen");
         }
     }
 }

@@ -59,7 +59,7 @@ static const bringup_note_t *find_note(const bringup_t *self, const char *sectio
     return NULL;
 }
 
-/// A note as a comment in the file.
+/// Notes for the comments in the file.
 typedef struct {
     const bringup_t *bringup;
     char date[16];
@@ -79,8 +79,9 @@ static const char *comment(const void *context, const char *section, const char 
 }
 
 static void print_head(const char *date, FILE *out) {
-    (void)fprintf(
-        out, "; Written by iwheelctl bringup on %s. Lines that begin with BRINGUP tell how a value was found.\n", date);
+    (void)fprintf(out,
+                  "; Written by iwheelctl bringup on %s. Lines that begin with BRINGUP state how a value was found.\n",
+                  date);
 }
 
 /// Moves the new file to its place; an existing file is renamed to PATH.old.
@@ -91,7 +92,7 @@ static bool put_in_place(const char *beside, const char *path) {
         if (rename(path, old) != 0) {
             return false;
         }
-        talk_say("The old one is kept as %s.", old);
+        talk_say("The old file is now %s.", old);
     }
     return rename(beside, path) == 0;
 }
@@ -109,14 +110,14 @@ static bool write_file(bringup_t *self, const char *path) {
     }
     FILE *file = fopen(beside, "we");
     if (file == NULL) {
-        talk_say("Cannot write %s: %s. Name another one.", beside, strerror(errno));
+        talk_say("Cannot write %s: %s. Choose another file.", beside, strerror(errno));
         return false;
     }
     print_head(commenter.date, file);
     gateway_config_print_noted(&self->config, comment, (const void *)&context, file);
     const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
     if (fclose(file) != 0 || !written || !put_in_place(beside, path)) {
-        talk_say("Cannot write %s: %s. Name another one.", path, strerror(errno));
+        talk_say("Cannot write %s: %s. Choose another file.", path, strerror(errno));
         (void)unlink(beside);
         return false;
     }
@@ -148,7 +149,7 @@ static const char *value_of(const bringup_t *self, const bringup_note_t *note, c
 
 static void tell_findings(const bringup_t *self) {
     char value[32];
-    talk_say("What was found:");
+    talk_say("Results:");
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
         (void)printf("  %s [%s] %s%s%s\n", (note->item != NULL) ? "confirmed" : "noted    ", note->section, note->key,
@@ -195,11 +196,11 @@ static bool may_keep(const bringup_t *self) {
 static void tell_next(bringup_t *self, const char *path) {
     char value[32];
     if (may_keep(self) && confirm_all(self)) {
-        talk_say("The ledger in %s knows what was confirmed. Next: iwheel-gateway -c %s", self->config.record.directory,
+        talk_say("The confirmed results are stored in %s. Next: iwheel-gateway -c %s", self->config.record.directory,
                  path);
         return;
     }
-    talk_say("Next: iwheel-gateway -c %s, and when it runs, tell its ledger what you saw:", path);
+    talk_say("Next: iwheel-gateway -c %s, and when it runs, confirm the results:", path);
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {

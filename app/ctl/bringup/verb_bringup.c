@@ -42,7 +42,7 @@ static bool parse_current(const char *text, int *out_mA) {
     const long current = strtol(text, &end, 10);
     if (end == text || (*end != '\0' && strcmp(end, "mA") != 0) || current < CURRENT_MIN_mA ||
         current > CURRENT_MAX_mA) {
-        (void)ctl_fail(CTL_USAGE, "--current wants mA, %d to %d", CURRENT_MIN_mA, CURRENT_MAX_mA);
+        (void)ctl_fail(CTL_USAGE, "--current needs mA, %d to %d", CURRENT_MIN_mA, CURRENT_MAX_mA);
         return false;
     }
     *out_mA = (int)current;
@@ -59,7 +59,7 @@ static int configure(bringup_t *self, const words_t *words) {
     bringup_forget_wiring(self);
     self->recording = words->learn;
     if (words->learn != NULL && access(words->learn, R_OK) != 0) {
-        return ctl_fail(CTL_USAGE, "--learn %s: %s; name a recording in candump's form", words->learn, strerror(errno));
+        return ctl_fail(CTL_USAGE, "--learn %s: %s; use a recording in candump's form", words->learn, strerror(errno));
     }
     self->out_path = (words->out != NULL) ? words->out : "gateway.conf";
     self->current_mA = BRINGUP_CURRENT_mA;
@@ -71,13 +71,14 @@ static int configure(bringup_t *self, const words_t *words) {
 
 /// Explains bringup and its conditions. Ends bringup if the operator does not agree.
 static void introduce(bringup_t *self) {
-    talk_say("iwheelctl bringup: from wheels that nobody knows to a configuration that somebody has seen to be right.");
+    talk_say("iwheelctl bringup: from unknown wheels to a configuration that you have tested.");
     talk_say(" ");
-    talk_say("Bus %s, e-stop %s. Ten steps; in three of them WHEELS TURN. Both wheels must hang in the air, free to "
-             "turn, and nobody and nothing may touch them. Keep a finger on the e-stop. They turn only right after a "
-             "question, with at most %d mm/s and %d mA, for two seconds at most; the e-stop and any key stop them at "
-             "once.",
-             self->config.bus.interface, self->config.estop.line, 2 * BRINGUP_SPEED_MM_S, self->current_mA);
+    talk_say(
+        "Bus %s, e-stop %s. Ten steps; in three of them WHEELS TURN. Both wheels must hang in the air, free to "
+        "turn, and no person or thing may touch them. Keep a finger on the e-stop. They turn only directly after a "
+        "question, with at most %d mm/s and %d mA, for two seconds at most; the e-stop and any key stop them "
+        "immediately.",
+        self->config.bus.interface, self->config.estop.line, 2 * BRINGUP_SPEED_MM_S, self->current_mA);
     talk_say("The word in [brackets] stands for an empty answer; q ends bringup. Nothing is written before the last "
              "step.");
     if (!talk_yes(self, "Wheels in the air, finger on the e-stop?", false)) {

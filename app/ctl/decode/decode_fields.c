@@ -6,8 +6,8 @@
 #define PERCENT_MAX     100
 #define MN_PER_CN       10
 #define MN_PER_DN       100
-#define BATTERY_NOTE    "battery at least 25.5 V: the byte ends there"
-#define IMPOSSIBLE_NOTE "a temperature above 200 degC or a load above 100 % is left out: impossible"
+#define BATTERY_NOTE    "battery at least 25.5 V: the byte has its largest value"
+#define IMPOSSIBLE_NOTE "a temperature above 200 degC or a load above 100 % is impossible and left out"
 #define SATURATED_NOTE  "force at the end of its range: it may be larger"
 
 typedef struct {
@@ -110,7 +110,7 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
         break;
     case IW_CODEC_BAD_LENGTH:
         out->message = "ignored";
-        out->note = "shorter than the wheels' document says: the gateway ignores it";
+        out->note = "shorter than in the wheels' document: the gateway ignores it";
         break;
     default:
         out->message = iw_codec_name(kind);

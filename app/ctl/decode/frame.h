@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A frame as one line of text on stdout, and as the gateway sends it: in the event `frame`, and in the reply to `why`.
+/// A frame as one line of text on stdout, and as JSON from the gateway: in the event `frame` and the reply to `why`.
 #ifndef FRAME_H
 #define FRAME_H
 

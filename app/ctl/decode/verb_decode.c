@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/// An earlier time is not counted from 1970.
+/// An earlier time does not count from 1970, so it is printed as seconds.
 #define CALENDAR_US 1000000000000000
 
 typedef struct {
@@ -157,7 +157,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     while (ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
         write_frame(&decode, &frame, self->json);
         if (recording_is_drained(&decode.recording)) {
-            (void)fflush(stdout); // Live: each line must be visible before the next one comes.
+            (void)fflush(stdout); // Live: each line must be visible before the next one arrives.
         }
     }
     return recording_close(&decode.recording);

@@ -23,7 +23,7 @@ typedef struct {
     unsigned listen_ms;
 } doctor_t;
 
-/// An option of the command line and its value; NULL: not given.
+/// An option of the command line and its value; NULL if the option is absent.
 typedef struct {
     const char *word;
     const char *value;

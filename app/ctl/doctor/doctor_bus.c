@@ -26,7 +26,7 @@ static void say_contradicted(doctor_t *self, const char *name, const json_t *ent
                 : harmless ? INSPECT_WARN
                            : INSPECT_FAIL,
                 "assumption %s is contradicted: %s%s", name, text_word(entry, "reason"),
-                tared ? "; the tare has settled it" : "");
+                tared ? "; the tare has resolved it" : "");
     if (!tared) {
         inspect_cure(&self->findings, "%s", inspect_assumption_cure(item));
     }
@@ -60,9 +60,10 @@ static void list_unset(doctor_t *self) {
     } needed[] = {{"setpoint_type", "setpoint_type"}, {"current_role", "current_role"}, {"track", "track_mm"}};
     for (size_t i = 0; i < sizeof needed / sizeof needed[0]; i++) {
         if (advice_is_unset(self->gateway.status, needed[i].item)) {
-            inspect_say(&self->findings, "config", INSPECT_WARN, "%s not configured: arm is refused", needed[i].key);
+            inspect_say(&self->findings, "config", INSPECT_WARN, "%s not configured: the gateway refuses arm",
+                        needed[i].key);
             inspect_cure(&self->findings,
-                         "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
+                         "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
         }
     }
 }
@@ -87,12 +88,12 @@ static void look_at_status(doctor_t *self) {
                 text_word(status, "version"), self->gateway.path, self->gateway.bus, state, latched ? ", " : "",
                 latched ? text_word(status, "cause") : "");
     if (latched) {
-        inspect_cure(findings, "iwheelctl why tells the cause; when it is gone: iwheelctl reset");
+        inspect_cure(findings, "iwheelctl why prints the cause; when it is gone: iwheelctl reset");
     }
     judge_sending(self);
     if (advice_is_present(status, "second_master")) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
-                    "the gateway hears setpoints that are not its own, id 266 (0x10A) or 298 (0x12A)");
+                    "the gateway receives setpoints of another sender, id 266 (0x10A) or 298 (0x12A)");
         inspect_cure(findings, "switch off the other program or device that sends them");
     }
     if (!json_is_true(json_object_get(status, "listen_only"))) {
@@ -121,11 +122,11 @@ void doctor_look_at_gateway(doctor_t *self) {
                     self->gateway.bus);
         break;
     case NEAR_DENIED:
-        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not talk to it", path);
+        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not use it", path);
         cure_denied(self);
         break;
     case NEAR_MUTE:
-        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: it takes the connection and does not answer",
+        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: it accepts the connection and does not answer",
                     path);
         inspect_cure(findings, "see its log: journalctl -u iwheel-gateway; then: systemctl restart iwheel-gateway");
         break;
@@ -133,7 +134,7 @@ void doctor_look_at_gateway(doctor_t *self) {
         inspect_say(findings, "gateway", INSPECT_OK, "several gateways are running: %s", path);
         break;
     case NEAR_NONE:
-        inspect_say(findings, "gateway", INSPECT_OK, "gateway: none is running; doctor looks by itself");
+        inspect_say(findings, "gateway", INSPECT_OK, "gateway: none is running; doctor reads the bus itself");
         break;
     }
 }
@@ -204,7 +205,7 @@ inspect_estop_t doctor_estop(doctor_t *self) {
                  : (strcmp(state, "pressed") == 0)   ? 1
                  : (strcmp(state, "disagrees") == 0) ? IW_ESTOP_DISAGREES
                                                      : -1,
-        .trouble = "the gateway's log tells why: journalctl -u iwheel-gateway",
+        .trouble = "the gateway's log has the reason: journalctl -u iwheel-gateway",
     };
 }
 

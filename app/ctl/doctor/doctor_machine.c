@@ -19,7 +19,7 @@
 #define TYPE_CAN "280"
 /// No release of this program is older than this time.
 #define WALL_MIN_S 1735689600
-/// Number and length of the measured sleeps, and the lateness from which on a warning is given.
+/// Number and length of the measured sleeps, and the lateness above which a warning is printed.
 #define NAPS         200
 #define NAP_NS       1000000L
 #define LATE_CARE_us 20000
@@ -80,7 +80,8 @@ static void say_no_can(doctor_t *self) {
     (void)snprintf(path, sizeof path, "/lib/modules/%s", kernel.release);
     inspect_say(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
     if (access(path, F_OK) == 0) {
-        inspect_cure(&self->findings, "modprobe can_raw (and for ever: echo can_raw > /etc/modules-load.d/can.conf)");
+        inspect_cure(&self->findings,
+                     "modprobe can_raw (and permanently: echo can_raw > /etc/modules-load.d/can.conf)");
     } else {
         inspect_cure(&self->findings,
                      "its modules are not installed (%s is missing): boot a kernel with CAN; without "
@@ -99,10 +100,10 @@ static bool look_at_kernel(doctor_t *self) {
     (void)close(probe);
     read_driver((self->bus != NULL) ? self->bus : "", driver, sizeof driver);
     if (driver[0] != '\0') {
-        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are there; %s is driven by %s",
+        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available; %s has the driver %s",
                     self->bus, driver);
     } else {
-        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are there");
+        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are available");
     }
     return true;
 }
@@ -131,7 +132,7 @@ static void look_at_clock(doctor_t *self) {
     if (resolution.tv_nsec > NAP_NS || late_us > LATE_CARE_us) {
         inspect_say(findings, "clock", INSPECT_WARN, "clock: a sleep of 1 ms ended up to %.1f ms late",
                     (double)late_us / 1e3);
-        inspect_cure(findings, "the gateway stops the wheels when it is 100 ms late: lighten this machine's load, or "
+        inspect_cure(findings, "the gateway stops the wheels when it is 100 ms late: reduce this machine's load, or "
                                "run it with priority: chrt -f 10 iwheel-gateway ...");
     } else {
         inspect_say(findings, "clock", INSPECT_OK, "clock: a sleep of 1 ms ends at most %.1f ms late",
@@ -142,8 +143,7 @@ static void look_at_clock(doctor_t *self) {
         inspect_cure(findings, "timedatectl set-ntp true");
     } else if (adjtimex(&state) == TIME_ERROR || ((unsigned)state.status & (unsigned)STA_UNSYNC) != 0U) {
         inspect_say(findings, "clock", INSPECT_OK,
-                    "wall clock: set, not synchronised; nothing but dates in logs "
-                    "depends on it");
+                    "wall clock: set, not synchronised; only dates in logs depend on it");
     }
 }
 
@@ -164,9 +164,7 @@ static void look_at_rights(doctor_t *self) {
         inspect_say(&self->findings, "rights", INSPECT_OK, "rights: you are in group %s", group_name);
     } else {
         inspect_say(&self->findings, "rights", INSPECT_WARN,
-                    "rights: you are not in group %s, whose members may talk "
-                    "to the gateway",
-                    group_name);
+                    "rights: you are not in group %s, whose members may use the gateway", group_name);
         inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again", group_name);
     }
 }

@@ -104,7 +104,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
         paper_text(&paper, tones[finding->verdict], INDENT, inspect_verdict_word(finding->verdict));
         print_text(&paper, TONE_PLAIN, finding->text);
         if (finding->cure[0] != '\0') {
-            // Not broken into lines: users copy it.
+            // Printed in one line, so that users can copy it.
             paper_say(&paper, TONE_TITLE, "      -> %s", finding->cure);
             paper_end(&paper);
         }
@@ -113,7 +113,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
 
 static void print_sum(const doctor_t *self) {
     const unsigned *total = self->findings.total;
-    (void)printf("%u ok, %u to be looked at, %u wrong%s\n", total[INSPECT_OK], total[INSPECT_WARN], total[INSPECT_FAIL],
+    (void)printf("%u ok, %u to check, %u wrong%s\n", total[INSPECT_OK], total[INSPECT_WARN], total[INSPECT_FAIL],
                  (total[INSPECT_FAIL] > 0U) ? ": begin with the first" : "");
 }
 
@@ -197,7 +197,7 @@ static void say_unseen(doctor_t *self, bool skipped, const char *what) {
     }
 }
 
-/// Guides the operator through a press and a release on a terminal, seen through the input that will stop the wheels.
+/// Asks the operator at a terminal for a press and a release, and reads them from the input that will stop the wheels.
 static void press(doctor_t *self) {
     bool skipped = false;
     const inspect_estop_t before = doctor_estop(self);
@@ -206,7 +206,7 @@ static void press(doctor_t *self) {
         return;
     }
     if (self->gateway.result == NEAR_FOUND && (strcmp(state, "armed") == 0 || strcmp(state, "stopping") == 0)) {
-        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because somebody drives");
+        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because a client drives");
         inspect_cure(&self->findings, "iwheelctl stop, then run doctor again");
         return;
     }

@@ -56,7 +56,7 @@ static bool parse_option(int count, char **words, int *at, drive_words_t *drive,
         *at += 2;
         if (!drive->has_current) {
             (void)snprintf(out_why, DRIVE_WHY_SIZE,
-                           "--current wants two currents in mA, left and right, within -%d..%d", DRIVE_CURRENT_MAX_mA,
+                           "--current needs two currents in mA, left and right, within -%d..%d", DRIVE_CURRENT_MAX_mA,
                            DRIVE_CURRENT_MAX_mA);
         }
         return drive->has_current;
@@ -72,7 +72,7 @@ bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *
     for (int i = 0; i < count && why[0] == '\0'; i++) {
         if (speeds < 2 && is_number(words[i])) {
             if (!parse_integer(words[i], 32768, &drive.speed_mm_s[speeds]) || drive.speed_mm_s[speeds] == 32768) {
-                (void)snprintf(why, sizeof why, "\"%.40s\" is no speed; write whole mm/s within -32768..32767",
+                (void)snprintf(why, sizeof why, "\"%.40s\" is not a speed; write whole mm/s within -32768..32767",
                                words[i]);
             }
             speeds++;
@@ -82,7 +82,7 @@ bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *
     }
     if (why[0] == '\0' && speeds < 2) {
         (void)snprintf(why, sizeof why,
-                       "drive wants two speeds in mm/s, left and right, such as: iwheelctl drive 200 200");
+                       "drive needs two speeds in mm/s, left and right, such as: iwheelctl drive 200 200");
     }
     (void)snprintf(out_why, DRIVE_WHY_SIZE, "%s", why);
     if (why[0] == '\0') {

@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/// If no reply to a drive command comes for this time, the gateway hangs.
+/// If no reply to a drive command arrives for this time, the gateway hangs.
 #define SILENT_US 1000000
 /// The wheels must be at standstill at this time after the stop: the longest hold of the gateway.
 #define REST_US 10000000
@@ -26,7 +26,7 @@
 /// Range of the lease that the gateway may grant; another value counts as the shortest.
 #define LEASE_MIN_MS 20
 #define LEASE_MAX_MS 500
-/// A wheel without telemetry cannot be seen at standstill. The program waits this time for telemetry.
+/// Without telemetry a wheel is not known to be at standstill. The program waits this time for telemetry.
 #define UNHEARD_US 2000000
 
 typedef enum { END_NONE = 0, END_TIME, END_SIGNAL, END_REFUSED, END_SILENT, END_LOST } end_t;
@@ -37,13 +37,13 @@ typedef struct {
     json_t *first; ///< Snapshot at the beginning of the drive, and the last one.
     json_t *latest;
     int64_t lease_us;
-    int64_t begin_us; ///< Time when the first drive command was accepted; 0: not yet.
+    int64_t begin_us; ///< Time when the first drive command was accepted; 0 if none was.
     int64_t next_us;
     int64_t sent_us;     ///< Time when the last drive command was sent.
     int64_t answered_us; ///< Time of the last reply.
     long long applied[2];
     bool limited;
-    unsigned live;       ///< Columns for the progress; 0: stdout is not a suitable terminal, or --json was given.
+    unsigned live;       ///< Columns for the progress; 0 with --json, or if stdout is not a suitable terminal.
     char last_line[512]; ///< With --json: the last reply to a drive command.
 } drive_t;
 
@@ -220,8 +220,7 @@ static int wait_for_rest(drive_t *self) {
             return CTL_OK;
         }
         if (!both_heard(self->latest) && now_us >= begin_us + UNHEARD_US) {
-            return ctl_fail(
-                CTL_NO, "stopped, but a wheel is not heard, so nobody knows whether it turns; see: iwheelctl status");
+            return ctl_fail(CTL_NO, "stopped, but a wheel is offline, so it may still turn; see: iwheelctl status");
         }
         if (now_us >= begin_us + REST_US) {
             return ctl_fail(CTL_TIMEOUT, "a wheel still turns 10 s after the stop; see: iwheelctl status");
@@ -230,7 +229,8 @@ static int wait_for_rest(drive_t *self) {
             json_decref(event);
         }
         if (signals_count() != self->ctl->client.seen_signals) {
-            return ctl_fail(CTL_NO, "interrupted before both wheels were at rest; the gateway goes on stopping them");
+            return ctl_fail(CTL_NO,
+                            "interrupted before both wheels were at standstill; the gateway continues to stop them");
         }
     }
 }
@@ -304,8 +304,8 @@ static int finish(drive_t *self, end_t end) {
     clear_progress(self);
     if (end == END_LOST) {
         return ctl_fail(CTL_UNAVAILABLE,
-                        "the lease ended with the connection: the gateway, or else the wheels' own watchdog "
-                        "(1 s), stops them");
+                        "the lease ended with the connection: the gateway stops the wheels, or else their own "
+                        "watchdog (1 s) does");
     }
     if (self->ctl->json && self->last_line[0] != '\0') {
         text_json(self->last_line, stdout);
@@ -339,7 +339,7 @@ static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) 
     const int64_t end_us = client_now_us() + ARM_PATIENCE_US;
     int code = ctl_exchange(self->ctl, json_incref(request), out_reply);
     if (code == CTL_OK && passes(*out_reply)) {
-        (void)ctl_fail(CTL_OK, "waiting for a second at the most, because %s", text_word(*out_reply, "message"));
+        (void)ctl_fail(CTL_OK, "waiting for one second at most, because %s", text_word(*out_reply, "message"));
     }
     while (code == CTL_OK && passes(*out_reply) && client_now_us() < end_us) {
         json_decref(*out_reply);

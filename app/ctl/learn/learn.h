@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// Facts about the wheels that their document leaves open, from a recording of another controller: setpoint types,
-/// ranges, lengths, periods, and observations for or against the documented units. Constant memory; frames come one by
-/// one.
+/// ranges, lengths, periods, and observations for or against the documented units. Needs constant memory: the caller
+/// passes the frames one by one.
 ///
-/// This part makes no decision. It collects figures and observations, and reports where there are none. Everything that
-/// a sentence claims was seen, because its reader drives a person with it (learn_findings.h).
+/// This part makes no decision. It collects figures and observations, and reports where there are none. A sentence
+/// claims only what was observed, because its reader configures a machine that moves a person (learn_findings.h).
 #ifndef LEARN_H
 #define LEARN_H
 
@@ -101,7 +101,7 @@ typedef struct {
     learn_range_t offset_dN;
 } learn_wheel_t;
 
-/// Way of the pose from frame to frame, with the most and with the least significant byte first.
+/// Sum of the pose's steps from frame to frame, with the most and with the least significant byte first.
 typedef struct {
     uint64_t count;
     uint64_t moves; ///< Number of frames that differ from the one before.

@@ -112,8 +112,8 @@ void learn_drives_weigh(const learn_drives_t *self, learn_findings_t *out_findin
     const uint32_t limit_mm = self->config->pair_mm;
     if (self->judged_us < LEARN_SHOWN_MIN_US) {
         (void)learn_say(out_findings, '?', "pair", LEARN_BOTH,
-                        "whether the machine keeps its path: half a second with setpoints and speed frames of both "
-                        "wheels is not in it");
+                        "deviation from the path: the recording lacks half a second with setpoints and speed frames of "
+                        "both wheels");
     } else if (self->largest_mm < limit_mm) {
         (void)learn_say(out_findings, '+', "pair", LEARN_BOTH,
                         "the machine left its path by %" PRIu32 " mm at most; the gateway stops at %" PRIu32

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Distance by which each drive of a recording left its path, as the gateway's rule of the pair (iwheel/diverge.h)
-/// would have measured it. It shows an integrator the margin to `pair_mm` on the real wheels before the gateway drives
-/// them.
+/// would have measured it. It shows the margin to `pair_mm` on the real wheels before the gateway drives them.
 #ifndef LEARN_DRIVES_H
 #define LEARN_DRIVES_H
 
@@ -12,8 +11,8 @@
 /// Maximum number of drives that are reported one by one.
 #define LEARN_DRIVES_MAX 32U
 
-/// A drive begins with its first setpoint with a speed. It ends when both wheels had none for a second, or no setpoint
-/// came for a second.
+/// A drive begins with its first setpoint with a speed. It ends when both wheels had no speed for a second, or no
+/// setpoint arrived for a second.
 typedef struct {
     int64_t begin_us;  ///< Time in the recording.
     int64_t end_us;    ///< Time of its last setpoint with a speed.
@@ -37,7 +36,7 @@ typedef struct {
     learn_lag_t lag[IW_SIDES];
 } learn_drives_t;
 
-/// Initialises the state. `config` must exist as long as it: limits, time constants, `invert` and the gear.
+/// Initialises `self`. `config` must exist as long as `self`: limits, time constants, `invert` and the gear.
 void learn_drives_init(learn_drives_t *self, const iw_config_t *config);
 
 void learn_drives_frame(learn_drives_t *self, const candump_t *frame);

@@ -60,13 +60,13 @@ static void weigh_frames(const learn_t *self, learn_findings_t *out) {
         (void)learn_say(
             out, '-', "frames", LEARN_BOTH,
             "%" PRIu64
-            " remote, extended or FD frames with one of the eleven numbers: the gateway ignores such. python-can "
+            " remote, extended or FD frames with one of the eleven numbers: the gateway ignores them. python-can "
             "sends extended ids by default: is_extended_id=False",
             self->strange);
     }
     if (self->too_short > 0U) {
         (void)learn_say(out, '-', "frames", LEARN_BOTH,
-                        "%" PRIu64 " frames are shorter than the document says: the gateway ignores such",
+                        "%" PRIu64 " frames are shorter than in the document: the gateway ignores them",
                         self->too_short);
     }
     if (self->errors > 0U) {
@@ -90,13 +90,13 @@ static void weigh_oddities(const learn_t *self, unsigned side, learn_findings_t 
     }
     if (setpoint->padding > 0U) {
         (void)learn_say(out, '-', "padding", side,
-                        "%s: %" PRIu64 " setpoints have something behind the five documented bytes", text_side(side),
+                        "%s: %" PRIu64 " setpoints have nonzero bytes after the five documented ones", text_side(side),
                         setpoint->padding);
     }
     if (longest_us > (int64_t)IW_WHEEL_WATCHDOG_US) {
         (void)learn_say(out, '-', "silence", side,
                         "%s: up to %" PRId64
-                        " ms without a setpoint; by the document a wheel stops by itself after 1000 ms",
+                        " ms without a setpoint; by the document a wheel stops on its own after 1000 ms",
                         text_side(side), longest_us / 1000);
     }
 }
@@ -111,6 +111,6 @@ void learn_weigh(const learn_t *self, learn_findings_t *out_findings) {
     learn_weigh_wheels(self, out_findings);
     (void)learn_say(
         out_findings, '?', "mounting", LEARN_BOTH,
-        "whether a wheel is mounted mirrored, its radius, the track, what byte 0 means: no recording tells; "
-        "iwheelctl bringup");
+        "mirrored mounting, radius, track and the meaning of byte 0: no recording shows them; use iwheelctl "
+        "bringup");
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// Findings about a recording, sentence by sentence. Private to learn.
 ///
-/// A sentence is for (+) or against (-) a fact only if everything that it claims was seen, often enough and on each
-/// wheel that it names; otherwise its mark is ? and it names what is missing. `item` and `side` are its subject,
-/// `value` is its conclusion as the configuration writes it.
+/// A sentence is for (+) or against (-) a fact only if everything that it claims was observed, often enough and on each
+/// wheel that it names. Otherwise its mark is ? and it names the missing observation. `item` and `side` are its subject,
+/// `value` is its conclusion in the form of the configuration.
 #ifndef LEARN_FINDINGS_H
 #define LEARN_FINDINGS_H
 

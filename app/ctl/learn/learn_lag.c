@@ -118,7 +118,7 @@ static bool is_sure(const learn_lag_t *self) {
 static void weigh_one(const learn_lag_t *self, unsigned side, uint32_t lag_ms, learn_findings_t *out) {
     if (self->count < COUNT_MIN) {
         (void)learn_say(out, '?', "wheel_lag", side,
-                        "%s wheel's lag: two changes by 300 mm/s or more, from a steady second to another, are not in "
+                        "%s wheel's lag: two changes by 300 mm/s or more, each between two steady seconds, are not in "
                         "it",
                         text_side(side));
         return;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Time by which each wheel follows its setpoints late: `wheel_lag_ms` of the rule of the pair. If a wheel follows a
-/// change of speed with a lag, its way is shorter than commanded by the change times the lag, whatever the form of the
+/// change of speed with a lag, its distance is shorter than commanded by the change times the lag, for any form of the
 /// change.
 ///
 ///     lag = area under (commanded - before) / commanded change  -  area under (measured - before) / measured change
@@ -18,14 +18,14 @@ typedef struct {
     int64_t constant_us; ///< Time since which this is the setpoint.
     double measured_mm_s;
     int64_t measured_us; ///< Time of the last speed frame; -1: none.
-    double settled_mm;   ///< Way and time at this setpoint, after the wheel has reached it.
+    double settled_mm;   ///< Distance and time at this setpoint, after the wheel has reached it.
     int64_t settled_us;
     bool changing;      ///< The speed changes from a steady speed.
     double before_told; ///< Steady speed before the change, commanded,
     double before;      ///< and measured.
     int64_t change_us;  ///< Duration of the change so far.
-    double way_told_mm; ///< Commanded way beyond that of the steady speed.
-    double way_mm;      ///< Measured way beyond that of the steady speed.
+    double way_told_mm; ///< Commanded distance beyond that of the steady speed.
+    double way_mm;      ///< Measured distance beyond that of the steady speed.
     uint32_t count;     ///< Number of measured changes.
     double sum_ms;
     double least_ms;

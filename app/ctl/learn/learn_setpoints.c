@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Findings about the setpoints of the recording: type, role of the current, length. Where a finding claims a behaviour
-// of the wheels, it was seen as well.
+// Findings about the setpoints of the recording: type, role of the current, length. If a finding claims a behaviour of
+// the wheels, the recording shows it.
 #include "learn_findings.h"
 #include "text/ctl_text.h"
 
@@ -32,7 +32,7 @@ static const char *lacking(bool left, bool right) {
     return (left && right) ? NULL : left ? "the right wheel" : right ? "the left wheel" : "both wheels";
 }
 
-/// Returns the wheels that were not seen to turn by their setpoints; NULL: both turned.
+/// Returns the wheels that did not turn by their setpoints as far as recorded; NULL if both turned.
 static const char *unseen_motion(const learn_t *self) {
     return lacking(learn_turned(&self->wheel[IW_LEFT]), learn_turned(&self->wheel[IW_RIGHT]));
 }
@@ -42,25 +42,27 @@ static void weigh_common_type(const learn_t *self, int type, learn_findings_t *o
     const char *stayed = lacking(!learn_stayed(&self->wheel[IW_LEFT]), !learn_stayed(&self->wheel[IW_RIGHT]));
     if (stayed != NULL) {
         (void)learn_say(out, '-', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: every setpoint with a speed has type %d, but %s did not turn by it", type,
+                        "setpoint type: every setpoint with a speed has type %d, but %s did not follow it", type,
                         stayed);
     } else if (unseen != NULL) {
         (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: every setpoint with a speed has type %d, but %s is not seen to turn by it; "
+                        "setpoint type: every setpoint with a speed has type %d, but the recording does not show that "
+                        "%s followed it; "
                         "record the speed frames too (256 = 0x100, 288 = 0x120), while a steady speed of 100 mm/s or "
-                        "more is told for seconds",
+                        "more is commanded for seconds",
                         type, unseen);
     } else {
         learn_finding_t *told = learn_say(out, '+', "setpoint_type", LEARN_BOTH,
                                           "setpoint type %d moves the wheels: every setpoint with a speed has it, and "
-                                          "both wheels turned by it",
+                                          "both wheels followed",
                                           type);
         (void)snprintf(told->value, sizeof told->value, "%d", type);
         for (unsigned side = 0; side < IW_SIDES; side++) {
             const learn_setpoint_t *setpoint = &self->setpoint[side];
             if (setpoint->type[type] == setpoint->type_moving[type]) {
                 (void)learn_say(out, '?', "setpoint_type", side,
-                                "%s: no setpoint of type %d has speed 0: whether it stops the wheel was not seen",
+                                "%s: no setpoint of type %d has speed 0, so the recording does not show whether a zero "
+                                "stops the wheel",
                                 text_side(side), type);
             }
         }
@@ -74,15 +76,16 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
     const char *few = lacking(moving(left) >= LEARN_FRAMES_MIN, moving(right) >= LEARN_FRAMES_MIN);
     if (idle != NULL) {
         (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: %s was never told to move; record while the other controller drives both",
+                        "setpoint type: %s was never commanded to move; record while the other controller drives both",
                         idle);
     } else if (moving_type(left) < 0 || moving_type(left) != moving_type(right)) {
-        (void)learn_say(out, '-', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: several, or different ones left and right, come with a speed; find out which "
-                        "of them means speed");
+        (void)learn_say(
+            out, '-', "setpoint_type", LEARN_BOTH,
+            "setpoint type: setpoints with a speed have several types, or different ones left and right; find "
+            "out which type means speed");
     } else if (few != NULL) {
         (void)learn_say(out, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type: %s was told a speed fewer than %u times; record a longer drive", few,
+                        "setpoint type: %s received a speed fewer than %u times; record a longer drive", few,
                         LEARN_FRAMES_MIN);
     } else {
         weigh_common_type(self, moving_type(left), out);
@@ -103,7 +106,7 @@ static void weigh_sender(uint64_t count, uint64_t sent, learn_findings_t *out) {
     if (sent == count) {
         (void)learn_say(out, '-', "sender", LEARN_BOTH,
                         "all setpoints are marked as sent by the program that recorded them: if that was this gateway, "
-                        "they repeat its configuration and prove nothing");
+                        "they only repeat its configuration and prove nothing");
     } else if (sent > 0U) {
         (void)learn_say(out, '-', "sender", LEARN_BOTH,
                         "%" PRIu64 " of %" PRIu64
@@ -133,8 +136,8 @@ static bool both(const learn_t *self, bool (*judge)(const learn_setpoint_t *setp
     return judge(&self->setpoint[IW_LEFT]) && judge(&self->setpoint[IW_RIGHT]);
 }
 
-/// Lists the speeds that both wheels did not get often enough for "every speed": "0", "forwards", "backwards". Empty:
-/// none is missing.
+/// Lists the speeds that both wheels did not receive often enough for "every speed": "0", "forwards", "backwards". Empty
+/// if none is missing.
 static void list_untold(const learn_t *self, char *out_list, size_t size) {
     static const char *const words[] = {"0", "forwards", "backwards"};
     iwn_text_t list = iwn_text_begin(out_list, size);
@@ -163,20 +166,22 @@ static void weigh_limit(const learn_t *self, learn_findings_t *out) {
     const bool stood_left = left->stood_us >= LEARN_SHOWN_MIN_US && left->ran_us * 10 < left->stood_us;
     const bool stood_right = right->stood_us >= LEARN_SHOWN_MIN_US && right->ran_us * 10 < right->stood_us;
     if (ran != NULL) {
-        (void)learn_say(out, '-', "current_role", LEARN_BOTH,
-                        "current role: the same positive current comes with every speed, but with speed 0 %s turned "
-                        "for longer than a second: no limit?",
-                        ran);
+        (void)learn_say(
+            out, '-', "current_role", LEARN_BOTH,
+            "current role: every speed has the same positive current, but with speed 0 %s turned for longer "
+            "than a second: no limit?",
+            ran);
     } else if (!stood_left || !stood_right) {
-        doubt_role(out,
-                   "the same positive current comes with every speed, but both wheels are not seen to stand with "
-                   "speed 0 and this current; ",
-                   "record their speed frames, and let them stand for seconds");
+        doubt_role(
+            out,
+            "every speed has the same positive current, but the recording does not show both wheels at standstill with "
+            "speed 0 and this current; ",
+            "record their speed frames, and leave them at standstill for seconds");
     } else {
         learn_finding_t *told =
             learn_say(out, '+', "current_role", LEARN_BOTH,
-                      "current_role = limit: the same positive current comes with every speed, also with 0 and "
-                      "backwards, and with 0 the wheels stand");
+                      "current_role = limit: every speed has the same positive current, also 0 and backwards, and "
+                      "with 0 the wheels are at standstill");
         (void)snprintf(told->value, sizeof told->value, "limit");
     }
 }
@@ -188,20 +193,20 @@ static void weigh_role(const learn_t *self, bool own, learn_findings_t *out) {
     list_untold(self, untold, sizeof untold);
     if (!both(self, is_constant) && !both(self, is_signed)) {
         doubt_role(out,
-                   "the currents fit neither limit (one positive current always) nor setpoint (sign of the speed, "
-                   "0 at rest) on both wheels",
+                   "the currents fit neither limit (always one positive current) nor setpoint (sign of the speed, "
+                   "0 at speed 0) on both wheels",
                    "");
     } else if (untold[0] != '\0') {
-        (void)snprintf(text, sizeof text, "not told to both wheels often enough: speed %s; ", untold);
-        doubt_role(out, text, "record while the other controller stands, drives forwards and drives backwards");
+        (void)snprintf(text, sizeof text, "not commanded to both wheels often enough: speed %s; ", untold);
+        doubt_role(out, text, "record while the other controller holds, drives forwards and drives backwards");
     } else if (own) {
         doubt_role(
             out,
             "setpoints are marked as sent by the program that recorded them, so they may be its own configuration; ",
-            "record what another controller sends");
+            "record the setpoints of another controller");
     } else if (unseen != NULL) {
-        (void)snprintf(text, sizeof text, "%s is not seen to turn; ", unseen);
-        doubt_role(out, text, "record the speed frames too, while steady speeds are told for seconds");
+        (void)snprintf(text, sizeof text, "the recording does not show that %s turned; ", unseen);
+        doubt_role(out, text, "record the speed frames too, while steady speeds are commanded for seconds");
     } else if (both(self, is_constant)) {
         weigh_limit(self, out);
     } else {
@@ -220,15 +225,15 @@ static void weigh_length(const learn_t *self, learn_findings_t *out) {
     const bool one = left->low == left->high && right->low == left->low && right->high == left->low;
     if (!enough) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: not %u of them for each wheel; record a longer drive of both",
+                        "length of setpoints: fewer than %u for each wheel; record a longer drive of both",
                         LEARN_FRAMES_MIN);
     } else if (!one || left->low < (int32_t)IW_DLC_SETPOINT || left->low > (int32_t)IW_CAN_DATA_MAX) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
-                        "length of setpoints: not one length on both wheels, so which of them counts is open");
+                        "length of setpoints: they differ or are not valid, so the right length is not known");
     } else {
-        learn_finding_t *told = learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc",
-                                          LEARN_BOTH, "every setpoint has %" PRId32 " bytes (the document says %u)",
-                                          left->low, (unsigned)IW_DLC_SETPOINT);
+        learn_finding_t *told =
+            learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc", LEARN_BOTH,
+                      "every setpoint has %" PRId32 " bytes (document: %u)", left->low, (unsigned)IW_DLC_SETPOINT);
         (void)snprintf(told->value, sizeof told->value, "%" PRId32, left->low);
     }
 }
@@ -237,9 +242,10 @@ void learn_weigh_setpoints(const learn_t *self, learn_findings_t *out_findings) 
     const uint64_t count = self->setpoint[IW_LEFT].count + self->setpoint[IW_RIGHT].count;
     const uint64_t sent = self->setpoint[IW_LEFT].sent + self->setpoint[IW_RIGHT].sent;
     if (count == 0U) {
-        (void)learn_say(out_findings, '?', "setpoint_type", LEARN_BOTH,
-                        "setpoint type and current role: no setpoint (266 = 0x10A, 298 = 0x12A) is in it; record while "
-                        "the other controller drives");
+        (void)learn_say(
+            out_findings, '?', "setpoint_type", LEARN_BOTH,
+            "setpoint type and current role: the recording has no setpoint (266 = 0x10A, 298 = 0x12A); record while "
+            "the other controller drives");
         return;
     }
     weigh_sender(count, sent, out_findings);

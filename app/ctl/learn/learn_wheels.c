@@ -47,13 +47,14 @@ static int sign_of(const learn_answer_t *answer) {
 static const char *no_sign(const learn_t *self, unsigned side) {
     const learn_wheel_t *wheel = &self->wheel[side];
     if (self->setpoint[side].count == 0U) {
-        return "it was told nothing";
+        return "it received no setpoint";
     }
     if (wheel->speeds == 0U) {
-        return "none of its speed frames is in it";
+        return "the recording has none of its speed frames";
     }
-    return learn_stayed(wheel) ? "it was told steady speeds and did not turn"
-                               : "it was not seen to turn for half a second by a steady speed of 100 mm/s or more";
+    return learn_stayed(wheel)
+               ? "it was commanded steady speeds and did not turn"
+               : "the recording does not show it turning for half a second at a steady command of 100 mm/s or more";
 }
 
 /// Writes "a positive setpoint is measured as a positive speed" for a commanded direction and its sign.
@@ -78,15 +79,16 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     }
     if (first == 0 || first != second) {
         (void)learn_say(out, '-', "feedback_sign", side,
-                        "%s: the measured speed has now the sign of the setpoint, now the other", text_side(side));
+                        "%s: the measured speed has sometimes the sign of the setpoint, sometimes the opposite one",
+                        text_side(side));
         return;
     }
     say_direction(forward, first, ahead, sizeof ahead);
     say_direction(false, first, back, sizeof back);
-    learn_finding_t *told =
-        learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", text_side(side), ahead,
-                  (forward && backward) ? ", " : "", (forward && backward) ? back : " (the other direction: not seen)",
-                  (first > 0) ? "" : "; the gateway would latch feedback_sign");
+    learn_finding_t *told = learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s",
+                                      text_side(side), ahead, (forward && backward) ? ", " : "",
+                                      (forward && backward) ? back : " (the other direction: not recorded)",
+                                      (first > 0) ? "" : "; the gateway would latch feedback_sign");
     (void)snprintf(told->value, sizeof told->value, "%s", (first > 0) ? "yes" : "no");
 }
 
@@ -94,7 +96,8 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
 static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
         (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: not seen to turn for half a second by a steady speed of 100 mm/s or more",
+                        "%s mm/s per rpm: the recording does not show it turning for half a second at a steady command "
+                        "of 100 mm/s or more",
                         text_side(side));
         return;
     }
@@ -103,36 +106,37 @@ static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_finding
     if (nearly_all(wheel->steady_fit_us, wheel->steady_us)) {
         (void)learn_say(out, '+', "speed_scale", side,
                         "%s: %" PRId64 ".%03" PRId64
-                        " mm/s of setpoint per measured rpm; 20.106 is expected of 192 mm and rpm of the wheel",
+                        " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel",
                         text_side(side), um_s / 1000, um_s % 1000);
     } else if (nearly_all(off_us, wheel->steady_us)) {
         (void)learn_say(out, '-', "speed_scale", side,
                         "%s: %" PRId64 ".%03" PRId64
-                        " mm/s of setpoint per measured rpm, where 20.106 is expected of 192 mm and rpm of the wheel: "
+                        " mm/s of setpoint per measured rpm; 20.106 is expected with 192 mm and rpm of the wheel: "
                         "another gear (rpm_of, gear_ratio), another radius, or it did not follow",
                         text_side(side), um_s / 1000, um_s % 1000);
     } else {
         (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: the wheel was now at the speed that it was told, now not", text_side(side));
+                        "%s mm/s per rpm: the wheel had its commanded speed only part of the time", text_side(side));
     }
 }
 
 static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (wheel->turned_rpm_us < (int64_t)TURNS_MIN * US_PER_MIN) {
         (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", text_side(side),
-                        (wheel->statuses == 0U) ? "none of its status frames is in it"
-                        : (wheel->speeds == 0U) ? "none of its speed frames is in it"
-                                                : "fewer than two turns at 10 rpm or more, without a gap, are in it");
+                        (wheel->statuses == 0U) ? "the recording has none of its status frames"
+                        : (wheel->speeds == 0U)
+                            ? "the recording has none of its speed frames"
+                            : "the recording has fewer than two turns at 10 rpm or more without a gap");
         return;
     }
     const uint64_t tenths = wheel->ticks * 10U * US_PER_MIN / (uint64_t)wheel->turned_rpm_us;
     const bool same = tenths >= 540U && tenths <= 660U;
     (void)learn_say(out, same ? '+' : '-', "ticks_per_turn", side,
-                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn of what the rpm count; %s", text_side(side),
-                    tenths / 10U, tenths % 10U,
-                    same              ? "the rotor makes 60, so the rpm are the rotor's, or there is no gear"
-                    : (tenths > 660U) ? "the rotor makes 60, so there is a gear between: gear_ratio"
-                                      : "the rotor makes 60, and no gear makes fewer: were frames lost?");
+                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn by the rpm; %s", text_side(side), tenths / 10U,
+                    tenths % 10U,
+                    same              ? "a rotor has 60, so the rpm are the rotor's, or there is no gear"
+                    : (tenths > 660U) ? "a rotor has 60, so there is a gear: gear_ratio"
+                                      : "a rotor has 60, and no gear results in fewer: were frames lost?");
 }
 
 /// Returns what is missing for a ratio of force and offset; NULL: nothing.
@@ -152,11 +156,11 @@ static const char *no_force(const learn_wheel_t *wheel) {
         return "needs an offset of at least 2 N";
     }
     if (wheel->rest_force_count < REST_MIN) {
-        return "needs a second at rest, told by its speed frames";
+        return "needs a second at standstill, shown by its speed frames";
     }
     const int32_t mean = (int32_t)(wheel->rest_force_sum / (int64_t)wheel->rest_force_count);
     const int32_t slack = ((mean < 0) ? -mean : mean) / 10 + QUIET_COUNTS;
-    return (rest->high - rest->low > slack) ? "the force sways while the wheel rests: somebody touched it" : NULL;
+    return (rest->high - rest->low > slack) ? "the force sways while the wheel is at standstill: it was touched" : NULL;
 }
 
 /// Returns the unit that the ratio (1000 x raw / offset) shows: "cN", "dN", "removed", or NULL.
@@ -182,13 +186,13 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     const bool dead = wheel->force.low == wheel->force.high;
     learn_finding_t *told =
         learn_say(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
-                  "%s force at rest / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (the document says %s)",
-                  text_side(side), (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
+                  "%s force at standstill / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (document: %s)", text_side(side),
+                  (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
                   (unit == NULL) ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
                   : is_unit      ? unit
                   : dead         ? "the wheel subtracts the offset itself, or its force never changes"
                                  : "the wheel subtracts the offset itself",
-                  is_unit ? " per count, if nothing pressed it" : "", documented);
+                  is_unit ? " per count, if nothing pressed the handle" : "", documented);
     (void)snprintf(told->value, sizeof told->value, "%s", is_unit ? unit : "");
 }
 
@@ -196,18 +200,18 @@ static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
     const bool enough = pose->moves >= POSE_MOVES_MIN && pose->way_big + pose->way_little >= POSE_WAY_MIN;
     if (!enough) {
         (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
-                        (pose->count == 0U) ? "no pose frame (290 = 0x122) is in it" : "it hardly changes");
+                        (pose->count == 0U) ? "the recording has no pose frame (290 = 0x122)" : "it hardly changes");
     } else if (pose->way_big * 4U < pose->way_little) {
         learn_finding_t *told = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
                                           "the pose is smooth with the most significant byte first");
         (void)snprintf(told->value, sizeof told->value, "yes");
     } else if (pose->way_little * 4U < pose->way_big) {
-        learn_finding_t *told =
-            learn_say(out, '-', "pose_byte_order", LEARN_BOTH,
-                      "the pose is smooth with the LEAST significant byte first: the gateway reads it the other way");
+        learn_finding_t *told = learn_say(
+            out, '-', "pose_byte_order", LEARN_BOTH,
+            "the pose is smooth with the LEAST significant byte first: the gateway reads it in the other order");
         (void)snprintf(told->value, sizeof told->value, "no");
     } else {
-        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth neither way");
+        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth in neither order");
     }
 }
 

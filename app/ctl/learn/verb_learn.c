@@ -10,7 +10,7 @@
 #include <string.h>
 
 #define CELL     26
-#define EXTENDED "extended; the wheels' is standard (python-can: is_extended_id=False)"
+#define EXTENDED "extended; the wheels use a standard id (python-can: is_extended_id=False)"
 
 static void range_text(const learn_range_t *range, const char *unit, char *out) {
     if (learn_is_empty(range)) {
@@ -103,7 +103,7 @@ static void print_telemetry(const learn_t *self) {
         print_id(&self->other[i], is_extended_of_ours(self, &self->other[i]) ? EXTENDED : "");
     }
     if (self->more_others > 0U) {
-        (void)printf("  and %" PRIu64 " frames of still other ids\n", self->more_others);
+        (void)printf("  and %" PRIu64 " frames of more ids\n", self->more_others);
     }
 }
 
@@ -133,8 +133,7 @@ static void suggest(const learn_findings_t *findings) {
         const char *key;
         if (learn_suggests(findings, &findings->at[i], &section, &key)) {
             if (last[0] == '\0') {
-                (void)puts(
-                    "\nFor the configuration, as far as it goes (evidence, no proof; then: iwheelctl bringup)\n");
+                (void)puts("\nSuggestions for the configuration (observed, not proven; then: iwheelctl bringup)\n");
             }
             if (strcmp(section, last) != 0) {
                 (void)printf("[%s]\n", section);
@@ -163,7 +162,7 @@ static void report(const study_t *study, const char *name) {
     print_setpoints(self);
     print_telemetry(self);
     print_drives(&study->drives, self->first_us);
-    (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");
+    (void)puts("\nFindings (+ for, - against, ? not known)");
     for (unsigned i = 0; i < findings->count; i++) {
         (void)printf("  %c %s\n", findings->at[i].mark, findings->at[i].text);
     }
@@ -334,7 +333,7 @@ int verb_learn(ctl_t *self, int count, char **words) {
     iw_config_default(&study.config);
     int code = words_read(&syntax, count, words);
     if (code == CTL_OK && path == NULL) {
-        code = ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
+        code = ctl_fail(CTL_USAGE, "learn needs one recording (or -); see: iwheelctl learn --help");
     }
     recording.even = true;
     if (code == CTL_OK) {

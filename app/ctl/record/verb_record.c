@@ -22,7 +22,7 @@
 /// Interval at which the file is flushed, so that other programs can read it.
 #define FLUSH_US 1000000
 #define LOOK_US  500000
-/// Time for which an interface may take to be up.
+/// Longest time in which an interface must come up.
 #define UP_US   1000000
 #define WAIT_MS 50
 
@@ -44,7 +44,7 @@ typedef struct {
 
 typedef struct {
     const char *path; ///< NULL: a name made of the time.
-    const char *bus;  ///< NULL: not given.
+    const char *bus;  ///< NULL if the option is absent.
     int64_t for_us;   ///< 0: until a signal.
 } words_t;
 
@@ -79,8 +79,8 @@ static int open_file(recorder_t *self, const char *path) {
     self->name = path;
     if (self->file == NULL) {
         return (errno == EEXIST)
-                   ? ctl_fail(CTL_USAGE, "%s is there already; name another file, or remove it", path)
-                   : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be made: %s; name another place", path, strerror(errno));
+                   ? ctl_fail(CTL_USAGE, "%s exists already; name another file, or remove it", path)
+                   : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be created: %s; name another place", path, strerror(errno));
     }
     return CTL_OK;
 }
@@ -96,7 +96,7 @@ static int64_t wall_minus_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000 - client_now_us();
 }
 
-/// Writes one frame that came at `at_us` (monotonic). Returns false, with errno, if it cannot be written.
+/// Writes one frame that arrived at `at_us` (monotonic). Returns false, with errno, if it cannot be written.
 static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
     char line[CANDUMP_LINE_SIZE];
     candump_t whole = *frame;
@@ -180,12 +180,10 @@ static int tell_unopened(const char *bus, int error) {
 
 static int tell_down(const char *bus) {
     return (strncmp(bus, "unix:", 5) == 0)
-               ? ctl_fail(CTL_UNAVAILABLE, "nobody answers on %s; is the simulator running? iwheel-sim --can %s", bus,
-                          bus)
-               : ctl_fail(
-                     CTL_UNAVAILABLE,
-                     "%s is not there or not up; sudo ip link set %s up type can bitrate 1000000 sample-point 0.625",
-                     bus, bus);
+               ? ctl_fail(CTL_UNAVAILABLE, "no simulator answers on %s; start it: iwheel-sim --can %s", bus, bus)
+               : ctl_fail(CTL_UNAVAILABLE,
+                          "%s is absent or not up; sudo ip link set %s up type can bitrate 1000000 sample-point 0.625",
+                          bus, bus);
 }
 
 /// Waits for a frame, a signal, or WAIT_MS.
@@ -195,7 +193,7 @@ static void wait_a_while(source_t *source) {
     (void)ppoll(&entry, 1, &while_, signals_let_in());
 }
 
-/// Records all frames that are there. Returns false if they cannot be written.
+/// Records all received frames. Returns false if they cannot be written.
 static bool drain(source_t *source, recorder_t *self) {
     iw_can_frame_t frame;
     const int64_t now_us = client_now_us();
@@ -260,14 +258,15 @@ static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
         name_interface(self, gateway.bus);
         (void)snprintf(self->bus, sizeof self->bus, "%s", gateway.bus);
         self->from_gateway = true;
-        (void)ctl_fail(CTL_OK, "recording what the gateway on %s sees, to %s; Ctrl-C ends it", gateway.bus, self->name);
+        (void)ctl_fail(CTL_OK, "recording the frames of the gateway on %s to %s; Ctrl-C ends it", gateway.bus,
+                       self->name);
         return record_gateway(ctl, self);
     }
     const char *bus = (words->bus != NULL) ? words->bus : USUAL_BUS;
     name_interface(self, bus);
     (void)snprintf(self->bus, sizeof self->bus, "%s", bus);
-    (void)ctl_fail(CTL_OK, "no gateway for it: recording from %s itself, sending nothing, to %s; Ctrl-C ends it", bus,
-                   self->name);
+    (void)ctl_fail(CTL_OK, "no gateway on this bus: recording from %s itself, sending nothing, to %s; Ctrl-C ends it",
+                   bus, self->name);
     return record_bus(bus, self);
 }
 
@@ -279,8 +278,8 @@ static int finish_empty(recorder_t *self, int code) {
     }
     return (code != CTL_OK)
                ? code
-               : ctl_fail(CTL_NO, "the bus was silent, nothing is recorded: wheels powered? cable? iwheelctl "
-                                  "doctor tells");
+               : ctl_fail(CTL_NO, "no frame arrived, nothing is recorded; check the wheels' power and cable: "
+                                  "iwheelctl doctor");
 }
 
 static void sum_up(const recorder_t *self, bool json) {
@@ -298,7 +297,7 @@ static void sum_up(const recorder_t *self, bool json) {
     (void)ctl_fail(CTL_OK, "%" PRIu64 " frames in %" PRId64 ".%" PRId64 " s recorded to %s", self->frames, ms / 1000,
                    ms % 1000 / 100, self->name);
     if (self->lost > 0U) {
-        (void)ctl_fail(CTL_OK, "%" PRIu64 " frames came faster than they could be taken and are missing", self->lost);
+        (void)ctl_fail(CTL_OK, "%" PRIu64 " frames arrived too fast to be recorded and are missing", self->lost);
     }
 }
 
@@ -316,7 +315,7 @@ static int finish(recorder_t *self, bool json, int code) {
     }
     return (why == EPIPE)
                ? CTL_OK
-               : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; make room", self->name, strerror(why));
+               : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; free some space", self->name, strerror(why));
 }
 
 int verb_record(ctl_t *self, int count, char **words) {

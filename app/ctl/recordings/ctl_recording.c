@@ -67,7 +67,7 @@ static bool fetch(ctl_t *ctl, const char *name, int64_t most, int fd) {
         const iwc_result_t result = iwc_recording(ctl->client.gateway, name, PIECE_MS, bytes, &piece);
         if (result != IWC_OK || piece.size > BYTES_MAX || !write_all(fd, bytes, piece.length)) {
             if (result != IWC_REFUSED) {
-                client_close(&ctl->client); // A late reply would be taken for the reply to another request.
+                client_close(&ctl->client); // A late reply would count as the reply to another request.
             }
             return false;
         }
@@ -110,7 +110,7 @@ json_t *source_list(ctl_t *ctl) {
 static int tell_unopened(const char *path, int error) {
     switch (error) {
     case ENOENT:
-        return ctl_fail(CTL_DATA, "%s: there is no such file; record one: iwheelctl record FILE", path);
+        return ctl_fail(CTL_DATA, "%s: the file does not exist; record one: iwheelctl record FILE", path);
     case EACCES:
     case EPERM:
         return ctl_fail(CTL_PERMISSION, "%s: you may not read it; ask its owner, or use sudo", path);
@@ -151,7 +151,7 @@ static void tell_bad(recording_t *self) {
     if (self->bad <= RECORDING_TOLD_MAX) {
         (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": %s", self->name, self->reader.line, self->reader.why);
     } else if (self->bad == RECORDING_TOLD_MAX + 1U) {
-        (void)ctl_fail(CTL_DATA, "%s: more bad lines follow; they are counted, not told", self->name);
+        (void)ctl_fail(CTL_DATA, "%s: more bad lines follow; they are counted, not printed", self->name);
     }
 }
 
@@ -277,16 +277,16 @@ int recording_close(recording_t *self) {
         return CTL_DATA;
     }
     if (self->bad > 0U) {
-        return ctl_fail(CTL_DATA, "%s: %" PRIu64 " of %" PRIu64 " lines with something on them were left out",
-                        self->name, self->bad, self->bad + self->frames);
+        return ctl_fail(CTL_DATA, "%s: %" PRIu64 " of %" PRIu64 " lines that are not empty were left out", self->name,
+                        self->bad, self->bad + self->frames);
     }
     if (self->frames == 0U && self->others > 0U) {
         return ctl_fail(CTL_DATA,
-                        "%s: there is no frame of interface %s in it; name one of its own: iwheelctl decode %s",
+                        "%s: it has no frame of interface %s; name one of its interfaces: iwheelctl decode %s",
                         self->name, self->only, self->name);
     }
     if (self->frames == 0U) {
-        return ctl_fail(CTL_DATA, "%s: there is no frame in it", self->name);
+        return ctl_fail(CTL_DATA, "%s: it has no frame", self->name);
     }
     return CTL_OK;
 }
@@ -294,7 +294,7 @@ int recording_close(recording_t *self) {
 int config_option_load(const option_t *option, const char *verb, const char *path) {
     gateway_config_t config;
     if (path == NULL) {
-        return ctl_fail(CTL_USAGE, "--config wants the gateway's configuration file; see: iwheelctl %s --help", verb);
+        return ctl_fail(CTL_USAGE, "--config needs the gateway's configuration file; see: iwheelctl %s --help", verb);
     }
     if (gateway_config_load(path, &config, stderr) != 0) {
         return CTL_CONFIG;

@@ -16,7 +16,7 @@ static int64_t integer(const json_t *line, const char *name) {
     return json_integer_value(json_object_get(line, name));
 }
 
-/// Returns the index of a word in the list that `name_of` gives; `count` if it is not in the list.
+/// Returns the index of a word in the list of `name_of`; `count` if it is not in the list.
 static unsigned word_of(const json_t *line, const char *name, const char *(*name_of)(unsigned), unsigned count) {
     const char *word = json_string_value(json_object_get(line, name));
     for (unsigned i = 0; word != NULL && i < count; i++) {
@@ -195,8 +195,8 @@ bool events_open(events_t *self, const char *path, FILE *file) {
     const char *type = json_string_value(json_object_get(self->head, "type"));
     if (type == NULL || strcmp(type, "blackbox") != 0) {
         (void)ctl_fail(CTL_DATA,
-                       "%s: this is not the file that the gateway writes beside its recordings; "
-                       "move it away, or give the recording's own",
+                       "%s: this is not the file that the gateway writes next to its recordings; "
+                       "move it away, or use the recording's own",
                        path);
         events_close(self);
         errno = EPROTO;

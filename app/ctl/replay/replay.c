@@ -16,7 +16,7 @@ static int side_of(const iw_can_frame_t *frame) {
     return (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : (frame->id == IW_ID_RIGHT_SETPOINT) ? IW_RIGHT : -1;
 }
 
-/// Returns the next noted answer of that kind; `otherwise` if there is none.
+/// Returns the next recorded answer of that kind; `otherwise` if there is none.
 static int take_answer(replay_t *self, blackbox_kind_t kind, uint32_t number, int otherwise) {
     if (self->answered < self->answers) {
         const blackbox_entry_t *answer = &self->answer[self->answered];
@@ -35,7 +35,7 @@ static int send_one(replay_t *self, const iw_can_frame_t *frame) {
         return answer;
     }
     self->total_sent++;
-    if (self->sent_count[side] == REPLAY_SENT) { // The oldest gets no echo any more.
+    if (self->sent_count[side] == REPLAY_SENT) { // The oldest will have no echo.
         memmove(&self->sent[side][0], &self->sent[side][1], sizeof self->sent[side] - sizeof self->sent[side][0]);
         self->sent_count[side]--;
     }
@@ -205,7 +205,7 @@ static void compare(replay_t *self, const blackbox_entry_t *entry) {
                                : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
                                      (int64_t)stop->detail == entry->as.value;
     if (is_state && entry->a == entry->b && same) {
-        return; // The state is only noted again.
+        return; // The state is only recorded again.
     }
     count(is_state ? &self->states : &self->stops, same);
     if (!same) {

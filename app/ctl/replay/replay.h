@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// Feeds a recording through the core of the gateway and prints the decisions of the core.
 ///
-/// Pure, except for the output stream: time, frames and requests come from the recording, so the same recording gives
-/// the same bytes each time. The frames that the core sends go nowhere. Where the recording has the echo of a setpoint,
+/// Pure, except for the output stream: time, frames and requests come from the recording, so the same recording results
+/// in the same bytes each time. The frames that the core sends are dropped. If the recording has the echo of a setpoint,
 /// it is compared with the frame that the core sent.
 #ifndef REPLAY_H
 #define REPLAY_H
@@ -46,7 +46,7 @@ typedef struct {
     blackbox_entry_t answer[REPLAY_ANSWERS]; ///< Answers to sends and purges of the next step, in order.
     uint32_t answers;
     uint32_t answered;
-    bool echoes; ///< For a time without recorded echoes: each sent frame comes back as its echo.
+    bool echoes; ///< For a time without recorded echoes: each sent frame returns as its echo.
     // Values that were printed, so that only changes are printed.
     bool quiet;    ///< Nothing is printed.
     bool compares; ///< Echoes are compared with sent frames.
@@ -78,7 +78,7 @@ void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, 
 /// Starts as the recorded gateway started.
 void replay_start(replay_t *self, const iw_config_t *config, const blackbox_entry_t *entry);
 
-/// Adds a frame for the next step. Returns false if there is no room; then step first.
+/// Adds a frame for the next step. Returns false if the buffer is full; then step first.
 bool replay_frame(replay_t *self, const iw_can_frame_t *frame);
 
 /// Runs one step of the core and prints its decisions.
@@ -91,7 +91,7 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry);
 /// Returns the snapshot after the last step.
 iw_snapshot_t replay_look(const replay_t *self);
 
-/// Prints a summary: what was fed in, and how it compares with the recording.
+/// Prints a summary: the number of inputs, and the comparison with the recording.
 void replay_finish(const replay_t *self);
 
 /// Brings a replay to the point where the recording begins: to its state, lease and speed, on simulated wheels. Values

@@ -71,7 +71,7 @@ static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
         const bool heard = seen->wheel[side].heard;
         const iw_force_validity_t force = iw_snapshot_force_validity(seen, (iw_side_t)side);
         if (heard != self->heard[side]) {
-            tell(self, self->now_us, "wheel", "%s %s", text_side(side), heard ? "heard" : "not heard any more");
+            tell(self, self->now_us, "wheel", "%s %s", text_side(side), heard ? "online" : "offline");
             self->heard[side] = heard;
         }
         if (force != self->force[side]) {

@@ -19,7 +19,7 @@ typedef struct {
     const char *path;
     ctl_t *ctl; ///< To ask the gateway; NULL if the recording is a local file, whose other files are local too.
     replay_out_t out;
-    iw_config_t config; ///< Radius 0: no configuration was given.
+    iw_config_t config; ///< Radius 0 if there is no configuration.
     recording_t recording;
     events_t events;
     replay_t replay;
@@ -58,7 +58,7 @@ static int parse_words(verb_replay_t *self, int count, char **words) {
     const int code = words_read(&syntax, count, words);
     return (code != CTL_OK || self->path != NULL)
                ? code
-               : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
+               : ctl_fail(CTL_USAGE, "replay needs a recording; see: iwheelctl replay --help");
 }
 
 /// Finds the configuration that was in force: it is next to the gateway's own recordings.
@@ -69,7 +69,7 @@ static int find_config(verb_replay_t *self) {
     }
     const int fd = beside(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
     if (fd < 0) {
-        return ctl_fail(CTL_USAGE, "%s: no configuration lies beside it; tell one: iwheelctl replay FILE --config FILE",
+        return ctl_fail(CTL_USAGE, "%s: no configuration is next to it; name one: iwheelctl replay FILE --config FILE",
                         self->path);
     }
     return config_option_take(path, fd, &self->config);
@@ -166,9 +166,9 @@ static void begin_within(verb_replay_t *self) {
     if (self->has_entry && self->entry.kind == (uint8_t)BLACKBOX_STATE) {
         const bool reached = replay_warm(&self->replay, &self->config, &self->entry);
         replay_note(&self->out,
-                    "begins while the gateway was running: its state %s; force offsets and assumptions of before are "
+                    "begins while the gateway was running: its state %s; earlier force offsets and assumptions are "
                     "unknown",
-                    reached ? "is taken over" : "could not be taken over, so decisions differ");
+                    reached ? "is restored" : "could not be restored, so decisions differ");
         self->has_entry = false;
     }
 }
@@ -180,7 +180,7 @@ static void name_things(verb_replay_t *self) {
     self->replay.bus_name = (bus != NULL) ? bus : "";
 }
 
-/// Replays exactly: steps, requests and answers where they were.
+/// Replays exactly: steps, requests and answers at their recorded places.
 static void replay_exactly(verb_replay_t *self) {
     replay_note(&self->out, "%s, with its requests and the port's answers; times in seconds from its first entry",
                 self->path);
@@ -229,9 +229,10 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
 
 /// Replays frames only: no requests, the bus is up, the e-stop is released.
 static void replay_frames(verb_replay_t *self) {
-    replay_note(&self->out,
-                "%s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",
-                self->path);
+    replay_note(
+        &self->out,
+        "%s, frames only: no client arms. Setpoints marked T are the gateway's own, others another controller's",
+        self->path);
     self->recording.even = true; // No entry of a monotonic clock corrects its times.
     if (peek_frame(self)) {
         replay_init(&self->replay, &self->config, time_of(self, &self->frame), self->out);
@@ -246,7 +247,7 @@ static void replay_frames(verb_replay_t *self) {
     }
     flush_group(self);
     if (self->backwards > 0U) {
-        replay_note(&self->out, "time goes back %" PRIu64 " times; those frames were taken as of then",
+        replay_note(&self->out, "time goes back %" PRIu64 " times; those frames count at the time before",
                     self->backwards);
     }
 }
@@ -257,8 +258,8 @@ static int finish(verb_replay_t *self) {
         replay_finish(&self->replay);
     }
     if (self->events.lost > 0U || (self->events.file != NULL && !self->events.whole)) {
-        replay_note(&self->out, "the recording is not whole: %" PRIu64 " entries are missing%s", self->events.lost,
-                    self->events.whole ? "" : ", and so is its end");
+        replay_note(&self->out, "the recording is incomplete: %" PRIu64 " entries are missing%s", self->events.lost,
+                    self->events.whole ? "" : ", also its end");
     }
     const bool bad = self->events.bad > 0U;
     events_close(&self->events);

@@ -13,19 +13,19 @@ typedef struct {
 } cure_t;
 
 static const cure_t cures[] = {
-    {"estop_line", "release the e-stop button (or mend its wire)"},
-    {"estop_disagrees", "mend the e-stop's contact or wire, press and release its button"},
-    {"estop_software", "see that nobody is in the way"},
+    {"estop_line", "release the e-stop button (or fix its wire)"},
+    {"estop_disagrees", "fix the e-stop's contact or wire, press and release its button"},
+    {"estop_software", "check that no person is in the way"},
     {"wheel_lost", "switch the wheels on; check their cable and the termination"},
-    {"wheel_rebooted", "find out why a wheel lost power; wait until both are heard"},
-    {"send_stalled", "nobody takes our frames: check the wheels' power and the cable"},
+    {"wheel_rebooted", "find out why a wheel lost power; wait until both are online"},
+    {"send_stalled", "no node acknowledges the gateway's frames: check the wheels' power and the cable"},
     {"bus_down", "bring the bus up (or start the simulator)"},
     {"second_master", "switch off the other program or device that sends setpoints"},
     {"feedback_sign", "check `invert` and the wheels' wiring before anything else"},
-    {"overspeed", "check the wheel: it ran faster than it was told"},
-    {"loop_hung", "the gateway did not get the processor; lighten the machine's load"},
-    {"internal", "a fault of the gateway itself: keep its log and report it"},
-    {"loop_late", "the gateway got the processor late; lighten the machine's load"},
+    {"overspeed", "check the wheel: it ran faster than commanded"},
+    {"loop_hung", "the gateway did not get the processor; reduce the machine's load"},
+    {"internal", "a fault of the gateway itself: save its log and report it"},
+    {"loop_late", "the gateway got the processor late; reduce the machine's load"},
     {"wheel_blocked", "free the wheel, then arm again"},
     {"pair_diverges", "check that the wheel turns freely and drives, then arm again"},
     {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
@@ -46,8 +46,8 @@ bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_S
     out_cure[0] = '\0';
     if (strcmp(cause, "send_stalled") == 0 && has_lost_an_echo(status, bus)) {
         (void)snprintf(out_cure, ADVICE_SIZE,
-                       "the wheels are heard, so an echo was lost (or the bus is full): ip link set %.32s down; ip "
-                       "link set %.32s up (once and for all: systemctl enable --now iwheel-can-restart@%.32s.path)",
+                       "the wheels are online, so an echo was lost (or the bus is full): ip link set %.32s down; ip "
+                       "link set %.32s up (permanently: systemctl enable --now iwheel-can-restart@%.32s.path)",
                        bus, bus, bus);
         return true;
     }
@@ -82,7 +82,7 @@ __attribute__((format(printf, 2, 3))) static void add(advice_t *self, const char
 
 bool advice_is_unset(const json_t *status, const char *item) {
     const json_t *entry = json_object_get(json_object_get(status, "ledger"), item);
-    // A gateway before 0.3 reported a configured track without evidence too.
+    // A gateway before 0.3 also reported a configured track with evidence "none".
     return strcmp(text_word(entry, "evidence"), "none") == 0 && !json_is_string(json_object_get(entry, "value"));
 }
 
@@ -141,15 +141,16 @@ void advice_collect(const json_t *status, advice_t *out_advice) {
     if (strcmp(state, "listening") == 0) {
         advise_listening(status, out_advice);
     } else if (strcmp(state, "armed") == 0) {
-        add(out_advice, "the wheels obey the holder of the lease; iwheelctl stop ends that");
+        add(out_advice, "the wheels follow the lease holder; iwheelctl stop ends that");
     } else if (strcmp(state, "stopping") == 0 && json_is_true(json_object_get(status, "holding"))) {
-        add(out_advice, "zeros hold the wheels; end that: iwheelctl release, and the machine may roll; or arm again");
+        add(out_advice,
+            "zeros hold the wheels; to end that: iwheelctl release, and the machine may roll; or arm again");
     } else if (strcmp(state, "stopping") == 0) {
-        add(out_advice, "%s", known ? cure : "wait until both wheels are at rest, then arm again");
+        add(out_advice, "%s", known ? cure : "wait until both wheels are at standstill, then arm again");
     } else if (strcmp(state, "latched") == 0) {
         add(out_advice, "%.290s, then: iwheelctl reset", known ? cure : "remove the cause");
         add_present(status, out_advice);
     } else {
-        add(out_advice, "this gateway speaks of a state unknown here; use the iwheelctl of its version");
+        add(out_advice, "this gateway reports an unknown state; use the iwheelctl of its version");
     }
 }

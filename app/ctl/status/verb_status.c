@@ -59,15 +59,15 @@ static void draw_lease(const paper_t *paper, const json_t *lease) {
     text_integer(get(lease, "remaining_ms"), "ms", left);
     text_integer(get(lease, "lease_ms"), "ms", whole);
     if (held) {
-        (void)snprintf(text, sizeof text, "%.128s (client %s, pid %s), %s left; a command holds for %s",
+        (void)snprintf(text, sizeof text, "%.128s (client %s, pid %s), %s left; a command is valid for %s",
                        text_word(lease, "name"), client, pid, left, whole);
     } else {
-        (void)snprintf(text, sizeof text, "nobody drives; a command holds for %s", whole);
+        (void)snprintf(text, sizeof text, "no client drives; a command is valid for %s", whole);
     }
     paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
 }
 
-/// Returns the time when a real button was last seen to work; "" if the gateway does not report it.
+/// Returns the time when a real button was last tested; "" if the gateway does not report it.
 static const char *tell_tried(const json_t *estop, char *out_text, size_t size) {
     const json_t *tried = json_object_get(estop, "tried_wall_us");
     char when[TEXT_CELL] = "never";
@@ -104,11 +104,11 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 
-/// Value of `digits` that means an age.
+/// Value of `digits` for an age.
 #define AGE 99U
 
 typedef struct {
-    const char *field; ///< NULL: no such value.
+    const char *field; ///< NULL if there is no value.
     const char *unit;
     unsigned digits;
 } value_t;
@@ -128,9 +128,9 @@ static const row_t rows[] = {
     {"distance", {{"distance_mm", "m", 3}, {"ticks", "ticks", 0}}, NULL},
     {"net force", {{"force_net_mN", "N", 3}}, "force_validity"},
     {"raw force", {{"force_raw_mN", "N", 3}, {"force_age_ms", "ms ago", 0}}, NULL},
-    {"its zero", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
-    {"taken", {{"offset_age_ms", "ago", AGE}, {"offset_deviation_mN", "N noise", 3}}, NULL},
-    {"unit evidence", {{NULL, NULL, 0}}, "unit_evidence"},
+    {"force offset", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
+    {"offset age", {{"offset_age_ms", "ago", AGE}, {"offset_deviation_mN", "N noise", 3}}, NULL},
+    {"unit observed", {{NULL, NULL, 0}}, "unit_evidence"},
     {"battery", {{"battery_dV", "V", 1}, {"status_age_ms", "ms ago", 0}}, NULL},
     {"controller", {{"temperature_degC", "degC", 0}, {"cpu_percent", "% CPU", 0}}, NULL},
     {"reboots", {{"reboots", "seen", 0}}, NULL},
@@ -151,7 +151,7 @@ static void write_value(const value_t *value, const json_t *wheel, char number[T
     (void)snprintf(number, TEXT_CELL, "%.32s%s%s", age, is(age, "--") ? "" : " ", is(age, "--") ? "" : value->unit);
 }
 
-/// Writes the word that explains the values. For a zero, also the origin of a stored one, and whether it was measured
+/// Writes the word that explains the values. For an offset, also the origin of a stored one, and whether it was measured
 /// under load.
 static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
     const char *word = (row->remark != NULL) ? text_word(wheel, row->remark) : "";
@@ -183,9 +183,9 @@ static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, co
 
 static void draw_head(const paper_t *paper, const char *name, unsigned width, const json_t *wheel) {
     const json_t *heard = get(wheel, "heard");
-    const char *rest = json_is_true(get(wheel, "at_rest")) ? "at rest" : "turning";
+    const char *rest = json_is_true(get(wheel, "at_rest")) ? "standstill" : "turning";
     char head[TEXT_CELL];
-    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
+    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(heard) ? rest : "OFFLINE");
     paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, width, head);
 }
 
@@ -231,7 +231,7 @@ static void draw_assumptions(const paper_t *paper, json_t *assumptions, const ch
     }
 }
 
-/// Prints each contradiction with its evidence and what it disables.
+/// Prints each contradiction with its reason and its effect.
 static void draw_contradictions(const paper_t *paper, json_t *assumptions) {
     char text[640];
     const char *label = "CONTRADICTED";
@@ -253,14 +253,14 @@ static void draw_store(const paper_t *paper, const json_t *store) {
     const char *state = text_word(store, "state");
     if (is(state, "ignored") || is(state, "failed")) {
         (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(store, "file"), text_word(store, "reason"));
-        paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
+        paper_wrap(paper, is(state, "failed") ? "NOT STORED" : "NOT TRUSTED", TONE_CARE, text);
     }
 }
 
 static void draw_budget(const paper_t *paper, const json_t *budget) {
     static const char *const cases[][3] = {
         {"client lost", "client_lost_ms", "client_lost_mm"},
-        {"gateway dies", "killed_ms", "killed_mm"},
+        {"gateway killed", "killed_ms", "killed_mm"},
     };
     char time[TEXT_CELL];
     char way[TEXT_CELL];
@@ -281,7 +281,8 @@ static void draw_pair(const paper_t *paper, const json_t *pair) {
         text_integer(get(pair, "largest_mm"), "mm", largest);
         text_integer(get(pair, "limit_mm"), "mm", limit);
         paper_label(paper, "PAIR");
-        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; it stops at %s", largest, limit);
+        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; the gateway stops at %s", largest,
+                  limit);
         paper_end(paper);
     }
 }

@@ -24,7 +24,7 @@ enum {
 
 /// Options of all verbs.
 typedef struct {
-    const char *socket; ///< Value of --socket; NULL: find it.
+    const char *socket; ///< Value of --socket; NULL: the program searches for the socket.
     bool json;          ///< Print objects, one per line, instead of text: replies of the gateway, or of the verb.
     client_t client;
 } ctl_t;
@@ -61,8 +61,8 @@ __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format,
 /// closed the pipe. Returns the exit code.
 int ctl_finish(int code);
 
-/// Connects if necessary, sends `request` (takes its reference) and waits for its reply. Returns 0 with `*out_reply` (a
-/// new reference) if the gateway agreed; CTL_NO after it has reported the refusal; another code after it has reported
+/// Connects if necessary, sends `request` (releases its reference) and waits for its reply. Returns 0 with `*out_reply`
+/// (a new reference) if the gateway agreed; CTL_NO after it has reported the refusal; another code after it has reported
 /// an error. With --json the line of the reply is always printed.
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply);
 
@@ -89,10 +89,10 @@ int ctl_refused(const json_t *reply);
 /// Adds the sentences to the assumptions of a status if the gateway, a board, sent only figures.
 void ctl_explain_assumptions(json_t *assumptions);
 
-/// Reports a result of `client_receive` that brought no line. Returns the exit code.
+/// Reports a result of `client_receive` without a line. Returns the exit code.
 int ctl_lost(iwc_result_t result);
 
-// --- a gateway that may be absent: looked up without messages ------------------------------------------------------
+// --- a gateway that may be absent: found without messages ----------------------------------------------------------
 
 typedef enum {
     NEAR_NONE = 0, ///< There is no gateway.

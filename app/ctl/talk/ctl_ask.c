@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or give --socket PATH"
+#define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or use --socket PATH"
 
 int ctl_fail(int code, const char *format, ...) {
     va_list list;
@@ -25,7 +25,7 @@ int ctl_fail(int code, const char *format, ...) {
 int ctl_finish(int code) {
     errno = 0;
     if ((fflush(stdout) != 0 || ferror(stdout) != 0) && errno != EPIPE && errno != 0) {
-        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno));
+        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; free some space", strerror(errno));
     }
     return code;
 }
@@ -68,7 +68,7 @@ static int tell_denied(const char *path) {
 }
 
 static int tell_refusal(const char *error, const char *message) {
-    return ctl_fail(CTL_NO, "refused (%s): %s", (error != NULL) ? error : "no reason given",
+    return ctl_fail(CTL_NO, "refused (%s): %s", (error != NULL) ? error : "no reason",
                     (message != NULL) ? message : "no message");
 }
 
@@ -88,9 +88,9 @@ static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t resul
     case ENOENT:
         return ctl_fail(CTL_UNAVAILABLE, "%s does not exist; %s", path, START_HINT);
     case ECONNREFUSED:
-        return ctl_fail(CTL_UNAVAILABLE, "nobody answers on %s; %s", path, START_HINT);
+        return ctl_fail(CTL_UNAVAILABLE, "no gateway answers on %s; %s", path, START_HINT);
     case ETIMEDOUT:
-        return ctl_fail(CTL_TIMEOUT, "%s takes no connection for 2 s; the gateway hangs or is flooded, see its log",
+        return ctl_fail(CTL_TIMEOUT, "%s accepts no connection for 2 s; the gateway hangs or is flooded, see its log",
                         path);
     case ENAMETOOLONG:
         return ctl_fail(CTL_USAGE, "--socket %s is too long for a socket (107 characters); use a shorter path", path);
@@ -112,15 +112,15 @@ int ctl_lost(iwc_result_t result) {
         return ctl_fail(CTL_UNAVAILABLE, "the gateway ended the connection; see its log, or: iwheelctl status");
     case IWC_GARBLED:
         return ctl_fail(CTL_INTERNAL,
-                        "not the gateway's language on this socket; check --socket, or versions that differ");
+                        "this socket does not use the gateway's protocol; check --socket and both versions");
     case IWC_INTERRUPTED:
         return ctl_fail(CTL_NO, "interrupted");
     case IWC_FULL:
-        return ctl_fail(CTL_TIMEOUT, "the gateway takes no request; it hangs, see its log");
+        return ctl_fail(CTL_TIMEOUT, "the gateway accepts no request; it hangs, see its log");
     case IWC_NEWER:
         return ctl_fail(CTL_UNAVAILABLE, "%s", iwc_words(result));
     case IWC_INVALID:
-        return ctl_fail(CTL_USAGE, "a request of more than %u bytes; write less", IWC_REQUEST_MAX);
+        return ctl_fail(CTL_USAGE, "the request has more than %u bytes; shorten it", IWC_REQUEST_MAX);
     default:
         return CTL_OK;
     }
@@ -134,7 +134,7 @@ static int find_one(ctl_t *self, char *out_path, size_t size) {
     case NEAR_SEVERAL:
         return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", out_path);
     case NEAR_DENIED:
-        return ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
+        return ctl_fail(CTL_PERMISSION, "you may not read %s; sudo usermod -aG iwheel $USER, then log in again",
                         out_path);
     default:
         return ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
@@ -154,7 +154,7 @@ static int connect_to_one(ctl_t *self) {
         return tell_unopened(self, path, result);
     }
     if (iwc_watches_only(self->client.gateway)) {
-        (void)ctl_fail(CTL_OK, "by %s you may watch, stop and estop, but not drive", path);
+        (void)ctl_fail(CTL_OK, "%s allows watch, stop and estop, but not drive", path);
     }
     return CTL_OK;
 }

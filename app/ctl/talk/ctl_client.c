@@ -77,8 +77,8 @@ iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_li
     return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
 
-/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is
-/// accepted too: it refuses the whole connection or a line.
+/// Receives until the reply to `id` arrives. Drops events and replies to other requests. Accepts a reply without id too:
+/// it refuses the whole connection or a line.
 static iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
     for (;;) {
         const iwc_result_t result = client_receive(self, deadline_us, out_reply);

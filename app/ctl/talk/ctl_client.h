@@ -18,7 +18,7 @@ typedef struct {
     iwc_t *gateway;
     bool open; ///< Open, and not closed by this program. It is not reopened automatically.
     unsigned seen_signals;
-    uint64_t skipped; ///< Events left out so far; set to 0 after a report.
+    uint64_t skipped; ///< Number of dropped events; set to 0 after a report.
     const char *line; ///< Last line received, terminated; valid until the next receive.
 } client_t;
 
@@ -35,16 +35,16 @@ iwc_result_t client_open(client_t *self, const char *path, int64_t deadline_us);
 /// Closes the connection if there is one.
 void client_close(client_t *self);
 
-/// Sends `request` (takes its reference) with a new id, `*out_id`. IWC_FULL: it could not be sent and is dropped.
+/// Sends `request` (releases its reference) with a new id, `*out_id`. IWC_FULL: it could not be sent and is dropped.
 iwc_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, int64_t *out_id);
 
 /// Receives the next line as a new reference in `*out_line` (NULL unless IWC_OK).
 iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line);
 
-/// Sends `request` (takes its reference) and receives until its reply comes; earlier lines are dropped.
+/// Sends `request` (releases its reference) and receives until its reply arrives; earlier lines are dropped.
 iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply);
 
-// --- SIGINT, SIGTERM and SIGHUP: counted instead of deadly, and only where the program waits ----------------------
+// --- SIGINT, SIGTERM and SIGHUP: counted, and only while the program waits ----------------------------------------
 
 /// Blocks the three signals from now on, except in a wait that uses `signals_let_in`, and counts them there.
 void signals_catch(void);

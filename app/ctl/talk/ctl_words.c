@@ -7,10 +7,10 @@
 
 int option_text(const option_t *option, const char *verb, const char *value) {
     if (value == NULL && option->wants != NULL) {
-        return ctl_fail(CTL_USAGE, "%s wants %s", option->name, option->wants);
+        return ctl_fail(CTL_USAGE, "%s needs %s", option->name, option->wants);
     }
     if (value == NULL) {
-        return ctl_fail(CTL_USAGE, "%s wants a value; see: iwheelctl %s --help", option->name, verb);
+        return ctl_fail(CTL_USAGE, "%s needs a value; see: iwheelctl %s --help", option->name, verb);
     }
     *(const char **)option->out = value;
     return CTL_OK;

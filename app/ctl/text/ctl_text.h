@@ -31,7 +31,7 @@ void text_json(const char *line, FILE *out);
 /// Writes a value as text_json does. Returns false if there is not enough memory.
 bool text_json_value(const json_t *value, FILE *out);
 
-/// Returns true if `out` is a terminal that wants colours (not with NO_COLOR or TERM=dumb).
+/// Returns true if `out` is a terminal with colours (false with NO_COLOR or TERM=dumb).
 bool text_wants_colour(FILE *out);
 
 /// Returns the number of columns of a line that can be rewritten on `out`; 0 if it is not a terminal, or cannot do it

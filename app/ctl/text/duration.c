@@ -8,7 +8,7 @@
 #define DIGITS_MAX   6U
 #define DECIMALS_MAX 3U
 
-/// From the largest unit on; a whole number of days is written in hours.
+/// Units, the largest first. A whole number of days is written in hours.
 static const struct {
     const char *name;
     int64_t us;
@@ -75,7 +75,7 @@ bool duration_option(const char *option, const char *text, duration_range_t rang
     if (text == NULL || !duration_parse(text, &us)) {
         const bool guessed = text != NULL && guess(text, range, meant, sizeof meant);
         (void)snprintf(out_why, DURATION_WHY_SIZE,
-                       "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"%s%s%s%s", option,
+                       "%s needs a time with its unit, such as " DURATION_FORM ", not \"%.40s\"%s%s%s%s", option,
                        (text != NULL) ? text : "", guessed ? "; write: " : "", guessed ? option : "",
                        guessed ? " " : "", guessed ? meant : "");
         return false;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// Live screen of `top`, drawn from the last snapshot, on any terminal.
 ///
-/// 80 x 24 show everything, with the state in letters that can be read across a room. Smaller terminals lose the least
-/// important parts first, and narrow ones have shorter lines; below 20 x 4 only the state is drawn. Larger terminals
-/// have room for the last minute. Texts of other programs are cleaned before they are drawn.
+/// 80 x 24 show everything, with the state in letters that can be read from a distance. Smaller terminals lose the least
+/// important parts first, and narrow ones have shorter lines; below 20 x 4 only the state is drawn. Larger terminals also
+/// show the last minute. Texts of other programs are cleaned before they are drawn.
 #ifndef TOP_H
 #define TOP_H
 
@@ -26,7 +26,7 @@ typedef struct {
     int32_t value[TOP_PLOTS][TOP_HISTORY]; ///< INT32_MIN: not known.
 } top_history_t;
 
-/// Notes the values of the snapshot; without one (a null pointer), that they are not known.
+/// Stores the values of the snapshot; with a null pointer, stores that they are not known.
 void top_history_take(top_history_t *self, int64_t now_us, const json_t *state);
 
 /// From this width on lines are not shortened.
@@ -34,11 +34,11 @@ void top_history_take(top_history_t *self, int64_t now_us, const json_t *state);
 
 /// Data of the screen.
 typedef struct {
-    json_t *state; ///< Last snapshot; NULL: none yet.
+    json_t *state; ///< Last snapshot; NULL if there is none.
     char last_stop[TOP_TEXT_SIZE];
-    char notice[TOP_TEXT_SIZE]; ///< Answer to the last key, or why there is no gateway.
+    char notice[TOP_TEXT_SIZE]; ///< Answer to the last key, or the reason why there is no gateway.
     bool connected;
-    bool stale;                   ///< Connected, but no data came for a while.
+    bool stale;                   ///< Connected, but no data arrived for a while.
     int scale_mm_s;               ///< Scale of the bars.
     bool colour;                  ///< Otherwise tones are only bold, reverse and dim.
     bool fine_blocks;             ///< The terminal shows UTF-8.
@@ -52,7 +52,7 @@ void top_draw(const top_model_t *model);
 __attribute__((format(printf, 5, 6))) void top_put(const top_model_t *model, int row, int column, top_tone_t tone,
                                                    const char *format, ...);
 
-/// Draws a word in letters of five rows; each letter takes 6 columns. Unknown letters are not drawn.
+/// Draws a word in letters of five rows; each letter has 6 columns. Unknown letters are not drawn.
 void top_put_big(const top_model_t *model, int row, top_tone_t tone, const char *word);
 
 /// Draws text, broken between words, in at most `rows` rows; the last one is cut. Returns the number of rows.

@@ -15,7 +15,7 @@
 #define ROWS_BIG   20
 #define ROWS_FULL  24
 #define ROWS_LEAST 4
-/// In a narrower terminal, big letters would take the rows that sentences need.
+/// In a narrower terminal, big letters would use the rows that sentences need.
 #define COLUMNS_BIG 55
 
 static const json_t *get(const json_t *object, const char *field) {
@@ -71,7 +71,7 @@ static void spell(const char *name, char *out_words, size_t size) {
     }
 }
 
-/// Draws the holder of the lease, or why there is none and what to do next. Returns the number of rows.
+/// Draws the lease holder, or the reason why there is none and the next action. Returns the number of rows.
 static int draw_reason(const top_model_t *model, int row, int rows, const advice_t *advice) {
     char left[TEXT_CELL];
     char words[64];
@@ -81,8 +81,8 @@ static int draw_reason(const top_model_t *model, int row, int rows, const advice
     top_tone_t tone = TOP_TITLE;
     if (json_is_integer(get(lease, "holder"))) {
         text_integer(get(lease, "remaining_ms"), "ms", left);
-        (void)snprintf(text, sizeof text, "%.30s drives (pid %lld); its command holds for %s", text_word(lease, "name"),
-                       json_integer_value(get(lease, "pid")), left);
+        (void)snprintf(text, sizeof text, "%.30s drives (pid %lld); its command is valid for %s",
+                       text_word(lease, "name"), json_integer_value(get(lease, "pid")), left);
     } else if (cause != NULL) {
         tone = tone_of(model, text_word(model->state, "state"));
         spell(cause, words, sizeof words);
@@ -136,7 +136,7 @@ void top_draw(const top_model_t *model) {
     // Where lines are short, the rows without big letters are used for whole sentences.
     const int reasons = (LINES >= ROWS_FULL) ? (big ? 3 : 5) : (LINES >= ROWS_BIG) ? (big ? 2 : 4) : big ? 1 : 2;
     const int used = draw_cause(model, row, reasons);
-    row += big ? reasons : used; // Below big letters nothing moves when a sentence is longer.
+    row += big ? reasons : used; // Below big letters no line moves when a sentence is longer.
     if (model->state != NULL && model->connected) {
         row += top_draw_wheels(model, row, LINES < ROWS_FULL);
         row += top_draw_rest(model, row, LINES - 2 - row);

@@ -6,6 +6,6 @@ int verb_top(ctl_t *self, int count, char **words) {
     (void)self;
     (void)count;
     (void)words;
-    return ctl_fail(CTL_UNAVAILABLE, "ncurses was missing when this was built, so there is no top; apt-get install "
+    return ctl_fail(CTL_UNAVAILABLE, "this build has no top, because ncurses was missing; apt-get install "
                                      "libncurses-dev, configure and build again; until then: iwheelctl status");
 }

@@ -70,7 +70,7 @@ static void draw_speed(const top_model_t *model, int row, const char *label, top
     top_put(model, row, (column > LABEL_COLUMNS) ? column : LABEL_COLUMNS, TOP_TITLE, "%13s", number);
 }
 
-/// Writes an integer with fewer decimals than it has: text that is read across a room needs no thousandths.
+/// Writes an integer with fewer decimals than it has: text that is read from a distance needs no thousandths.
 static void coarse(const json_t *value, int divisor, unsigned digits, const char *unit, char out[TEXT_CELL]) {
     if (json_is_integer(value)) {
         text_number(json_integer_value(value) / divisor, digits, unit, out);
@@ -112,8 +112,8 @@ static int draw_wheel(const top_model_t *model, int row, const char *name, bool 
     const bool heard = json_is_true(get(wheel, "heard"));
     char told[24];
     char does[24];
-    (void)snprintf(told, sizeof told, "%-6s told", name);
-    (void)snprintf(does, sizeof does, "%-6s %s", "", heard ? "does" : "LOST");
+    (void)snprintf(told, sizeof told, "%-6s appl", name);
+    (void)snprintf(does, sizeof does, "%-6s %s", "", heard ? "meas" : "LOST");
     draw_speed(model, row, told, TOP_CARE, get(wheel, "applied_mm_s"));
     draw_speed(model, row + 1, does, heard ? TOP_GOOD : TOP_BAD, get(wheel, "speed_mm_s"));
     return brief ? 2 : 2 + draw_numbers(model, row + 2, wheel);

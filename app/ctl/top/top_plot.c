@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Speed and force of the last minute, drawn with characters on a terminal with enough room.
+// Speed and force of the last minute, drawn with characters on a terminal that is large enough.
 #include "top.h"
 
 #include <curses.h>

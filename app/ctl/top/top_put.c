@@ -49,7 +49,7 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
     (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     text_clean(text, clean, sizeof clean);
-    // Cut by characters, not by bytes: continuation bytes of UTF-8 take no column.
+    // Cut by characters, not by bytes: continuation bytes of UTF-8 use no column.
     size_t length = 0;
     int columns = 0;
     while (clean[length] != '\0') {

@@ -64,7 +64,7 @@ static void keep_sentence(top_t *self, const json_t *stop) {
     (void)snprintf(self->model.last_stop, sizeof self->model.last_stop, "%s%s",
                    (json_integer_value(json_object_get(stop, "number")) > 0) ? "last stop: " : "",
                    (sentence != NULL) ? sentence : "");
-    // The line above shows the fix for a latch, and two lines have no room for more than the rest.
+    // The line above shows the fix for a latch, and only the rest fits into two lines.
     char *const cure = strrchr(self->model.last_stop, ';');
     if (cure != NULL && json_is_true(json_object_get(stop, "latched"))) {
         *cure = '\0';
@@ -77,8 +77,8 @@ static void try_connect(top_t *self) {
         [NEAR_FOUND] = "",
         [NEAR_OTHER] = "",
         [NEAR_SEVERAL] = "several gateways are running; choose one with --socket PATH",
-        [NEAR_DENIED] = "its socket may not be used by you: sudo usermod -aG iwheel $USER, then log in again",
-        [NEAR_MUTE] = "the gateway takes the connection and does not answer; see its log",
+        [NEAR_DENIED] = "you may not use its socket: sudo usermod -aG iwheel $USER, then log in again",
+        [NEAR_MUTE] = "the gateway accepts the connection and does not answer; see its log",
     };
     near_gateway_t gateway;
     near_look(self->ctl, NULL, &gateway);
@@ -90,7 +90,7 @@ static void try_connect(top_t *self) {
     self->model.connected = true;
     self->model.notice[0] = '\0';
     if (iwc_watches_only(self->ctl->client.gateway)) {
-        notice(self, "by this socket you may watch and stop, but not drive");
+        notice(self, "this socket allows watch and stop, but not drive");
     }
     self->received_us = client_now_us();
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
@@ -126,7 +126,7 @@ static void take_line(top_t *self, json_t *line) {
     }
 }
 
-/// Reads the lines that are there, without waiting.
+/// Reads the received lines, without waiting.
 static void read_gateway(top_t *self) {
     if (self->model.connected) {
         (void)iwc_latest(self->ctl->client.gateway); // A slow terminal shows the present state, not a backlog.
@@ -140,7 +140,7 @@ static void read_gateway(top_t *self) {
         } else if (result == IWC_TIMEOUT || result == IWC_INTERRUPTED) {
             return;
         } else {
-            disconnect(self, "the gateway ended the connection; waiting for it to come back");
+            disconnect(self, "the gateway ended the connection; waiting for its return");
         }
     }
 }
@@ -235,11 +235,10 @@ int verb_top(ctl_t *self, int count, char **words) {
     (void)setlocale(LC_ALL, "");
     SCREEN *screen = can_draw() ? newterm(NULL, stdout, stdin) : NULL;
     if (screen == NULL) {
-        return ctl_fail(
-            CTL_USAGE,
-            "nothing can be drawn on this terminal (TERM=%s); without drawing: iwheelctl status, or iwheelctl watch; "
-            "if it can more than it says: TERM=vt100 iwheelctl top",
-            (getenv("TERM") != NULL) ? getenv("TERM") : "");
+        return ctl_fail(CTL_USAGE,
+                        "this terminal cannot draw (TERM=%s); without drawing: iwheelctl status, or iwheelctl watch; "
+                        "if it can: TERM=vt100 iwheelctl top",
+                        (getenv("TERM") != NULL) ? getenv("TERM") : "");
     }
     signals_catch();
     prepare_terminal(&top.model);

@@ -15,7 +15,7 @@
 #define FRAMES_USUAL 12U
 
 typedef struct {
-    const char *directory; ///< NULL: not given.
+    const char *directory; ///< NULL if the option is absent.
     const char *name;      ///< Name of a recording; NULL: none.
     size_t frames;
     bool list;
@@ -26,7 +26,7 @@ static int take_frames(const option_t *option, const char *verb, const char *tex
     (void)verb;
     const unsigned long number = (text != NULL && text[0] >= '0' && text[0] <= '9') ? strtoul(text, &end, 10) : 0UL;
     if (end == NULL || *end != '\0' || number > WHY_FRAMES_MAX) {
-        return ctl_fail(CTL_USAGE, "--frames wants a number of frames before and after the stop, 0 to %u",
+        return ctl_fail(CTL_USAGE, "--frames needs a number of frames before and after the stop, 0 to %u",
                         WHY_FRAMES_MAX);
     }
     *(size_t *)option->out = number;
@@ -128,9 +128,9 @@ static void print_recording(const json_t *reply) {
     const char *path = json_string_value(json_object_get(reply, "recording"));
     const char *error = json_string_value(json_object_get(reply, "recording_error"));
     if (path != NULL) {
-        text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
+        text_line(stdout, "recorded in %s; to replay it: iwheelctl replay %s", path, path);
     } else if (error != NULL) {
-        text_line(stdout, "not recorded on disk: %s; the gateway's log tells the cure", error);
+        text_line(stdout, "not recorded on disk: %s; the gateway's log has the fix", error);
     }
 }
 
@@ -140,7 +140,7 @@ static void print_stalled(ctl_t *self) {
     char cure[ADVICE_SIZE];
     json_t *status = near_ask(self, json_pack("{s:s}", "cmd", "status"));
     if (advice_is_present(status, "send_stalled") && advice_cure(status, "send_stalled", cure)) {
-        text_line(stdout, "send_stalled is there still: %s", cure);
+        text_line(stdout, "send_stalled is still present: %s", cure);
     }
     json_decref(status);
 }

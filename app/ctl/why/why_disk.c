@@ -23,7 +23,7 @@ static int tell_closed_directory(const char *directory, int error) {
     case ENOENT:
     case ENOTDIR:
         return ctl_fail(CTL_UNAVAILABLE,
-                        "%s: there is no such directory; name the gateway's: iwheelctl why --list --directory DIR",
+                        "%s: the directory does not exist; name the gateway's: iwheelctl why --list --directory DIR",
                         directory);
     case EACCES:
         return ctl_fail(CTL_PERMISSION, "%s: you may not read it; sudo usermod -aG iwheel $USER, then log in again",
@@ -38,7 +38,7 @@ static int is_recording(const struct dirent *entry) {
     return strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1U) == 0 && ending != NULL && strcmp(ending, EVENTS) == 0;
 }
 
-/// Adds a name as the gateway sends it, or as it is on disk.
+/// Adds a name from the gateway's list or from the disk.
 static void add_name(json_t *names, const char *stem, const char *ending) {
     char name[NAME_SIZE];
     const int n = snprintf(name, sizeof name, "%s%s", stem, ending);
@@ -127,7 +127,7 @@ int why_disk_list(const why_disk_t *self) {
     if (!self->json) {
         (void)fputs((count > 0U) ? "\n" : "", stdout);
         text_line(stdout, "%zu stop%s recorded in %s%s", count, (count == 1U) ? "" : "s", self->directory,
-                  (count > 0U) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
+                  (count > 0U) ? "; to see one with its frames: iwheelctl why NUMBER" : "");
     }
     json_decref(names);
     return CTL_OK;
@@ -194,7 +194,8 @@ int why_disk_show(const why_disk_t *self, const char *name, size_t frames) {
     char path[PATH_SIZE];
     events_t events;
     if (!find(self, name, path)) {
-        return ctl_fail(CTL_DATA, "no stop %s is recorded in %s; see: iwheelctl why --list", name, self->directory);
+        return ctl_fail(CTL_DATA, "stop %s is not recorded in %s; to list the stops: iwheelctl why --list", name,
+                        self->directory);
     }
     if (!events_open(&events, path, source_stream(self->ctl, path, 1))) {
         return (errno == EPROTO) ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
@@ -207,7 +208,7 @@ int why_disk_show(const why_disk_t *self, const char *name, size_t frames) {
     } else if (why_print_stop(events.why)) {
         path[strlen(path) - (sizeof EVENTS - 1U)] = '\0';
         (void)snprintf(path + strlen(path), sizeof EVENTS, FRAMES);
-        text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
+        text_line(stdout, "recorded in %s; to replay it: iwheelctl replay %s", path, path);
         code = (frames > 0U) ? print_frames(self->ctl, path, stop_us, frames) : CTL_OK;
     }
     events_close(&events);

@@ -73,8 +73,8 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
     if (sock_client_waited_through_stop(gw_answers_connection(self, client))) {
         return IWN_REFUSE(
             &server->refusal, IWN_STALE_COMMAND,
-            "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send "
-            "it anew");
+            "this request was sent before another client stopped the wheels; see why (iwheelctl why), then send "
+            "it again");
     }
     return !arms || gw_grant_draw_key(self->key) ||
            IWN_REFUSE(&server->refusal, IWN_INTERNAL,
@@ -83,9 +83,8 @@ bool iwn_target_permits(iwn_server_t *server, iwn_client_t *client) {
 
 bool iwn_target_is_key(iwn_server_t *server, const iwn_client_t *client, const char *key) {
     return gw_grant_is_same_key(key, ((const gw_served_t *)client)->key) ||
-           IWN_REFUSE(
-               &server->refusal, IWN_NOT_HOLDER,
-               "the key is not the one that the reply to the last arm gave; arm, and drive with the key of its reply");
+           IWN_REFUSE(&server->refusal, IWN_NOT_HOLDER,
+                      "the key is not that of the reply to the last arm; arm, and drive with the key of its reply");
 }
 
 bool iwn_target_is_fresh(iwn_server_t *server, iwn_client_t *client, iw_time_us_t *out_sent_us) {
@@ -198,7 +197,7 @@ void iwn_target_other(iwn_server_t *server, iwn_client_t *client) {
         break;
     default: // A client that may drive must not change a file that an administrator writes.
         (void)IWN_REFUSE(&server->refusal, IWN_DENIED,
-                         "this gateway's configuration is a file: change it, look at it with "
+                         "this gateway's configuration is a file: change it, check it with "
                          "iwheel-gateway --check -c FILE, and start the gateway again");
         iwn_server_refuse(server, client, &server->request.id);
         break;

@@ -36,7 +36,7 @@ static void tell_left_behind(const gw_answers_t *self) {
     char sentence[GW_WARNING_SIZE];
     gw_bus_left_sentence(link, self->server.bus, sentence, sizeof sentence);
     sock_log(self->log, SOCK_LOG_WARNING, "%s", sentence);
-    if (link->presence != IWL_LINK_LOCAL) { // If the restart could not be requested, the sentence says what to do.
+    if (link->presence != IWL_LINK_LOCAL) { // If the restart could not be requested, the sentence has the fix.
         (void)gw_bus_left_ask(SOCK_RUNTIME_DIRECTORY, self->server.bus);
     }
 }
@@ -149,17 +149,17 @@ static void observe_purge(gw_answers_t *self) {
     }
     self->purge = purge;
     if (purge == IWL_LINK_PURGE_DONE) {
-        sock_log(self->log, SOCK_LOG_WARNING, "bus %s: taken down and up again, so that no old setpoint waits in it",
+        sock_log(self->log, SOCK_LOG_WARNING, "bus %s: set down and up again, so that no old setpoint waits in it",
                  bus);
     } else if (purge == IWL_LINK_PURGE_NOT_ALLOWED) {
         sock_log(self->log, SOCK_LOG_WARNING,
                  "bus %s: an old setpoint may still wait in its queue, and this process may not empty it; do: ip link "
-                 "set %s down; ip link set %s up (or, once and for all: systemctl enable --now "
+                 "set %s down; ip link set %s up (or, permanently: systemctl enable --now "
                  "iwheel-can-restart@%s.path)",
                  bus, bus, bus, bus);
     } else if (purge == IWL_LINK_PURGE_FAILED) {
         sock_log(self->log, SOCK_LOG_ERROR,
-                 "bus %s: its queue could not be emptied; look with: ip -details link show %s", bus, bus);
+                 "bus %s: its queue could not be emptied; check it: ip -details link show %s", bus, bus);
     }
 }
 

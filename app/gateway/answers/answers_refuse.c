@@ -41,7 +41,7 @@ static void describe_bus(const gw_wheels_t *wheels, const iw_snapshot_t *seen, g
     (void)snprintf(texts->bus_cure, sizeof texts->bus_cure, "%s%s",
                    (local && off) ? "end it in the simulator: iwheel-sim busoff off"
                    : local        ? "start the simulator: iwheel-sim --can "
-                   : off          ? "check cable, termination and bit rate; what else: iwheelctl doctor "
+                   : off          ? "check cable, termination and bit rate; for more checks: iwheelctl doctor "
                                   : "bring it up; how: iwheelctl doctor ",
                    (local && off) ? "" : bus);
     texts->stalled_cure[0] = '\0';
@@ -90,12 +90,13 @@ void iwn_target_say_right(iwn_server_t *server) {
     char *message = server->refusal.message;
     const size_t size = sizeof server->refusal.message;
     if (strcmp(self->group, "none") == 0) {
-        (void)snprintf(message, size, "this socket is for watching, stop and estop; who may drive uses %s",
+        (void)snprintf(message, size, "this socket is for watching, stop and estop; clients that drive use %s",
                        self->socket);
     } else {
-        (void)snprintf(message, size,
-                       "this socket is for watching, stop and estop; who may drive uses %s and is in group %s (sudo "
-                       "usermod -aG %s USER, then log in again)",
-                       self->socket, self->group, self->group);
+        (void)snprintf(
+            message, size,
+            "this socket is for watching, stop and estop; clients that drive use %s and are in group %s (sudo "
+            "usermod -aG %s USER, then log in again)",
+            self->socket, self->group, self->group);
     }
 }

@@ -19,7 +19,8 @@ void gw_recordings_ask(gw_answers_t *self, iwn_client_t *client) {
         .client = client->id, .list = request->cmd == IWN_CMD_RECORDINGS, .offset = request->offset};
     memcpy(question.name, request->file, sizeof question.name);
     if (connection->owed) {
-        why = "the recording asked for before is still being read; wait for that reply, then ask again";
+        why =
+            "the recording of the last request is still being read; wait for that reply, then send this request again";
     } else if (self->box->config.blackbox_s == 0U) {
         why = "nothing is recorded: [record] blackbox_s is 0; set it, then restart the gateway";
     } else if (!gw_box_ask(self->box, &question)) {

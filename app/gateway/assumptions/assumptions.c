@@ -124,7 +124,7 @@ static void merge_item(gw_assumptions_t *self, iw_assumption_item_t item, const 
         return;
     }
     if (strcmp(value, stored->value) != 0) {
-        sock_log(self->log, SOCK_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
+        sock_log(self->log, SOCK_LOG_INFO, "%s: the stored result was for %s, and %s is configured now: dropped",
                  iwn_assumption_item_name(item), stored->value, (value[0] != '\0') ? value : "nothing");
         self->changed = true;
         return;
@@ -143,7 +143,7 @@ static void merge_offset(gw_assumptions_t *self, iw_side_t side, const gw_stored
     }
     if (stored->unit != self->configured.core->force_unit[side]) {
         sock_log(self->log, SOCK_LOG_WARNING,
-                 "the %s wheel's stored force offset was taken in another force_unit: forgotten; unload both wheels, "
+                 "the %s wheel's stored force offset was measured in another force_unit: dropped; unload both wheels, "
                  "then: iwheelctl tare",
                  (side == IW_LEFT) ? "left" : "right");
         self->changed = true;

@@ -215,17 +215,17 @@ static const char *read_line(const char *text, size_t length, const char *bus, g
     iwn_json_t root;
     int64_t version;
     if (!iwn_json_check(text, length, &work, &root, &unused) || !is_text(root, "format", FORMAT)) {
-        return "it is no ledger of an iWheel gateway";
+        return "it is not the ledger of an iWheel gateway";
     }
     if (!read_number(root, "version", VERSION, VERSION, &version)) {
         return "another version of the gateway wrote it";
     }
     if (!is_text(root, "bus", bus)) {
-        return "it speaks of another bus";
+        return "it is for another bus";
     }
     if (!read_all(root, "items", known, read_item) || !read_all(root, "offsets", known, read_offset) ||
         !read_button(root, &known->tried)) {
-        return "it holds what no gateway has measured";
+        return "it contains values that no gateway can have measured";
     }
     return NULL;
 }

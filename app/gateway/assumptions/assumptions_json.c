@@ -51,7 +51,7 @@ static bool is_as_written(const gw_assumptions_written_t *written, const source_
            is_alike(written->known, source->known, sizeof written->known);
 }
 
-/// Stores the bytes of the object at the end of the line, if there is room.
+/// Stores the bytes of the object at the end of the line, if they fit.
 static void keep(gw_assumptions_written_t *written, const source_t *source, const iwn_out_t *json, size_t begin) {
     const size_t length = json->overflow ? 0U : json->length - begin;
     written->length = 0;

@@ -74,10 +74,11 @@ void gw_assumptions_report_state(gw_assumptions_t *self) {
     sock_log_t *log = self->log;
     switch (self->state) {
     case GW_ASSUMPTIONS_STORED:
-        sock_log(log, SOCK_LOG_INFO, "what is known of the wheels is kept in %s", self->path);
+        sock_log(log, SOCK_LOG_INFO, "the assumptions about the wheels are stored in %s", self->path);
         break;
     case GW_ASSUMPTIONS_NEW:
-        sock_log(log, SOCK_LOG_INFO, "nothing is known of these wheels yet; it will be kept in %s", self->path);
+        sock_log(log, SOCK_LOG_INFO, "nothing was measured on these wheels yet; results will be stored in %s",
+                 self->path);
         break;
     case GW_ASSUMPTIONS_IGNORED:
         sock_log(log, SOCK_LOG_WARNING, "%s is ignored: %s; it is set aside as %s.damaged", self->path, self->reason,
@@ -86,10 +87,10 @@ void gw_assumptions_report_state(gw_assumptions_t *self) {
     case GW_ASSUMPTIONS_FAILED:
     case GW_ASSUMPTIONS_LOADING:
     default:
-        sock_log(log, SOCK_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s%s", self->path,
+        sock_log(log, SOCK_LOG_WARNING, "the assumptions about the wheels are not stored in %s: %s; %s%s", self->path,
                  sock_folder_fault(self->error),
                  (self->store.child.fd < 0) ? "start the gateway again" : sock_folder_cure(self->error),
-                 (self->store.child.fd < 0) ? "" : ", or set [record] directory; tried again");
+                 (self->store.child.fd < 0) ? "" : ", or set [record] directory; the gateway tries again");
         break;
     }
 }
@@ -129,10 +130,10 @@ void gw_assumptions_report_button(gw_assumptions_t *self, gw_button_news_t news)
     if (news == GW_BUTTON_TRIED) {
         sock_log(self->log, SOCK_LOG_INFO, "e-stop %s: its button was pressed and released, it works", line);
     } else if (news == GW_BUTTON_BROKEN) {
-        sock_log(self->log, SOCK_LOG_WARNING, "e-stop %s: its contacts disagree, so that what was tried counts no more",
-                 line);
+        sock_log(self->log, SOCK_LOG_WARNING,
+                 "e-stop %s: its contacts disagree, so the earlier test of the button is void", line);
     } else {
-        sock_log(self->log, SOCK_LOG_WARNING, "e-stop %s: its wiring is not the one on which its button was tried",
+        sock_log(self->log, SOCK_LOG_WARNING, "e-stop %s: its button was tested on another wiring; that test is void",
                  line);
     }
 }

@@ -120,8 +120,8 @@ static const char *why_not(const gw_box_t *box) {
 void gw_record_stop(gw_box_t *box, sock_log_t *log, const iwn_stop_note_t *note, iw_time_us_t now_us) {
     if (!order_recording(box, note, iwn_cause_name(note->stop.cause), now_us)) {
         sock_log(log, SOCK_LOG_WARNING,
-                 "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
-                 "memory: iwheelctl why",
+                 "stop %u is not recorded: the process that writes recordings is %s; the frames around it are in "
+                 "memory only: iwheelctl why",
                  (unsigned)note->stop.number, why_not(box));
     }
 }
@@ -149,12 +149,12 @@ static void tell_result(const gw_box_t *box, sock_log_t *log) {
         sock_log(log, SOCK_LOG_INFO, "recorded in %s", result->path);
     } else if (result->number == 0U) {
         sock_log(log, SOCK_LOG_WARNING,
-                 "no recording can be written to %s: %s; %s, or name another place as [record] directory. Until then a "
-                 "stop is kept in memory only: iwheelctl why",
+                 "no recording can be written to %s: %s; %s, or set [record] directory to another place. Until then a "
+                 "stop is stored in memory only: iwheelctl why",
                  directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
     } else if (result->error != 0) {
         sock_log(
-            log, SOCK_LOG_WARNING, "stop %u is not recorded in %s: %s; %s, or name another place as [record] directory",
+            log, SOCK_LOG_WARNING, "stop %u is not recorded in %s: %s; %s, or set [record] directory to another place",
             (unsigned)result->number, directory, sock_folder_fault(result->error), sock_folder_cure(result->error));
     } else {
         sock_log(log, SOCK_LOG_INFO, "stop %u is recorded in %s (%u frames, %u.%u s before it)",

@@ -102,11 +102,11 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
 }
 
 void gw_bus_left_sentence(const iwl_bus_link_t *link, const char *bus, char *out_sentence, size_t size) {
-    static const char what[] = "a setpoint is still in the controller and may leave when wheels get power";
+    static const char what[] = "a setpoint is still in the controller and may be sent when wheels get power";
     if (link->presence == IWL_LINK_LOCAL) {
         (void)snprintf(out_sentence, size, "bus %s: %s; start its hub (the simulator) again", bus, what);
     } else if (!link->echo_proven) {
-        (void)snprintf(out_sentence, size, "bus %s: %s; this adapter gives nothing back: switch it off and on", bus,
+        (void)snprintf(out_sentence, size, "bus %s: %s; this adapter cannot be emptied: switch it off and on", bus,
                        what);
     } else {
         (void)snprintf(out_sentence, size,

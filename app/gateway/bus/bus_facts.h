@@ -29,7 +29,7 @@ const char *gw_bus_facts_timing(const inspect_config_t *config, const iwl_bus_li
 /// iwheel-can-restart@INTERFACE.path waits for it; it is disabled by default. The gateway detects the restart like any
 /// other: the bus goes down and up, and all queued frames are gone.
 ///
-/// Writes what it means, and what to do.
+/// Writes the meaning of that state, and the fix.
 void gw_bus_left_sentence(const iwl_bus_link_t *link, const char *bus, char *out_sentence, size_t size);
 
 /// Requests the restart. Returns false if it cannot: the directory does not exist or is not writable. It does not wait

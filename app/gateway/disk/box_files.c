@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// Reserves room on the disk, so that a full disk does not cost the recording of an accident.
+/// Reserves space on the disk, so that the recording of an accident is written even on a full disk.
 #define RESERVE    "reserve"
 #define DIGITS_MIN 6U
 #define DIGITS_MAX 10U
@@ -74,7 +74,7 @@ static uint32_t number_of(const char *name) {
     return (number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
-/// Calls `take` for each file. A directory that cannot be read has none.
+/// Calls `take` for each file. A directory that cannot be read counts as empty.
 static void visit(int directory, void (*take)(int directory, const char *name, void *context), void *context) {
     const int fd = openat(directory, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *list = (fd >= 0) ? fdopendir(fd) : NULL;

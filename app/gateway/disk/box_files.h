@@ -33,7 +33,7 @@ int gw_box_files_open(const char *directory);
 /// Returns the number after the highest existing one.
 uint32_t gw_box_files_next(int directory);
 
-/// Number of files that one pass over the directory reads: those of 10,900 recordings. More files take more passes.
+/// Number of files that one pass over the directory reads: those of 10,900 recordings. More files need more passes.
 /// Only existing files use memory.
 #define GW_BOX_SURVEYED 32768U
 
@@ -78,7 +78,7 @@ size_t gw_box_line_head(const gw_box_config_t *config, const gw_box_order_t *ord
 /// Second line: the stop. `in_motion`: a wheel turned, or was commanded to.
 size_t gw_box_line_stop(const gw_box_order_t *order, bool in_motion, char out_line[GW_BOX_LINE_SIZE]);
 
-/// Returns true if the first two lines of an event file say that no wheel turned or was commanded to. Recordings of
+/// Returns true if by the first two lines of an event file no wheel turned or was commanded to. Recordings of
 /// earlier versions are judged by the commanded speeds. A text without that information is not harmless.
 bool gw_box_line_is_harmless(const char *lines);
 
@@ -94,7 +94,7 @@ size_t gw_box_line_end(uint64_t frames, char out_line[GW_BOX_LINE_SIZE]);
 /// Process that writes the black box to disk. It waits for orders and writes each as a recording of three files
 ///
 ///     stop-000017-wheel_lost.log     the frames, in candump's log form
-///     stop-000017-wheel_lost.jsonl   the stop, and everything else that went into the core, one JSON object per line
+///     stop-000017-wheel_lost.jsonl   the stop, and all other inputs of the core, one JSON object per line
 ///     stop-000017-wheel_lost.conf    the configuration in force
 ///
 /// and returns the result. Only this process waits for a slow, full or missing disk.

@@ -17,7 +17,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define IS_ENDING "a name is one that recordings tells, with .log, .jsonl or .conf behind it"
+#define IS_ENDING "a name is one from the reply to recordings, followed by .log, .jsonl or .conf"
 
 /// A recording of the list.
 typedef struct {
@@ -56,8 +56,8 @@ static void finish(iwn_out_t *json, gw_box_answer_t *out) {
     memmove(out->text, out->text + 1, out->length);
 }
 
-/// Returns the recording with that name in the list. Adds it if there is room or it is newer than the oldest. Returns
-/// NULL if it is not in the list.
+/// Returns the recording with that name in the list. Adds it if the list is not full or it is newer than the oldest.
+/// Returns NULL if it is not in the list.
 static listed_t *place(list_t *list, const char *name, size_t stem) {
     const unsigned long number = strtoul(name + sizeof GW_BOX_PREFIX - 1U, NULL, 10);
     listed_t *oldest = &list->entry[0];
@@ -233,7 +233,7 @@ static int open_file(int directory, const char *name, int64_t *out_size) {
 static void answer_piece(int directory, const gw_box_question_t *question, gw_box_answer_t *out) {
     int64_t size = 0;
     if (gw_box_files_stem(question->name) == 0U) {
-        refuse(out, IWN_BAD_VALUE, "name is none of a recording's file: " IS_ENDING);
+        refuse(out, IWN_BAD_VALUE, "name is not that of a recording's file: " IS_ENDING);
         return;
     }
     if (question->offset < 0) {
@@ -242,7 +242,8 @@ static void answer_piece(int directory, const gw_box_question_t *question, gw_bo
     }
     const int fd = open_file(directory, question->name, &size);
     if (fd < 0 && errno == ENOENT) {
-        refuse(out, IWN_DENIED, "%s is not there (the oldest recordings are removed); ask for recordings",
+        refuse(out, IWN_DENIED,
+               "%s does not exist (the oldest recordings are removed); request the list with recordings",
                question->name);
     } else if (fd < 0) {
         refuse(out, IWN_DENIED, "%s is not read: %s", question->name,

@@ -16,7 +16,7 @@
 
 /// Interval of reading entries after the stop.
 #define FOLLOW_MS 50
-/// Number of attempts if another process takes a number.
+/// Number of attempts if another process uses a number first.
 #define TRIES 8U
 /// A faster wheel was in motion: the default of rest_rpm.
 #define REST_RPM 2
@@ -28,7 +28,7 @@ typedef struct {
     int fd;
     const blackbox_ring_t *ring;
     const gw_box_config_t *config;
-    blackbox_entry_t *copy; ///< Room for as many entries as the ring has.
+    blackbox_entry_t *copy; ///< Buffer for all entries of the ring.
     const gw_box_order_t *order;
     const char *bus; ///< Name in the file of frames.
     FILE *frames_file;
@@ -142,7 +142,7 @@ static void fill_files(writer_t *self) {
     write_entries(self, self->order->mark, since_us);
     flush(self);
     if (self->error != 0) {
-        return; // As early as possible, because the rest takes two seconds.
+        return; // As early as possible, because the rest needs two seconds.
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
@@ -177,8 +177,8 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     return self->error;
 }
 
-/// Makes room on a full disk for recording `number`. A stop at standstill costs neither the reserve nor the recording
-/// of a stop in motion.
+/// Frees space on a full disk for recording `number`. For a stop at standstill it removes neither the reserve nor the
+/// recording of a stop in motion.
 static bool make_room(const writer_t *self, int directory, uint32_t number) {
     return (self->in_motion && gw_box_files_release(directory)) ||
            gw_box_files_drop_oldest(directory, number, self->in_motion);
@@ -190,7 +190,7 @@ static void reserve(const writer_t *self, int directory) {
     gw_box_files_reserve(directory, (bytes < RESERVE_MAX) ? bytes : RESERVE_MAX);
 }
 
-/// Writes a recording. A full disk costs older recordings.
+/// Writes a recording. On a full disk it removes older recordings.
 static int write_recording(writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     if (directory < 0) {
@@ -260,7 +260,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
     (void)send(self->fd, &self->result, sizeof self->result, MSG_NOSIGNAL);
 }
 
-/// Reports it immediately, not when the first stop is lost.
+/// Reports an unusable directory immediately, not when the first stop is lost.
 static void try_directory(writer_t *self) {
     const int directory = gw_box_files_open(self->config->directory);
     self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
@@ -294,8 +294,9 @@ static void note_death(writer_t *self) {
     (void)snprintf(
         order.note.sentence, sizeof order.note.sentence,
         "the gateway died while setpoints were being sent, the last ones left %d mm/s and right %d mm/s; only "
-        "the wheels' own 1 s watchdog was left, at %llu.%03llu s; look for the reason in its log and in the "
-        "kernel's (dmesg), then start it again",
+        "the wheels' own 1 s watchdog could stop them (at %llu.%03llu s); read its log and the kernel's (dmesg) for "
+        "the "
+        "reason, then start it again",
         applied->wheel[IW_LEFT].speed_mm_s, applied->wheel[IW_RIGHT].speed_mm_s, ms / 1000U, ms % 1000U);
     carry_out(self, &order);
 }

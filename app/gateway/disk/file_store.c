@@ -77,7 +77,7 @@ static void tell_file(work_t *work) {
 }
 
 /// Writes a new file, flushes it to the disk, and renames it; never writes into an existing file. The directory is
-/// locked in the meantime, because the store process of a gateway that died may still write.
+/// locked meanwhile, because the store process of a gateway that died may still write.
 static int write_over(const work_t *work, int directory, size_t length) {
     const char *text = &work->message[1];
     (void)unlinkat(directory, work->fresh, 0);
@@ -163,7 +163,7 @@ bool gw_file_store_write(gw_file_store_t *self, const char *text, size_t length)
         return false;
     }
     const bool taken = say(self, SAY_WRITE, text, length);
-    self->waits = taken || errno != EAGAIN; // If the process has ended, that is the news.
+    self->waits = taken || errno != EAGAIN; // If the process has ended, the next news report it.
     return taken;
 }
 

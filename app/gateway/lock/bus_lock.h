@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// Ensures one gateway per bus, for every user and every socket, and that foreign processes cannot prevent it.
 ///
-/// There are two locks. A gateway takes both as far as it has the rights, and both end with the process:
+/// There are two locks. A gateway acquires both as far as it has the rights, and both end with the process:
 ///
 /// - a file that only root and the service can open (for an interface in the runtime directory, with the network
-///   namespace in its name; for a local bus beside its path): no foreign process can hold it
+///   namespace in its name; for a local bus next to its path): no foreign process can hold it
 /// - a name that all processes in the network namespace can read (bus_names.h): for gateways that cannot open the file
 ///
 /// A process that has one of them and may not run a gateway (owners.h) is reported, but does not prevent the start. One
@@ -30,10 +30,10 @@ typedef struct {
     iw_time_us_t look_us;
 } gw_bus_lock_t;
 
-/// Takes the lock of the bus with this configured name. Returns 0 or an errno; EWOULDBLOCK: another process has it.
+/// Acquires the lock of the bus with this configured name. Returns 0 or an errno; EWOULDBLOCK: another process has it.
 int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory);
 
-/// Checks the lock once per cycle. Returns true if this gateway must give the bus to `self->holder`.
+/// Checks the lock once per cycle. Returns true if this gateway must leave the bus to `self->holder`.
 bool gw_bus_lock_poll(gw_bus_lock_t *self, iw_time_us_t now_us);
 
 void gw_bus_lock_release(gw_bus_lock_t *self);

@@ -23,7 +23,7 @@
 #define LIST_US 50000U
 /// Size of the head of an attribute.
 #define HEAD ((size_t)4U)
-static_assert(HEAD == sizeof(struct nlattr), "values follow the head at once");
+static_assert(HEAD == sizeof(struct nlattr), "values follow the head directly");
 static_assert(sizeof(struct nlmsghdr) % HEAD == 0 && sizeof(struct unix_diag_msg) % HEAD == 0, "nothing is between");
 
 static void name_of(const gw_bus_names_t *self, uid_t uid, unsigned place, char out_name[GW_BUS_NAME_SIZE]) {
@@ -40,7 +40,7 @@ static socklen_t address_of(const char *name, struct sockaddr_un *out_address) {
     return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(name));
 }
 
-// What the kernel lists ----------------------------------------------------------------------------------------------
+// List of the kernel -------------------------------------------------------------------------------------------------
 
 /// Returns the owner of a socket with that name from one message of the list; NOBODY if the message is about another
 /// socket.
@@ -111,7 +111,7 @@ static uid_t owner_listed(const char *name) {
     return uid;
 }
 
-// Asking -------------------------------------------------------------------------------------------------------------
+// Identity of a holder -----------------------------------------------------------------------------------------------
 
 /// Connects to the name and reads the holder's identity from the kernel, at the time when it began to listen. Returns
 /// false if there is none.
@@ -154,7 +154,7 @@ static int bind_name(const char *name, int *out_fd) {
     return 0;
 }
 
-/// Takes the first free place. The holders of the places before it are checked later.
+/// Acquires the first free place. The holders of the places before it are checked later.
 static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
     char name[GW_BUS_NAME_SIZE];
     int error = EADDRINUSE;
@@ -166,7 +166,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             return error;
         }
         gw_holder_t holder;
-        if (!ask(name, &holder)) { // The name is taken by a socket that does not listen.
+        if (!ask(name, &holder)) { // A socket that does not listen has the name.
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }

@@ -2,8 +2,8 @@
 /// Names in the network namespace by which gateways find each other: abstract unix sockets. They need no directory, are
 /// visible across mount namespaces, and end with the process.
 ///
-/// Every process may take any name, so only the identity of its holder counts, which the kernel reports. A gateway
-/// takes the first free one of its places, and then checks the places of all users who may run a gateway:
+/// Every process may use any name, so only the identity of its holder counts, which the kernel reports. A gateway
+/// acquires the first free one of its places, and then checks the places of all users who may run a gateway:
 ///
 ///     place 0       KEY          for all users
 ///     places 1..3   KEY/UID/n    for one user, if foreign processes hold the places before
@@ -32,15 +32,15 @@ typedef struct {
 typedef struct {
     char key[GW_BUS_KEY_SIZE]; ///< Prefix of all names of this bus, with `@` for the zero byte.
     sock_owners_t owners;
-    unsigned place; ///< GW_BUS_PLACES if all places were taken.
+    unsigned place; ///< GW_BUS_PLACES if no place was free.
     int fd;         ///< Socket of the name; -1 if there is none.
 } gw_bus_names_t;
 
-/// Takes a name. Returns 0, EWOULDBLOCK if a process that may run a gateway serves this bus (`*out_holder`), or another
+/// Acquires a name. Returns 0, EWOULDBLOCK if a process that may run a gateway serves this bus (`*out_holder`), or another
 /// errno. `*out_stranger` is a process that may not and has a name. It waits for GW_BUS_PATIENCE_US at most.
 int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t *out_stranger);
 
-/// Answers processes that asked for this one's identity. Returns true and sets `*out_holder` if this process is neither
+/// Answers processes that query this one's identity. Returns true and sets `*out_holder` if this process is neither
 /// root nor the service and one of these has connected: that one does not wait. A few system calls; never waits.
 bool gw_bus_names_poll(gw_bus_names_t *self, gw_holder_t *out_holder);
 

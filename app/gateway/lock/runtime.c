@@ -45,7 +45,7 @@ static int explain(const gw_bus_lock_t *lock, const char *bus, int error, FILE *
         return EX_UNAVAILABLE;
     }
     (void)fprintf(err, "iwheel-gateway: cannot lock the bus with %s: %s; %s\n", lock->path, strerror(error),
-                  (error == ENOENT) ? "make its directory, or correct --can" : "correct --can, or start it again");
+                  (error == ENOENT) ? "create its directory, or correct --can" : "correct --can, or start it again");
     return EX_UNAVAILABLE;
 }
 
@@ -57,17 +57,18 @@ static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
     for (size_t i = 0; i < sizeof lock->stranger / sizeof lock->stranger[0]; i++) {
         if (lock->stranger[i].name[0] != '\0') {
             (void)fprintf(err,
-                          "%s %s holds %s, with which gateways lock %s; it is neither root nor the service, and keeps "
-                          "nobody from starting. See what it is: if it is a gateway, end it\n",
+                          "%s %s holds %s, with which gateways lock %s; it is neither root nor the service, and does "
+                          "not prevent a start. Find out what it is: if it is a gateway, end it\n",
                           prefix, describe(&lock->stranger[i], who), lock->stranger[i].name, bus);
         }
     }
     if (lock->fd < 0 && (owners->own == 0U || owners->own == owners->service)) {
-        (void)fprintf(err, "%s %s cannot be locked (%s); a second gateway on %s is noticed by its name only\n", prefix,
+        (void)fprintf(err, "%s %s cannot be locked (%s); a second gateway on %s is detected by its name only\n", prefix,
                       lock->path, strerror(lock->error), bus);
     }
     if (lock->fd < 0 && lock->names.fd < 0) {
-        (void)fprintf(err, "%s strangers hold every name that locks %s: a second gateway would not be noticed\n",
+        (void)fprintf(err,
+                      "%s foreign processes hold every name that locks %s: a second gateway would not be detected\n",
                       prefix, bus);
     }
 }

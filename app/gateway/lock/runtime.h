@@ -2,8 +2,8 @@
 /// Files of a running gateway: the lock of its bus, and the marker that reports a crash to the next start.
 ///
 /// The name of the marker contains the bus. Every gateway on that bus must find it, independent of its socket. For an
-/// interface it is in a directory that all gateways share, or beside the socket of a gateway that cannot write there;
-/// the gateway searches both. For `unix:PATH` it is beside PATH. A file of a foreign user (owners.h) does not count.
+/// interface it is in a directory that all gateways share, or next to the socket of a gateway that cannot write there;
+/// the gateway searches both. For `unix:PATH` it is next to PATH. A file of a foreign user (owners.h) does not count.
 #ifndef GATEWAY_RUNTIME_H
 #define GATEWAY_RUNTIME_H
 
@@ -24,7 +24,7 @@ typedef struct {
     bool unsure;                      ///< The last change failed.
 } gw_runtime_t;
 
-/// Takes the lock of `bus` and searches for the marker, also beside `socket`. `directory` is SOCK_RUNTIME_DIRECTORY
+/// Acquires the lock of `bus` and searches for the marker, also next to `socket`. `directory` is SOCK_RUNTIME_DIRECTORY
 /// except in tests, and must exist as long as `self`. Returns 0, or a sysexits code after it has printed cause and fix
 /// to `err`. It also prints a foreign process that has the lock.
 int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err);

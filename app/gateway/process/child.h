@@ -6,7 +6,7 @@
 ///
 ///     gateway <--messages, whole or not at all, through a socket that never blocks--> child
 ///
-/// There are three processes because a recording takes two seconds and megabytes, reading takes as long as a client
+/// There are three processes because a recording needs two seconds and megabytes, reading lasts as long as a client
 /// reads, and assumptions must be on the disk within a second. If one is killed, the others are not affected.
 ///
 /// A child inherits nothing of the gateway but its end of the socket: no stream, no folder, no descriptor. It ignores

@@ -39,15 +39,16 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
     name_unset(&config->core, unset, sizeof unset);
     if (config->core.listen_only) {
         inspect_say(findings, "config", INSPECT_OK,
-                    "it only listens: setpoint type, current role and track are not needed");
+                    "listen only: setpoint type, current role and track are not needed");
     } else if (unset[0] == '\0') {
         inspect_say(findings, "config", INSPECT_OK, "setpoint type %u, current role %s, track %u mm",
                     config->core.setpoint_type, (config->core.current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint",
                     config->core.track_mm);
     } else {
-        inspect_say(findings, "config", INSPECT_WARN, "%s not configured: it starts and listens, arm will be refused",
-                    unset);
-        inspect_cure(findings, "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
+        inspect_say(findings, "config", INSPECT_WARN,
+                    "%s not configured: the gateway starts and listens, arm will be refused", unset);
+        inspect_cure(findings,
+                     "set it under [wheels] in the configuration; if it is unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
     inspect_say(findings, "budget", INSPECT_OK,
@@ -87,11 +88,11 @@ static void cure_directory(const char *path, const char *key, int error, inspect
     const unsigned uid = (unsigned)geteuid();
     switch (error) {
     case ENOENT:
-        inspect_cure(findings, "make it: sudo mkdir -p %s; sudo chown %u %s", path, uid, path);
+        inspect_cure(findings, "create it: sudo mkdir -p %s; sudo chown %u %s", path, uid, path);
         break;
     case EACCES:
     case EPERM:
-        inspect_cure(findings, "sudo chown %u %s (or check as the user whom the service has)", uid, path);
+        inspect_cure(findings, "sudo chown %u %s (or run this check as the user of the service)", uid, path);
         break;
     case ENOTDIR:
         inspect_cure(findings, "correct %s in the configuration", key);
@@ -156,7 +157,7 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
         say_printed(text, INSPECT_WARN, findings);
     } else {
         inspect_say(findings, "socket", INSPECT_OK, "socket: directory %s %s", path,
-                    new ? "will be made" : "can be written");
+                    new ? "will be created" : "can be written");
     }
 }
 
@@ -165,7 +166,7 @@ static void judge_socket(const sock_listener_config_t *wanted, inspect_findings_
 static void judge_record(const char *path, inspect_findings_t *findings) {
     int error = 0;
     if (is_to_be_made(path, &error) && error == 0) {
-        inspect_say(findings, "record", INSPECT_OK, "record: directory %s will be made", path);
+        inspect_say(findings, "record", INSPECT_OK, "record: directory %s will be created", path);
         return;
     }
     const int directory = (error == 0) ? sock_folder_open_own(path) : -1;
@@ -180,12 +181,12 @@ static void judge_record(const char *path, inspect_findings_t *findings) {
         return;
     }
     inspect_say(findings, "record", INSPECT_WARN,
-                "record: directory %s: %s: it starts, stops are not recorded, no assumption is stored", path,
+                "record: directory %s: %s: the gateway starts, but records no stop and stores no assumption", path,
                 sock_folder_fault(error));
     cure_directory(path, "[record] directory", error, findings);
 }
 
-// Who may use what ----------------------------------------------------------------------------------------------------
+// Rights of groups ----------------------------------------------------------------------------------------------------
 
 /// Checks a group. `may`: rights of the group by this key of [northbound].
 static void judge_group(const char *key, const char *group, const char *may, inspect_findings_t *findings) {
@@ -193,7 +194,7 @@ static void judge_group(const char *key, const char *group, const char *may, ins
         inspect_say(findings, key, INSPECT_OK, "group %s may %s", group, may);
         return;
     }
-    inspect_say(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s keeps the gateway's own group",
+    inspect_say(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s will have the gateway's own group",
                 group, (strcmp(key, "watch_group") == 0) ? " for watching" : "");
     inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] %s to another, or to none", group, key);
 }
@@ -208,7 +209,7 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
         judge_group("group", config->northbound.group, "use the socket", findings);
     }
     if ((config->northbound.mode & S_IWOTH) != 0U) {
-        inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: everybody on this machine may move the wheels",
+        inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: every user of this machine may move the wheels",
                     (unsigned)config->northbound.mode);
         inspect_cure(findings, "set [northbound] mode = 0660");
     }

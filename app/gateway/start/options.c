@@ -97,12 +97,12 @@ int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FIL
             }
         } else if (!take_option(option, &options)) {
             (void)snprintf(what, sizeof what, "%s %s", arguments[optind - 1],
-                           (option == ':') ? "needs a value" : "is no option of this program");
+                           (option == ':') ? "needs a value" : "is not an option of this program");
             return misuse(err, what);
         }
     }
     if (optind < count) {
-        (void)snprintf(what, sizeof what, "what should \"%s\" mean? There are options only", arguments[optind]);
+        (void)snprintf(what, sizeof what, "\"%s\" is not an option; this program has options only", arguments[optind]);
         return misuse(err, what);
     }
     *out_options = options;

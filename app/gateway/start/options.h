@@ -8,7 +8,7 @@
 
 typedef enum { GW_RUN = 0, GW_CHECK, GW_PRINT_CONFIG, GW_VERSION, GW_HELP } gw_action_t;
 
-/// Options. Texts point into the arguments; NULL if not given.
+/// Options. Texts point into the arguments; NULL if the option is absent.
 typedef struct {
     gw_action_t action;
     const char *config_path;

@@ -26,9 +26,10 @@ static void report_angles(const gateway_config_t *config, sock_log_t *log) {
         log, SOCK_LOG_INFO,
         "angle budget, ramp: a wheel coasting %u.%u degrees, at %u mm/s2 assumed, not measured; late by 100 ms %u.%u",
         TENTHS(angles.coasting), GW_ANGLES_COAST_MM_S2, TENTHS(angles.late));
-    sock_log(log, SOCK_LOG_INFO,
-             "angle budget, unbounded: a wheel running on %u.%u degrees a second; up to %u.%u a second are not noticed",
-             TENTHS(angles.runs_on), TENTHS(angles.unnoticed));
+    sock_log(
+        log, SOCK_LOG_INFO,
+        "angle budget, unbounded: a wheel running on %u.%u degrees a second; up to %u.%u a second are not detected",
+        TENTHS(angles.runs_on), TENTHS(angles.unnoticed));
 }
 
 void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, sock_log_t *log) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// Compares battery and temperature of each wheel with thresholds of the operator. Faults are reported and never stop
-/// the wheels. There are no defaults, because the document gives no limits.
+/// the wheels. There are no defaults, because the document states no limits.
 ///
 ///     well --beyond the threshold for GW_HEALTH_US--> fault --within it for as long--> well
 ///     (a value that is not known changes nothing)

@@ -20,8 +20,8 @@
 #define GW_WARNING_SIZE 400U
 /// Warning about an e-stop line, by its name, whose button was never tested.
 #define GW_ESTOP_UNTRIED                                                                                               \
-    "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would go unseen; press " \
-    "it for a second, then release it"
+    "the button of the e-stop %s was never seen to work on this wiring, and a short to ground would not be "           \
+    "detected; press it for a second, then release it"
 
 /// Regularity of setpoint pairs: a histogram of the gaps between them, and the largest gap, since the gateway's start.
 ///
@@ -70,7 +70,7 @@ typedef struct gw_wheels {
 /// this one died while it sent setpoints.
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted);
 
-/// Returns a snapshot. Take a new one after a step or a request.
+/// Returns a snapshot. Call it again after a step or a request.
 iw_snapshot_t gw_wheels_look(const gw_wheels_t *self);
 
 /// Sets the time after a clock was read.

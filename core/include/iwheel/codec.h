@@ -151,7 +151,7 @@ const char *iw_codec_name(iw_codec_kind_t kind);
 iw_side_t iw_codec_side(uint32_t id);
 
 /// Decodes a frame into the values of its wheel and returns the kind of the message. If the frame is not a message, it
-/// returns the reason and leaves the values unchanged. It accepts a frame that is longer than the table says, and
+/// returns the reason and leaves the values unchanged. It accepts a frame that is longer than in the table, and
 /// ignores the bytes after that length.
 iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]);
 

@@ -14,7 +14,7 @@
 #define IW_SETPOINT_RADIUS_MM 192
 
 /// Ranges are inclusive. No value in a range disables a safety rule. `iw_config_check` refuses a value outside.
-/// Short members come first, because a Cortex-M reaches them by shorter instructions.
+/// Short members come first, because a Cortex-M addresses them with shorter instructions.
 typedef struct {
     uint8_t setpoint_type;          ///< Byte 0 of a setpoint. Valid only with `setpoint_type_set`: no documented value.
     bool setpoint_type_set;         ///< The wheels do not move until this is true.
@@ -36,15 +36,15 @@ typedef struct {
     uint16_t hold_max_s;      ///< Longest duration of the zeros for a wheel that still moves, 10..600.
     uint16_t wheel_silent_ms; ///< A wheel without telemetry for this time is lost, 20..200.
     uint16_t echo_ms;         ///< A setpoint without echo for this time is stalled, 20..200.
-    uint16_t rest_rpm;       ///< A wheel is at rest if |rpm| <= this, at most 60 mm/s at the wheel (iw_config_rest) ...
-    uint16_t rest_ms;        ///< ... for this time, 50..2000.
-    uint16_t follow_mm_s;    ///< A wheel that is faster than its applied speed by this, 50..500, at 192 mm radius ...
-    uint16_t follow_ms;      ///< ... for this time, 100..1000, causes a latch.
-    uint16_t blocked_ms;     ///< A wheel below 20 % of its command for this time, 200..2000, stops the pair.
-    uint16_t pair_mm;        ///< A deviation from the commanded path, right minus left, by this, 20..150 ...
-    uint16_t pair_leak_ms;   ///< ... within about this time, 500..3000, stops the pair.
-    uint16_t wheel_lag_ms;   ///< Time constant with which a wheel follows its setpoint, 10..300.
-    uint16_t max_yaw_mrad_s; ///< Largest yaw rate, 50..10000. The core scales faster commands by one factor.
+    uint16_t rest_rpm;        ///< A wheel is at standstill if |rpm| <= this, at most 60 mm/s (iw_config_rest) ...
+    uint16_t rest_ms;         ///< ... for this time, 50..2000.
+    uint16_t follow_mm_s;     ///< A wheel that is faster than its applied speed by this, 50..500, at 192 mm radius ...
+    uint16_t follow_ms;       ///< ... for this time, 100..1000, causes a latch.
+    uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this time, 200..2000, stops the pair.
+    uint16_t pair_mm;         ///< A deviation from the commanded path, right minus left, by this, 20..150 ...
+    uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000, stops the pair.
+    uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
+    uint16_t max_yaw_mrad_s;  ///< Largest yaw rate, 50..10000. The core scales faster commands by one factor.
     uint16_t yaw_accel_mrad_s2; ///< Largest growth of the yaw rate by a drive command, 100..10000. It slows no stop.
     uint16_t track_mm;          ///< Distance between the wheels, 200..1500. 0: not configured, the wheels do not move.
     uint16_t radius_mm;         ///< Radius of the wheel, 60..400. Document: "approximately 192".
@@ -110,7 +110,7 @@ iw_config_range_t iw_config_range(iw_config_fault_t field);
 /// Values of `rest_rpm` for the radius and the gear of a configuration.
 typedef struct {
     uint16_t standard; ///< Default: the largest rpm of telemetry that is at most 45 mm/s at the wheel, at least 1.
-    uint16_t max;      ///< Limit: the same for 60 mm/s. With more, a rolling wheel would count as at rest.
+    uint16_t max;      ///< Limit: the same for 60 mm/s. Above it a rolling wheel would count as at standstill.
 } iw_config_rest_t;
 /// Returns the values of `rest_rpm` for a configuration whose radius, gear and gear ratio are within their ranges. A
 /// caller that changes these sets `rest_rpm` to `standard`.

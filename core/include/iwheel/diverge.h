@@ -3,7 +3,7 @@
 /// Compares the path of the pair with the commanded path. The rules of follow.h judge each wheel alone, but a machine
 /// on two wheels turns when only one of them deviates.
 ///
-///     applied --lag--> expected;   measured - expected, less what is ordinary, of each wheel
+///     applied --lag--> expected;   measured - expected, less ordinary differences, of each wheel
 ///     right - left --integral, leaking--> deviation from the commanded path;   beyond pair_mm: it diverges
 ///
 /// The expected speed follows the applied speed as a first-order system with the time constant `wheel_lag_ms`. Ordinary

@@ -6,7 +6,7 @@
 /// and "only has sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its
 /// own offset only in its first 60 s. The offset therefore has a provenance, and a bad offset is not used.
 ///
-///     OPEN --40 samples without a gap--> judged: GOOD -> its mean becomes ESTIMATED, unless there is something better
+///     OPEN --40 samples without a gap--> judged: GOOD -> its mean becomes ESTIMATED, unless there is a more trusted one
 ///       ^                                  any other (contaminated) -> no value from it
 ///       +--- wheel rebooted
 ///
@@ -15,7 +15,7 @@
 /// a reboot WHEEL and ESTIMATED become STORED. If the start of the wheel was observed, the core uses the wheel's offset
 /// only after its own window over the same two seconds was judged GOOD.
 ///
-/// Observation of the unit: at rest, the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0
+/// Observation of the unit: at standstill, the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0
 /// (offset already removed). Its effect on the force:
 ///
 /// | observation                | without a tare             | after a tare               |
@@ -28,7 +28,7 @@
 /// The core never rescales a force. `iw_snapshot_force_validity` also considers the assumption store: the operator and
 /// earlier runs.
 ///
-/// The document gives no thresholds; we chose them.
+/// The document has no thresholds; we chose them.
 #ifndef IW_FORCE_OFFSET_H
 #define IW_FORCE_OFFSET_H
 
@@ -80,7 +80,7 @@ typedef enum {
     IW_UNIT_UNKNOWN = 0, ///< No wheel offset, a wheel offset that is too small, or no good window.
     IW_UNIT_CN,
     IW_UNIT_DN,
-    IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at rest although the offset is not.
+    IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at standstill although the offset is not.
     IW_UNIT_UNCLEAR,        ///< None of these: there was a load during one of the two measurements.
 } iw_unit_observation_t;
 
@@ -115,10 +115,10 @@ typedef struct {
 } iw_force_quality_t;
 
 /// State of the force on one wheel. Read it through the functions below. Short members come first, because a Cortex-M
-/// reaches them by shorter instructions.
+/// addresses them with shorter instructions.
 typedef struct {
     uint8_t count;                           ///< Number of samples in the ring.
-    uint8_t still;                           ///< Number of newest samples in a row from a wheel at rest.
+    uint8_t still;                           ///< Number of newest samples in a row from a wheel at standstill.
     uint8_t next;                            ///< Index of the next sample.
     bool wheel_offset_heard;                 ///< The wheel has sent its offset in this run.
     bool boot_seen;                          ///< The start of this run was observed.
@@ -147,7 +147,7 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen);
 /// Sets `offset_us` to IW_NEVER. `offset_mN` is within +/- IW_FORCE_OFFSET_MAX_mN.
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
-/// Receives a force message. `still`: the wheel is at rest.
+/// Receives a force message. `still`: the wheel is at standstill.
 void iw_force_receive(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still);
 
 /// Receives an offset message.

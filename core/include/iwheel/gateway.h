@@ -7,7 +7,7 @@
 /// The owner calls `iw_gateway_step` when a frame arrives, when the e-stop line has an edge, and at the latest at the
 /// time that the last step returned; more calls do no harm. Requests are calls between steps in the same thread of
 /// execution. A step directly after a request sends its result without delay. The commands to the wheels depend only on
-/// configuration, times, frames and requests: the same recording gives the same bytes on every port.
+/// configuration, times, frames and requests: the same recording causes the same bytes on every port.
 ///
 /// The core uses no heap, no floating point and no file-scope state. docs/developer/sizes.md has the size of
 /// `iw_gateway_t`.
@@ -63,7 +63,7 @@ typedef struct {
 } iw_applied_t;
 
 /// State of the controller. Only the core may use its members; snapshot.h has the values that others may read. Short
-/// members come first, because a Cortex-M reaches them by shorter instructions.
+/// members come first, because a Cortex-M addresses them with shorter instructions.
 typedef struct iw_gateway {
     iw_bus_state_t bus;   ///< State of the bus in this step.
     iw_bus_facts_t facts; ///< The last facts from the port.

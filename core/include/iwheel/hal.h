@@ -31,7 +31,7 @@ typedef struct {
     ///
     ///     > 0  Number of accepted frames, counted from the first; the port refused the rest. Only the echo proves that
     ///          a frame was sent.
-    ///     0    The port accepted none: there is no room for the first frame now.
+    ///     0    The port accepted none: it has no free buffer for the first frame now.
     ///     < 0  The port accepted none: the bus is lost.
     ///
     /// The port neither retries nor stores a refused frame. If it accepts one frame of two, the core treats the pair as

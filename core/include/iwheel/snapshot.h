@@ -7,9 +7,9 @@
 ///     iw_gateway_snapshot(&gateway, now_us, &now);
 ///     if (now.state == IW_STATE_ARMED && now.wheel[IW_LEFT].heard) { ... now.wheel[IW_LEFT].speed_mm_s ... }
 ///
-/// The values are those at the time of the call: take a new snapshot after a step or a request. A pointer refers to the
-/// gateway's own data: it is valid as long as the gateway, and reading it always gives the present values. A step does
-/// not update a snapshot, so only callers that take one pay for it.
+/// The values are those at the time of the call: call `iw_gateway_snapshot` again after a step or a request. A pointer
+/// refers to the gateway's own data: it is valid as long as the gateway, and always shows the present values. A step
+/// does not update a snapshot, so only callers of `iw_gateway_snapshot` pay for it.
 #ifndef IW_SNAPSHOT_H
 #define IW_SNAPSHOT_H
 
@@ -78,7 +78,7 @@ typedef struct {
     uint32_t assumed_changes; ///< Increases with every change of an assumption.
     int32_t pair_mm;          ///< Deviation from the commanded path, right minus left; positive turns left.
     int32_t pair_largest_mm;  ///< Largest deviation in either direction since ARMED began.
-    uint32_t still_moving;    ///< Number of holds that ended after `hold_max_s` with a wheel not at rest.
+    uint32_t still_moving;    ///< Number of holds that ended after `hold_max_s` while a wheel still turned.
     iw_state_t state;         ///< State that the gateway reports to clients.
     iw_refusal_t arm_refusal; ///< Reason why the last arming failed.
     iw_demand_t demand;       ///< Target of the scheduler since the last step.

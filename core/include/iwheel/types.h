@@ -19,7 +19,7 @@
 /// Monotonic time in microseconds since any fixed instant. It does not wrap in the life of a device.
 typedef uint64_t iw_time_us_t;
 
-/// Later than every time. It stands for "no wake-up needed" and "never happened".
+/// Later than every time. It means "no wake-up needed" or "never happened".
 #define IW_NEVER UINT64_MAX
 
 #define IW_US_PER_MS 1000U ///< Microseconds in a millisecond.
@@ -63,7 +63,7 @@ typedef enum {
     IW_ROLE_SETPOINT, ///< A setpoint. A zero command is 0/0. The current ramps with the speed, and `invert` negates it.
 } iw_current_role_t;
 
-/// Unit of a wheel's raw normal force. The document says cN for the left and dN for the right wheel.
+/// Unit of a wheel's raw normal force. In the document it is cN for the left and dN for the right wheel.
 typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
 
 /// Id of a client. The owner of the gateway chooses it and never reuses it for another connection.

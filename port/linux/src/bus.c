@@ -165,7 +165,7 @@ int iwl_bus_send(iwl_backend_store_t *store, const iw_can_frame_t *frames, uint3
     return result;
 }
 
-/// Takes the next frame of the batch that is not an error frame. Returns false if there is none.
+/// Removes the next frame that is not an error frame from the batch. Returns false if there is none.
 static bool take(iwl_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
     while (!iwl_socketcan_socket_is_empty(from)) {
         const uint32_t i = from->next++;

@@ -56,7 +56,7 @@ typedef struct {
 
 /// A kind of bus. Its functions are those of backend.h. Frames do not pass through them.
 typedef struct iwl_bus_kind {
-    /// All of `self` after this struct is zero. If it fails, it closes what it has opened.
+    /// All of `self` after this struct is zero. If it fails, it closes every descriptor that it has opened.
     int (*open)(iwl_bus_t *self, const char *name);
     void (*close)(iwl_bus_t *self);
     void (*poll)(iwl_bus_t *self);

@@ -18,7 +18,7 @@
 #define REPLIES_MAX 8
 /// Largest number of events read in one call.
 #define EVENTS_MAX 64
-/// The description of a CAN interface takes about 2 KiB.
+/// The description of a CAN interface needs about 2 KiB.
 #define REPLY_SIZE 16384U
 /// Number and interval of attempts to bring an interface up.
 #define TRIES_MAX 60
@@ -132,7 +132,7 @@ int iwl_netlink_set_up(iwl_netlink_t *self, int index, bool up) {
     return ask(self, request, NULL);
 }
 
-/// An interface that this process took down must not stay down because its adapter answers slowly, so it tries again.
+/// An interface that this process set down must not stay down because its adapter answers slowly, so it tries again.
 /// ENODEV: the interface is gone.
 static int restart(int interface) {
     iwl_netlink_t netlink;

@@ -47,10 +47,10 @@ int iwl_netlink_set_up(iwl_netlink_t *self, int index, bool up);
 /// Parses a message of type RTM_NEWLINK. Pure function. Returns false if it is malformed.
 bool iwl_netlink_parse(const struct nlmsghdr *message, iwl_netlink_reading_t *out_reading);
 
-/// Takes an interface down and up again in a separate process: with some adapters that takes seconds, and the loop must
-/// not wait for it.
+/// Sets an interface down and up again in a separate process: some adapters need seconds for it, and the loop must not
+/// wait.
 ///
-///     start --> RUNNING --poll--> ended: 0 done, or why not
+///     start --> RUNNING --poll--> ended: 0 done, or an errno
 ///
 /// The process inherits no descriptors, and continues if the gateway ends: it brings the interface up again, and tries
 /// that once a second for a minute.
@@ -72,8 +72,8 @@ int iwl_netlink_restart_poll(pid_t process);
 /// interface counts as up only when its setup is complete.
 iwl_link_presence_t iwl_netdev_presence(int fd, const char *name, int *out_index);
 
-/// Returns 1 if the controller takes part in the bus, 0 if it does not (for a CAN controller that is up: bus-off), < 0
-/// if unknown.
+/// Returns 1 if the controller participates in the bus, 0 if not (for a CAN controller that is up: bus-off), < 0 if
+/// unknown.
 int iwl_netdev_carrier(const char *name);
 
 #endif

@@ -9,7 +9,7 @@
 /// index and needs new sockets. DOWN: `up` is false. The sockets stay open, because closing them may wait for a process
 /// that configures interfaces (netlink.h); their frames are dropped. bus.h describes the states within UP.
 ///
-///     purge: NONE --asked: child process takes the link down and up--> RESTARTING --> DONE | NOT_ALLOWED | FAILED
+///     purge: NONE --requested: a process sets the link down and up--> RESTARTING --> DONE | NOT_ALLOWED | FAILED
 ///
 /// `restarting` is that process. While it runs, UP changes to DOWN and back as above: this loss is the result of the
 /// purge for the core, and `link.purge` is only displayed. NOT_ALLOWED is final; after DONE and FAILED a purge may be
@@ -217,9 +217,9 @@ static void can_poll(iwl_bus_t *bus) {
     (void)iwl_bus_load_take(&bus->load, bus->now_us, bus->link.bitrate_hz, &bus->link.load_permille);
 }
 
-/// Takes the link down and up, which empties the queue and the controller. It may take seconds, so the result is
-/// "begun", and the loss of the bus reports the end. Not if echoes are unproven: an slcan adapter would retain its old
-/// frames, and only the zeros after them would be lost.
+/// Sets the link down and up, which empties the queue and the controller. That may need seconds, so the result is
+/// "begun", and the loss of the bus reports the end. Does nothing if echoes are unproven: an slcan adapter would retain
+/// its old frames, and only the zeros after them would be lost.
 static int can_purge(iwl_bus_t *bus) {
     socketcan_t *can = can_of(bus);
     if (bus->link.purge == IWL_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {

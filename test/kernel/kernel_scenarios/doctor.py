@@ -37,7 +37,7 @@ def doctor_on_vcan(t):
     line = ("--config", rig.path("gateway.conf"), "--estop", rig.estop_line())
     code, checks = doctor(rig, rig.interface, *line)
     t.check(code == 0, f"exit code {code}: {checks}")
-    expect(t, checks, "kernel", "ok", "CAN sockets are there")
+    expect(t, checks, "kernel", "ok", "CAN sockets are available")
     expect(t, checks, "interface", "ok", "is up")
     expect(t, checks, "left_wheel", "ok", "speed")
     expect(t, checks, "right_wheel", "ok", "pose")

@@ -105,8 +105,8 @@ def memory_of_another_configuration(t):
     t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "the radius is open again")
     t.check(status["left"]["offset_origin"] != "operator", "a tare in another unit is no zero")
     log = rig.gateway.text()
-    t.check("wheel_radius: what was found before was for 192, and 180 is configured now: forgotten" in log, "told: radius")
-    t.check("stored force offset was taken in another force_unit: forgotten" in log, "told: offset")
+    t.check("wheel_radius: the stored result was for 192, and 180 is configured now: dropped" in log, "told: radius")
+    t.check("stored force offset was measured in another force_unit: dropped" in log, "told: offset")
     t.judge(rig, moves=False)
 
 
@@ -172,7 +172,7 @@ def settled(path):
 @scenario("a damaged, foreign or forged file is told, ignored and set aside", 24)
 def memory_that_is_not_to_be_trusted(t):
     rig, client = t.running()
-    for spoil, fault in ((damage, "it is damaged"), (replace, "it is damaged"), (forge, "it holds what no gateway has measured")):
+    for spoil, fault in ((damage, "it is damaged"), (replace, "it is damaged"), (forge, "it contains values that no gateway can have measured")):
         t.expect(client.request("confirm", item="wheel_radius"))
         t.check(written(rig, '"wheel_radius"'), "written")
         time.sleep(1.3)
@@ -226,6 +226,6 @@ def memory_without_a_place(t):
     status = client.request("status")
     t.check(status["memory"]["state"] == "failed", f"a dead keeper is told: {status['memory']}")
     t.check(status["ledger"]["mount_sign_left"]["state"] == "confirmed", "what is known stays known in this run")
-    t.check(rig.gateway.text().count("is not kept in") == 2, "each once")
+    t.check(rig.gateway.text().count("are not stored in") == 2, "each once")
     client.request("stop")
     t.judge(rig)

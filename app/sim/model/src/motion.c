@@ -44,7 +44,7 @@ static int64_t coasting(const sim_motion_t *self, int64_t speed_um_s, int64_t dt
     return pulled - clamp(pulled, friction);
 }
 
-/// Returns the acceleration that the current gives, in mm/s2, with the sign of the current.
+/// Returns the acceleration by the current, in mm/s2, with the sign of the current.
 static int64_t torque_mm_s2(const sim_motion_t *self) {
     int64_t const current = clamp(self->setpoint.current_mA, IW_CURRENT_LIMIT_mA);
     return (int64_t)self->config.accel_mm_s2 * current / IW_CURRENT_LIMIT_mA;

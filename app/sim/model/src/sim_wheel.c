@@ -9,7 +9,7 @@
 #define CPU_NOISE_PERCENT    3
 #define CPU_DRIVEN_PERCENT   6U
 #define RPM_DITHER           1000U
-/// Delay of the right wheel, so that the frames of both wheels do not come at the same instant.
+/// Delay of the right wheel, so that both wheels do not send at the same instant.
 #define PHASE_RIGHT_US 1300U
 
 static const uint32_t period_us[SIM_TELEMETRY_KINDS] = {4000U, 40000U, 40000U, 50000U, 1000000U};

@@ -8,9 +8,9 @@
 ///         | +----------- LISTENING               REARMING <--------------- arm ----------- HOLDING --held--> LISTENING
 ///         |                                         | failed                                 ^
 ///         |                                         +----------------------------------------+
-///         |   RESTARTING --held, or somebody else drives--> LISTENING
+///         |   RESTARTING --held, or another master drives--> LISTENING
 ///         |
-///         |   any of them --latching cause--> CUT --held--> LATCHED;  from LISTENING at once: LATCHED
+///         |   any of them --latching cause--> CUT --held--> LATCHED;  from LISTENING directly: LATCHED
 ///         +------------------------------- reset ------------- CUT, LATCHED
 ///
 /// Arming fails if TX is not confirmed in time, and by any stop, disarm or cause. If arm follows a stop before a step
@@ -26,7 +26,7 @@
 ///
 /// A table defines the effect of each cause. Some causes latch in every state. Some latch while setpoints are sent;
 /// otherwise they only refuse arm and reset while they are present. Some only stop. RESTARTING sends zeros on behalf of
-/// a process that died, so only causes that latch in every state latch there.
+/// a process that died. There only causes that latch in every state latch.
 ///
 /// With `iw_config_t::hold` (R19) time ends neither HOLDING nor CUT, RESTARTING becomes HOLDING, and `reset` leads from
 /// CUT to HOLDING. The hold ends by a setpoint of another sender, by `iw_permit_release`, and by the end of the
@@ -41,7 +41,7 @@
 
 /// A cause that is an event counts as gone after this time without a new one.
 #define IW_PERMIT_EVENT_US 1000000U
-/// The core sends zeros until both wheels were at rest for this time ...
+/// The core sends zeros until both wheels were at standstill for this time ...
 #define IW_PERMIT_SETTLED_US 500000U
 /// ... but at most for `hold_max_s`, and against a second master at most for this time.
 #define IW_PERMIT_CONTESTED_US 10000000U
@@ -69,8 +69,8 @@ typedef enum {
 /// Facts that the owner has found in this step.
 typedef struct {
     bool heard;        ///< Both wheels are online.
-    bool at_rest;      ///< Both wheels were at rest for rest_ms.
-    bool settled;      ///< Both wheels were at rest for IW_PERMIT_SETTLED_US.
+    bool at_rest;      ///< Both wheels were at standstill for rest_ms.
+    bool settled;      ///< Both wheels were at standstill for IW_PERMIT_SETTLED_US.
     bool output_zero;  ///< The last pair was zero, or none was sent since the last pause.
     bool timing_ok;    ///< The bus timing is not contradicted.
     bool can_send;     ///< The sender could send a zero to both wheels now.
@@ -78,7 +78,7 @@ typedef struct {
     iw_pair_t applied; ///< Last pair, in the machine's frame.
 } iw_permit_view_t;
 
-/// State of the permission. Short members come first, because a Cortex-M reaches them by shorter instructions.
+/// State of the permission. Short members come first, because a Cortex-M addresses them with shorter instructions.
 typedef struct {
     const iw_config_t *config;   ///< Configuration of the owner.
     iw_phase_t phase;            ///< State of the diagram.
@@ -87,14 +87,14 @@ typedef struct {
     bool quiet;                  ///< No latching cause is present or recent, so a step need not search for one.
     bool at_once;                ///< In BRAKING, CUT and the states after them: zero without ramp.
     bool until_release;          ///< Only a release ends the next zeros; time does not.
-    bool latch_until_release;    ///< Value of `until_release` after the next latch. False once the gateway ends.
+    bool latch_until_release;    ///< Value of `until_release` after the next latch. False after the gateway has begun to end.
     iw_permit_view_t view;       ///< Facts of the last step, written by the owner. Requests are judged by them.
     iw_client_t stale_client;    ///< Client of the last nonzero drive command.
     iw_client_t holder;          ///< Lease holder; IW_CLIENT_NONE if there is none.
     iw_client_t blocked;         ///< Client whose wheels did not follow at the last stop: refused until the hold ends.
     uint32_t raised;             ///< Bit mask of causes that were raised since the last step.
     uint32_t present;            ///< Bit mask of causes that were raised in the step before.
-    uint32_t still_moving;       ///< Number of holds that ended after `hold_max_s` with a wheel not at rest.
+    uint32_t still_moving;       ///< Number of holds that ended after `hold_max_s` while a wheel still turned.
     iw_time_us_t armed_us;       ///< Time at which ARMED began or the lease was taken over: older commands are stale.
     iw_time_us_t lease_from_us;  ///< Time of the last accepted drive command, or of arm.
     iw_time_us_t lease_until_us; ///< End of the lease, unless another drive command arrives.
@@ -153,7 +153,7 @@ iw_demand_t iw_permit_demand(const iw_permit_t *self);
 
 /// Requests ARMED for `client`. Returns IW_REFUSE_NONE if arming has begun, or if the client already holds the lease,
 /// which does not extend it. With `takeover` the lease of another client moves to `client` if the output is zero and
-/// both wheels are at rest.
+/// both wheels are at standstill.
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
 /// Judges a well-formed drive command. Returns IW_REFUSE_NONE if it is accepted, and extends the lease. Stores the time

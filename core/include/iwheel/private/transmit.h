@@ -134,7 +134,7 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
 /// Returns true if the pair may be sent now: to both wheels, or if it is `zero`, to at least one wheel.
 bool iw_sender_ready(const iw_sender_t *self, bool zero);
 
-/// Sends the pair, given in the machine's frame, to the wheels that may receive it.
+/// Sends the pair to the wheels that may receive it. `pair` is in the machine's frame.
 iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_time_us_t now_us, bool zero);
 
 /// Reports that nothing is sent any more: the next pair starts the measurement of gaps, and refused frames are cleared.

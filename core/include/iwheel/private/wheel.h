@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// @file
-/// State of one wheel: its last values, their age, and whether it is online, at rest, or has rebooted.
+/// State of one wheel: its last values, their age, and whether it is online, at standstill, or has rebooted.
 ///
 /// A wheel is online if its speed message (4 ms) arrives, because the safety rules judge that message. Other messages
 /// do not count.
@@ -43,7 +43,7 @@ typedef enum {
     IW_REBOOT_OFFSET_FRAMES,
 } iw_reboot_t;
 
-/// State of a wheel. Short members come first, because a Cortex-M reaches them by shorter instructions.
+/// State of a wheel. Short members come first, because a Cortex-M addresses them with shorter instructions.
 typedef struct {
     const iw_config_t *config;      ///< Configuration of the owner.
     iw_side_t side;                 ///< Side of this wheel.
@@ -56,7 +56,7 @@ typedef struct {
     iw_time_us_t received_until_us; ///< Without another speed message the wheel is online until this time; 0 if none.
     iw_time_us_t speed_us;          ///< Time of the last speed message.
     iw_time_us_t status_us;         ///< Time of the last status message.
-    iw_time_us_t rest_since_us;     ///< Start of the speed messages at rest without a gap; IW_NEVER if it moves.
+    iw_time_us_t rest_since_us;     ///< Start of the run of speed messages at standstill; IW_NEVER if the wheel moves.
     iw_time_us_t excused_us;        ///< End of the last stall of the gateway: missing frames before it do not count.
     int64_t ticks; ///< Odometry without wraps since the first status message, in the wheel's direction.
     /// Distance of one tick in the machine's frame: negative if `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64
@@ -73,7 +73,7 @@ typedef struct {
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
 /// Receives a message of this wheel; `told` has its values. `fresh` is false in a late step, in which reception times
-/// are unknown. The values are then stored, but the wheel does not become online and no run of rest begins.
+/// are unknown. The values are then stored, but the wheel does not become online and no standstill begins.
 void iw_wheel_receive(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
                       bool fresh);
 

@@ -17,7 +17,7 @@
 
 /// Storage for the state of any backend, so that its owner need not know the size.
 typedef union {
-    uint64_t align;      ///< Gives the strictest alignment that a backend needs.
+    uint64_t align;      ///< Sets the strictest alignment that a backend needs.
     uint8_t bytes[8192]; ///< State of the backend.
 } iwl_backend_store_t;
 
@@ -98,7 +98,7 @@ typedef struct {
     /// Returns the identity of the line while it can be read, otherwise NULL. The function pointer is NULL for kinds
     /// without identity.
     const iwl_estop_seen_t *(*seen)(const void *self);
-    bool simulated; ///< Not a real button. Every display of the e-stop says so.
+    bool simulated; ///< Not a real button. Every display of the e-stop shows that.
     bool present;   ///< False if there is no e-stop: always released.
 } iwl_estop_ops_t;
 

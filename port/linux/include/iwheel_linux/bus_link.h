@@ -2,7 +2,7 @@
 /// @file
 /// State of the link to the bus as the kernel reports it, and the check of its bit timing.
 ///
-/// The port reads this state and never changes it, except for a purge (hal.h), which takes the link down and up.
+/// The port reads this state and never changes it, except for a purge (hal.h), which sets the link down and up.
 #ifndef IWHEEL_LINUX_BUS_LINK_H
 #define IWHEEL_LINUX_BUS_LINK_H
 
@@ -21,9 +21,9 @@ typedef enum {
 /// Result of the last purge.
 typedef enum {
     IWL_LINK_PURGE_NONE = 0,    ///< There was no purge.
-    IWL_LINK_PURGE_DONE,        ///< The link was taken down and up.
+    IWL_LINK_PURGE_DONE,        ///< The link was set down and up.
     IWL_LINK_PURGE_NOT_ALLOWED, ///< CAP_NET_ADMIN is missing.
-    IWL_LINK_PURGE_FAILED,      ///< Taking the link down or up failed: see the presence.
+    IWL_LINK_PURGE_FAILED,      ///< Setting the link down or up failed: see the presence.
 } iwl_link_purge_t;
 
 /// State of the link. Numbers that are 0 are not reported by the kernel.

@@ -2,17 +2,17 @@
 /// Motion of one wheel: its last setpoint, the time for which the setpoint is valid, and the response of the wheel.
 ///
 /// The wheel approaches a commanded speed as a first-order system with the time constant `response_us`, never faster
-/// than the torque of the current allows: 2000 mA give `accel_mm_s2`. Speeds are those of the wheel's firmware, which
+/// than the torque of the current allows: 2000 mA result in `accel_mm_s2`. Speeds are those of the wheel's firmware, which
 /// assumes a radius of 192 mm. A wheel with another radius really moves faster or slower (`sim_motion_true_mm_s`).
 ///
-/// Choices of this model where the document gives no rule:
+/// Choices of this model where the document has no rule:
 /// - 1 s after its last setpoint the wheel coasts: friction alone (`coast_mm_s2`) brings it to standstill.
 /// - Current as a limit: 0 mA means no torque, and the wheel coasts.
 /// - Current as a setpoint: with a speed, the absolute value of the current bounds the torque. Speed 0 with a current
 ///   is torque without a speed to hold, so the wheel runs. 0/0 coasts.
 /// - The unit of the acceleration field is rpm/s.
 /// - The controller holds the wheel on a slope as far as the torque suffices. A slope moves a wheel that coasts. The
-///   speed that a load costs is the droop.
+///   droop is the loss of speed by a load.
 /// - A kerb reduces the speed by a share for its whole duration, which includes the recovery of the wheel.
 /// - The yaw inertia of the machine passes a share of one wheel's motor to the other wheel (pair.h). Straight driving
 ///   is the same as without it; turning is slower by (1 + share) / (1 - share).
@@ -60,7 +60,7 @@ typedef struct {
     iw_codec_setpoint_t setpoint;
     int16_t runaway_mm_s;    ///< Fault: a driven wheel is faster than its setpoint by this; 0: no fault.
     uint16_t droop_permille; ///< Share of the setpoint that the settled wheel lacks; up to 1000.
-    uint16_t kerb_permille;  ///< Share of the speed that a kerb takes; up to 1000.
+    uint16_t kerb_permille;  ///< Share of the speed that is lost at a kerb; up to 1000.
     bool driven;             ///< The last setpoint is still valid.
     bool freewheels;         ///< Fault: the motor does not act on the wheel.
     bool blocked;            ///< Fault: the wheel cannot turn.
@@ -81,7 +81,7 @@ bool sim_motion_receive(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_
 /// Ends the setpoint because the wheel loses power or its firmware starts again. The wheel coasts.
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us);
 
-/// Turns the wheel by hand by `way_mm` at the real radius, in the wheel's own sense of rotation. The distance is added
+/// Turns the wheel by hand by `way_mm` at the real radius, in the wheel's own direction of rotation. The distance is added
 /// to the distance that is left.
 void sim_motion_push(sim_motion_t *self, iw_time_us_t now_us, int32_t way_mm);
 

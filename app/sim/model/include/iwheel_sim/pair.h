@@ -2,8 +2,8 @@
 /// A pair of simulated iWheels: frames in, frames out.
 ///
 /// Pure and deterministic: no I/O, no clock, no heap, no floating point. Time is an argument, and random numbers come
-/// from the seed: the same configuration, seed, frames and times give the same bytes, however often `sim_pair_step` is
-/// called in between. One instance belongs to one thread; it may be copied. To read speed or position at an instant,
+/// from the seed: the same configuration, seed, frames and times result in the same bytes, independent of the number of
+/// calls of `sim_pair_step` in between. One instance belongs to one thread; it may be copied. To read speed or position at an instant,
 /// advance a copy of `wheel[side].motion`.
 ///
 ///     sim_pair_init(&pair, NULL, now_us, seed);
@@ -60,8 +60,8 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent);
 /// Returns the time of the next action of `sim_pair_step`; IW_NEVER without power.
 iw_time_us_t sim_pair_next_us(const sim_pair_t *self);
 
-/// Passes a frame that was on the bus to the wheels. Before the call, `sim_pair_step` must have returned all that is
-/// due before `now_us`. Frames without a meaning for the wheels are ignored: other ids, remote, extended, FD, error,
+/// Passes a frame that was on the bus to the wheels. Before the call, `sim_pair_step` must have returned all frames that
+/// are due before `now_us`. Frames without a meaning for the wheels are ignored: other ids, remote, extended, FD, error,
 /// too short.
 void sim_pair_receive(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 

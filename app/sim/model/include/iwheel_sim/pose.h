@@ -5,7 +5,7 @@
 /// The right wheel trusts these frames. A left wheel without speed frames for more than 50 ms counts as at standstill,
 /// and a forged frame or a mirrored wheel makes the pose wrong. Both wheels turn forward with positive speed unless
 /// `mirrored` is set. X and Y saturate at +/-32.767 m, PSI wraps at 65.536 rad (choices of this model; the document
-/// gives only the fields).
+/// defines only the fields).
 #ifndef IWHEEL_SIM_POSE_H
 #define IWHEEL_SIM_POSE_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Random numbers for the simulator: a small generator that gives the same numbers on every machine.
+/// Random numbers for the simulator: a small generator with the same numbers on every machine.
 ///
 /// splitmix64: 64 bits of state, no file-scope state, good enough for noise. It must not be used for secrets.
 #ifndef IWHEEL_SIM_RANDOM_H
@@ -11,7 +11,7 @@ typedef struct {
     uint64_t state;
 } sim_random_t;
 
-/// Sets the seed. Any seed is good; neighbouring seeds give unrelated sequences.
+/// Sets the seed. Any seed is good; neighbouring seeds result in unrelated sequences.
 void sim_random_init(sim_random_t *self, uint64_t seed);
 
 uint32_t sim_random_next(sim_random_t *self);

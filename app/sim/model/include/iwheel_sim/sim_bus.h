@@ -6,7 +6,7 @@
 /// average number of stuff bits). When the frame ends, every node receives it and the sender gets its echo.
 ///
 /// A frame without acknowledgement stays in its controller and is repeated without end; the frames behind it wait. This
-/// is how old setpoints reach the bus when power returns. Simplifications: repetitions take no bus time, and only ports
+/// is how old setpoints reach the bus when power returns. Simplifications: repetitions need no bus time, and only ports
 /// that `sim_bus_open` opened with `needs_ack` wait for an acknowledgement. Wheels acknowledge each other, and the
 /// gateway's controller acknowledges the wheels.
 ///
@@ -43,9 +43,9 @@ typedef struct {
     iw_time_us_t free_us; ///< Earliest start of the next frame.
     iw_time_us_t done_us; ///< End of the frame on the bus.
     uint32_t waiting;     ///< Bit n: port n has a queued frame.
-    uint64_t busy_us;     ///< Time that frames have taken so far, for the load.
+    uint64_t busy_us;     ///< Time that frames have used so far, for the load.
     uint8_t sending;      ///< Port whose frame is on the bus, or SIM_BUS_NONE.
-    bool acknowledged;    ///< A node is there to acknowledge.
+    bool acknowledged;    ///< A node acknowledges.
     bool stalled;         ///< Fault: the bus transfers no frame.
 } sim_bus_t;
 

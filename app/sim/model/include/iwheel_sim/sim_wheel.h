@@ -6,8 +6,8 @@
 ///      +---- power off -+--------------------+
 ///
 /// OFF and BOOTING: the wheel coasts; it sends, receives and acknowledges nothing. RUNNING begins with ticks 0. The
-/// wheel sends offset frames for 60 s, or for the configured time. The first one comes when the two seconds of learning
-/// are over (choice of this model; the document gives only the period). "Muted" stops telemetry only: the wheel still
+/// wheel sends offset frames for 60 s, or for the configured time. It sends the first one after the two seconds of
+/// learning (choice of this model; the document has only the period). "Muted" stops telemetry only: the wheel still
 /// follows and acknowledges setpoints.
 ///
 /// Pure: no I/O, no clock, no heap. Used through pair.h; visible so that tests and tools can read it and set faults in
@@ -90,8 +90,8 @@ void sim_wheel_reboot(sim_wheel_t *self, iw_time_us_t now_us);
 /// over.
 void sim_wheel_age(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us);
 
-/// Sets a new factor for all periods except that of offset frames, 100..1000000 permille. (Offset frames come once a
-/// second; their end and return have a meaning.) The new period counts from the next frame of each kind.
+/// Sets a new factor for all periods except that of offset frames, 100..1000000 permille. (The period of offset frames
+/// stays one second, because their end and return have a meaning.) The new period counts from the next frame of each kind.
 void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 
 /// Accepts a setpoint for this wheel that was on the bus.
@@ -103,7 +103,7 @@ typedef struct {
     iw_codec_wheel_t told;
 } sim_message_t;
 
-/// Performs the action that is due at `self->next_us`. The caller has checked that this time has come. Returns true
+/// Performs the action that is due at `self->next_us`. The caller has checked that it is due. Returns true
 /// with a telemetry frame in `*out_message`, or false if there is none to send. `battery_dV` is the voltage that the
 /// wheel measures, `pose` is the pose of the pair.
 bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, sim_message_t *out_message);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Sine and cosine in integers, so that a simulation gives the same bytes with every compiler and on every machine.
+/// Sine and cosine in integers, so that a simulation has the same bytes with every compiler and on every machine.
 #ifndef IWHEEL_SIM_TRIG_H
 #define IWHEEL_SIM_TRIG_H
 

@@ -2,18 +2,18 @@
 /// Simulated world: a pair of wheels, the bus, other nodes, and ports for clients such as the gateway.
 ///
 /// The world executes all events in the order of their times, so it is a pure function of seed, configuration, times,
-/// submitted frames and faults. No I/O, no clock, no heap. It takes about 40 KiB, may be static and may be copied.
+/// submitted frames and faults. No I/O, no clock, no heap. It needs about 40 KiB, may be static and may be copied.
 ///
 ///     sim_world_init(&world, NULL, now_us, seed);
 ///     port = sim_world_connect(&world);
 ///     sim_world_submit(&world, now_us, port, &frame);
 ///     while (sim_world_step(&world, now_us, &delivery)) {
-///         every client receives delivery.frame; delivery.port gets it as echo
+///         every client receives delivery.frame; delivery.port receives it as echo
 ///     }
 ///     sleep until sim_world_wake_us(&world)
 ///
-/// Before a fault is set or a frame is submitted at `now_us`, `sim_world_step` must have returned all that is due by
-/// then.
+/// Before a fault is set or a frame is submitted at `now_us`, `sim_world_step` must have returned all frames that are
+/// due by then.
 #ifndef IWHEEL_SIM_WORLD_H
 #define IWHEEL_SIM_WORLD_H
 
@@ -30,7 +30,7 @@
 #define SIM_WORLD_CLIENTS (SIM_BUS_PORTS - SIM_PORT_CLIENT)
 /// Default number of frames in a client's adapter: one in the controller and three behind it.
 #define SIM_QUEUE_DEFAULT 4U
-/// Duration of a wheel's speed frame at 1 Mbit/s. Most frames take this time or longer.
+/// Duration of a wheel's speed frame at 1 Mbit/s. Most frames have this duration or a longer one.
 #define SIM_WORLD_FRAME_US 85U
 /// Period of the setpoint pairs of another master.
 #define SIM_FOREIGN_PERIOD_US 20000U
@@ -55,7 +55,7 @@ typedef struct {
     sim_babble_t babble;
     uint32_t dropped;    ///< Clients' frames that were lost because of a full queue or bus-off.
     uint8_t queue_depth; ///< Queue depth of the clients' adapters.
-    bool ack_off;        ///< Fault: clients' frames are not acknowledged although the wheels are there.
+    bool ack_off;        ///< Fault: clients' frames are not acknowledged although the wheels are online.
     bool bus_off;        ///< Fault: clients' controllers are bus-off.
     bool connected[SIM_WORLD_CLIENTS];
 } sim_world_t;
@@ -69,8 +69,8 @@ uint8_t sim_world_connect(sim_world_t *self);
 /// Unplugs the adapter. Its queued frames are lost.
 void sim_world_disconnect(sim_world_t *self, iw_time_us_t now_us, uint8_t port);
 
-/// Sends a frame of a client. A frame that the adapter cannot accept is lost and counted. The sender gets no error, but
-/// no echo either.
+/// Sends a frame of a client. A frame that the adapter cannot accept is lost and counted. The sender receives no error,
+/// but no echo either.
 void sim_world_submit(sim_world_t *self, iw_time_us_t now_us, uint8_t port, const iw_can_frame_t *frame);
 
 /// Returns true and writes the next frame that was on the bus to `*out_delivery`; returns false if there is none by
@@ -104,8 +104,8 @@ void sim_world_foreign_once(sim_world_t *self, iw_time_us_t now_us);
 /// Sends one frame from another node.
 void sim_world_inject(sim_world_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 
-/// Clears every fault of the world, the bus and the wheels. Wheels without power get power again; running wheels keep
-/// running.
+/// Clears every fault of the world, the bus and the wheels. Wheels without power boot; running wheels continue without a
+/// reboot.
 void sim_world_heal(sim_world_t *self, iw_time_us_t now_us);
 
 #endif
