@@ -87,7 +87,7 @@ typedef struct {
     bool quiet;                  ///< No latching cause is present or recent, so a step need not search for one.
     bool at_once;                ///< In BRAKING, CUT and the states after them: zero without ramp.
     bool until_release;          ///< Only a release ends the next zeros; time does not.
-    bool latch_until_release;    ///< Value of `until_release` after the next latch. False after the gateway has begun to end.
+    bool latch_until_release;    ///< Value of `until_release` after the next latch. False while the gateway ends.
     iw_permit_view_t view;       ///< Facts of the last step, written by the owner. Requests are judged by them.
     iw_client_t stale_client;    ///< Client of the last nonzero drive command.
     iw_client_t holder;          ///< Lease holder; IW_CLIENT_NONE if there is none.
