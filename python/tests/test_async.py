@@ -40,7 +40,7 @@ class Async(RigCase):
 
         self.assert_stood_by(self.run_async(story()), 500)
 
-    def test_a_task_cancelled_twice_leaves_at_once_and_the_wheels_stop(self):
+    def test_task_cancelled_twice_ends_promptly_and_wheels_stop(self):
         async def drive():
             async with AsyncGateway(self.socket).arm() as wheels:
                 await wheels.drive_for(60, 300, 300)
@@ -110,7 +110,7 @@ class Async(RigCase):
 
         self.assertEqual(self.run_async(story()), ["gained", "lease_lost", "lost"])
 
-    def test_a_connection_whose_end_is_still_unread_is_an_ended_lease(self):
+    def test_connection_end_not_yet_read_counts_as_ended_lease(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 wheels = await gateway.arm()
@@ -134,7 +134,7 @@ class Async(RigCase):
         self.assertEqual(self.run_async(story()), "stale_command")
         self.assert_stood_by(now_us(), 0)
 
-    def test_a_task_cancelled_while_it_waits_to_arm_leaves_nothing_armed(self):
+    def test_task_cancelled_while_arming_leaves_nothing_armed(self):
         async def drive():
             async with AsyncGateway(self.socket).arm(wait=30):
                 pass

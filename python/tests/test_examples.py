@@ -198,7 +198,7 @@ class Examples(RigCase):
         self.assertRegex(child.stderr.readline(), r"[0-9]+ lines in .*a\.csv")
         self.assertEqual(child.wait(5), 0)
 
-    def test_a_recording_for_some_seconds_ends_although_the_gateway_is_away(self):
+    def test_timed_recording_without_gateway_ends_on_time(self):
         child = self.recorder(self.socket, "--for", "1.5", self.rig.path("a.csv"))
         self.assertIn("recording", child.stderr.readline())
         self.rig.kill_gateway(signal.SIGKILL)

@@ -162,7 +162,7 @@ class Hostile(unittest.TestCase):
     def test_an_answer_to_something_else_is_no_answer(self):
         self.both(b'{"id":77,"ok":true}\n', NoAnswer)
 
-    def test_who_does_not_say_hello_is_no_answer_and_is_asked_nothing(self):
+    def test_peer_without_hello_is_no_answer_and_gets_no_request(self):
         impostor, told = self.both(b"", NoAnswer, hello=b"")
         self.assertIn("did not say hello", told)
         self.wait_for_two(impostor)
@@ -173,7 +173,7 @@ class Hostile(unittest.TestCase):
         while len(impostor.heard) < 2 and time.monotonic() < deadline:
             time.sleep(0.01)
 
-    def test_a_newer_protocol_is_refused_in_words_before_anything_is_asked(self):
+    def test_newer_protocol_in_hello_is_refused_before_any_request(self):
         for ask in ("status", "arm", "watch"):
             with self.subTest(ask):
                 impostor, told = self.both(b"", ProtocolError, hello=NEWER, ask=ask)
@@ -288,7 +288,7 @@ class Hostile(unittest.TestCase):
         self.addCleanup(lambda: os.environ.pop("IWHEEL_SOCKET") if before is None else None)
         self.assertEqual(default_socket(), "/tmp/somewhere.sock")
 
-    def test_of_a_gateways_two_sockets_the_one_that_may_be_used_is_taken(self):
+    def test_two_sockets_of_gateway_the_permitted_one_is_chosen(self):
         folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, folder)
         os.chmod(folder, 0o755)

@@ -181,7 +181,7 @@ class Story(unittest.TestCase):
             self.witness.event(event)
         client.events.clear()
 
-    def test_all_that_the_gateway_sends_is_described_and_all_that_is_described_is_sent(self):
+    def test_gateway_messages_match_the_description_both_ways(self):
         self.rig.sim.ask("mute both")
         self.rig.sim.ask("raw left 32767")
         self.rig.start_gateway(wheels=False)
@@ -338,7 +338,7 @@ class Requests(RigCase):
         named = {"name": "stop-000001-none.log"} if request["reply"] == "piece" else {}  # One with the form that is asked for.
         return {**{name: self.example(field)[0] for name, field in request["fields"].items() if not field.get("optional")}, **named}
 
-    def test_a_request_has_the_fields_that_are_described_and_no_others(self):
+    def test_request_fields_match_the_description_exactly(self):
         names = {name for request in self.description.requests.values() for name in request["fields"]} | {"speed"}
         for cmd, request in self.description.requests.items():
             for name in sorted(names):

@@ -61,7 +61,7 @@ class Crowded(RigCase):
 
 
 class Driving(RigCase):
-    def test_the_example_of_the_documentation_drives_and_stands_at_the_end(self):
+    def test_documented_example_drives_and_ends_at_standstill(self):
         with Gateway(self.socket).arm("example") as wheels:
             applied = wheels.drive_for(0.6, 200, 200)
         left_us = now_us()
@@ -165,7 +165,7 @@ class Driving(RigCase):
         self.addCleanup(end)
         return child
 
-    def test_leaving_a_block_that_lost_its_lease_does_not_stop_who_drives_now(self):
+    def test_block_end_after_lost_lease_stops_no_other_driver(self):
         other = Gateway(self.socket)
         self.addCleanup(other.close)
         with Gateway(self.socket) as gateway:
@@ -178,7 +178,7 @@ class Driving(RigCase):
             mine.drive(200, 200)
             self.assertEqual(other.status()["state"], "armed")
 
-    def test_an_older_permission_ends_when_the_same_gateway_arms_anew(self):
+    def test_older_permission_ends_when_same_gateway_arms_again(self):
         with Gateway(self.socket) as gateway:
             old = gateway.arm()
             new = gateway.arm()
@@ -186,7 +186,7 @@ class Driving(RigCase):
                 old.drive(200, 200)
             new.drive(0, 0)
 
-    def test_values_that_do_not_fit_are_refused_and_the_permission_stays(self):
+    def test_values_out_of_range_are_refused_and_permission_stays(self):
         with Gateway(self.socket) as gateway, gateway.arm() as wheels:
             for bad in (40000, -40000):
                 with self.assertRaises(Refused) as caught:
@@ -251,7 +251,7 @@ class Arming(RigCase):
                 wheels.drive_for(0.3, 300, 300)
         self.assert_stood_by(now_us(), 0)
 
-    def test_arming_right_after_a_stop_that_nobody_waited_for_waits_until_both_stand(self):
+    def test_arm_right_after_unawaited_stop_waits_for_standstill(self):
         with Gateway(self.socket) as gateway:
             gateway.arm().drive_for(0.5, 400, 400)
             gateway.stop()
@@ -354,7 +354,7 @@ class Ending(RigCase):
             self.assertIn("second", str(self.ended(lambda: wheels.drive(0, 0), None)))
             mine.drive(0, 0)
 
-    def test_a_connection_whose_end_is_still_unread_is_an_ended_lease(self):
+    def test_connection_end_not_yet_read_counts_as_ended_lease(self):
         with Gateway(self.socket) as gateway:
             wheels = gateway.arm()
             wheels.drive(100, 100)
@@ -467,7 +467,7 @@ class Answers(RigCase):
 
 
 class Reconnecting(RigCase):
-    def test_a_gateway_that_was_killed_is_found_again_and_nothing_moves(self):
+    def test_gateway_killed_is_reconnected_and_nothing_moves(self):
         with Gateway(self.socket, wait=5) as gateway:
             with warnings.catch_warnings(record=True):
                 warnings.simplefilter("always")

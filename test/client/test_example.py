@@ -84,7 +84,7 @@ class Example(RigCase):
         self.assertIn("arm", err)  # Its next command is refused, with the cure.
         self.assertLess(self.last_motion_us(), thawed_us)
 
-    def test_example_whose_gateway_starts_anew_ends_and_moves_nothing(self):
+    def test_example_when_gateway_restarts_ends_and_moves_nothing(self):
         child = self.start_driving()
         self.rig.kill_gateway(signal.SIGKILL)
         killed_us = now_us()

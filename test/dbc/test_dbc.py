@@ -174,7 +174,7 @@ class TestDatabase(unittest.TestCase):
         with self.assertRaises(cantools.database.EncodeError):
             message.encode(values)
 
-    def test_force_units_are_those_of_the_document_and_marked_assumed(self):
+    def test_force_units_match_the_document_and_are_marked_assumed(self):
         for name, unit in (("LeftForce", "cN"), ("RightForce", "dN")):
             signal = DATABASE.get_message_by_name(name).get_signal_by_name(f"normal_force_{unit}")
             self.assertEqual(unit, signal.unit)

@@ -71,7 +71,7 @@ class Pages(unittest.TestCase):
             with self.subTest(verb):
                 self.expect_block("iwheelctl.1", f"## {verb}\n" + literal(output("iwheelctl", verb, "--help")))
 
-    def test_commands_of_the_simulator_are_those_that_a_running_one_lists(self):
+    def test_simulator_commands_are_those_that_a_running_one_lists(self):
         with tempfile.TemporaryDirectory() as folder:
             control = os.path.join(folder, "control")
             command = [program("iwheel-sim"), "--quiet", "--can", f"unix:{folder}/bus", "--estop", f"{folder}/button", "--control", control]

@@ -76,7 +76,7 @@ def steer(far, seconds, speed=200, until_time=None):
 # ---- what it tells --------------------------------------------------------------------------------------------------
 
 
-def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
+def test_topics_match_the_page_and_values_match_the_gateway(rig):
     rig.start()
     far = rig.online()
     state = until(lambda: far.messages("state"), what="a state")[-1]
@@ -99,7 +99,7 @@ def test_topics_are_those_of_the_page_and_say_what_the_gateway_says(rig):
 
 
 @pytest.mark.rig(settings={"state": {"every_ms": 60000}})
-def test_state_comes_at_once_when_it_changes_and_else_as_seldom_as_configured(rig):
+def test_state_is_sent_on_change_else_at_configured_interval(rig):
     rig.start()
     far = rig.online()
     time.sleep(1.5)
@@ -111,7 +111,7 @@ def test_state_comes_at_once_when_it_changes_and_else_as_seldom_as_configured(ri
     assert time.monotonic() - begun < 1.5
 
 
-def test_gateway_gone_is_offline_bridge_killed_is_offline_by_its_will(rig):
+def test_gateway_gone_or_bridge_killed_is_published_offline(rig):
     rig.start()
     far = rig.online()
     rig.gateway.signal(signal.SIGKILL)
@@ -346,7 +346,7 @@ def test_sender_drives_while_it_sends_and_no_longer(rig):
 
 
 @pytest.mark.rig(**DRIVING)
-def test_broker_stalls_300_ms_the_wheels_stop_and_nothing_is_driven_late(rig):
+def test_broker_stalls_300_ms_wheels_stop_without_late_drive(rig):
     """From the bus log: lease and period after the last command the wheels are told to brake, and the backlog moves nothing."""
     rig.start()
     far = rig.online()
@@ -443,7 +443,7 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
 
 @pytest.mark.full
 @pytest.mark.rig(settings={"broker": {"keepalive_s": 5}})
-def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
+def test_network_that_drops_all_is_noticed_and_no_stop_is_lost(rig):
     line = rig.cut_here()
     rig.start()
     far = rig.online()
@@ -456,7 +456,7 @@ def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
     far.tell("network that swallows everything, noticed after 1.5 times `keepalive_s` (`--full`)")
 
 
-def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
+def test_bridge_killed_with_stored_events_each_stop_comes_once(rig):
     line = rig.cut_here()
     rig.start_gateway()
     rig.start_broker()
@@ -611,7 +611,7 @@ def make_certificates(rig):
         )
 
 
-def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):
+def test_tls_needs_signer_name_and_certificate_of_machine(rig):
     make_certificates(rig)
     rig.broker_lines += [f"cafile {rig.path('ca.pem')}", f"certfile {rig.path('broker.pem')}", f"keyfile {rig.path('broker.key')}", "require_certificate true"]
     rig.mqtt_settings["broker"].update({"host": "localhost", "ca": rig.path("ca.pem"), "certificate": rig.path("machine.pem"), "key": rig.path("machine.key")})
@@ -633,7 +633,7 @@ def test_tls_needs_the_signer_the_name_and_the_machines_certificate(rig):
     rig.online(far)
 
 
-def test_credentials_that_others_may_read_are_refused_and_right_ones_needed(rig):
+def test_credentials_wrong_or_readable_by_others_are_refused(rig):
     secret = Path(rig.path("secret"))
     subprocess.run(["mosquitto_passwd", "-b", "-c", rig.path("passwords"), ID, "pass:word"], check=True)
     os.chmod(rig.path("passwords"), 0o644)
@@ -681,7 +681,7 @@ def test_check_refuses_a_spool_file_that_the_start_refuses(rig):
     assert check_of(rig)[0] == 0
 
 
-def test_check_of_a_spool_for_reading_only_warns_and_the_bridge_starts(rig):
+def test_check_of_read_only_spool_warns_and_bridge_starts(rig):
     if os.geteuid() != 0:
         raise Skip("needs root to mount")
     mount = read_only(rig.path("spool"))

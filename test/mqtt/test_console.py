@@ -91,7 +91,7 @@ def publish_stops(far, events, pad=0, qos=1):
     assert all(one.is_published() for one in sent)
 
 
-def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
+def test_history_after_lost_leader_has_each_stop_once_and_gaps(rig):
     cluster = Cluster(rig)
     config = cluster_config(rig, cluster)
     code, out, err = console(rig, config, "history")
@@ -144,7 +144,7 @@ def test_history_with_a_frozen_first_host_checks_its_end(rig):
         cluster.servers[HOSTS[0]].signal(signal.SIGCONT)
 
 
-def test_history_of_thousands_comes_whole_and_the_console_may_not_change_it(rig):
+def test_history_of_thousands_is_complete_and_read_only(rig):
     """More than the engine sends without a word of flow control; and what else the console's certificate allows."""
     cluster = Cluster(rig)
     far = machine_at(rig, cluster)
@@ -197,7 +197,7 @@ def nats_says(rig, cluster, name, subject):
     return said.decode()
 
 
-def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(rig):
+def test_history_without_stream_names_fix_and_info_last_stop(rig):
     rig.start()
     rig.online()
     make_stops(rig, 1)
@@ -251,7 +251,7 @@ def stop_with_recording(rig, seconds=0.0):
     return name
 
 
-def test_recording_is_fetched_whole_never_over_a_file_and_read_by_iwheelctl(rig):
+def test_recording_is_fetched_whole_and_overwrites_no_file(rig):
     rig.start()
     rig.online()
     name = stop_with_recording(rig)
@@ -287,7 +287,7 @@ def slow_console(rig, *words):
     return process
 
 
-def test_recording_goes_on_after_the_bridge_was_killed_and_began_anew(rig):
+def test_recording_fetch_continues_after_bridge_restart(rig):
     rig.start()
     rig.online()
     name = stop_with_recording(rig, 3)
@@ -302,7 +302,7 @@ def test_recording_goes_on_after_the_bridge_was_killed_and_began_anew(rig):
     assert len(list(folder.iterdir())) == 3
 
 
-def test_recording_of_a_machine_that_stays_away_leaves_no_file_behind(rig):
+def test_recording_of_absent_machine_leaves_no_file(rig):
     rig.start()
     rig.online()
     stop_with_recording(rig, 3)
@@ -361,7 +361,7 @@ def fetch_from(rig, name, data, trouble):
     return console(rig, write_config(rig, port=rig.port), "recording", name, "--wait", "8", "-o", str(folder_of(rig) / "x"))
 
 
-def test_recording_with_a_piece_lost_damaged_or_refused_once_is_whole_all_the_same(rig):
+def test_recording_with_piece_lost_or_refused_once_is_complete(rig):
     rig.start_broker()
     data = bytes(number * number % 251 for number in range(100000))
 
@@ -435,7 +435,7 @@ class Far5:
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
-def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_wanted(rig):
+def test_mqtt5_all_but_events_expire_replies_use_response_topic(rig):
     rig.start()
     far = Far5(rig)
     until(lambda: far.of("state"), what="a state")
@@ -457,7 +457,7 @@ def test_mqtt5_messages_expire_but_for_events_and_answers_go_where_they_are_want
 
 
 @pytest.mark.rig(settings={"broker": {"protocol": "5"}})
-def test_mqtt5_event_that_the_broker_refuses_is_kept_and_told_when_it_may_be(rig):
+def test_mqtt5_event_refused_by_broker_is_stored_and_sent_later(rig):
     """By 3.1.1 a broker confirms what its ACL forbids, and nobody knows."""
     acl = Path(rig.path("acl"))
     acl.write_text(

@@ -175,7 +175,7 @@ def test_machine_reaches_nothing_of_another_machine(rig):
     )
 
 
-def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
+def test_forwarding_mosquitto_stores_while_fleet_is_down(rig):
     port = start_fleet_broker(rig)
     central = rig.processes[-1]
     text = (

@@ -276,7 +276,7 @@ def test_key_that_others_may_read_is_refused(rig):
         rig.bridge and rig.bridge.end()
 
 
-def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
+def test_spool_of_other_owner_is_refused_and_no_link_followed(rig):
     need_root()
     spool, other = Path(rig.path("spool")), Path(rig.path("other"))
     other.write_text("of somebody", encoding="ascii")
@@ -306,7 +306,7 @@ def test_spool_of_a_stranger_is_refused_and_links_are_not_followed(rig):
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
-def test_home_assistant_sensors_pass_the_shipped_rights_of_mosquitto(rig):
+def test_home_assistant_sensors_pass_shipped_mosquitto_rights(rig):
     port = start_fleet_broker(rig)
     certificates(rig, "console", "homeassistant")
     use_tls(rig, "localhost", port)

@@ -156,7 +156,7 @@ def test_unit(machine, compiler, level, name, record_property):
     record_property("tests", built(machine, compiler, level).unit_test(name, unity_folder()))
 
 
-def test_planted_core_that_reads_bytes_in_the_machines_own_order_is_found_out(tmp_path, reference):
+def test_seeded_core_with_native_byte_order_is_detected(tmp_path, reference):
     build = Build("s390x", "gcc", "-Os", tmp_path, planted_core(tmp_path))
     if build.missing:
         pytest.skip(f"{', '.join(build.missing)} missing (scripts/install_tools check brings it)")

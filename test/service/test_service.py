@@ -119,7 +119,7 @@ class Units(unittest.TestCase):
                 ours = [line for line in done.stderr.splitlines() if "iwheel" in line]
                 self.assertEqual((ours, done.returncode), ([], 0), done.stderr)
 
-    def test_bridges_that_watch_are_shut_in_and_not_started_by_themselves(self):
+    def test_watching_bridges_are_confined_and_not_autostarted(self):
         need("systemd-analyze")
         for unit, ends in ((WEB, "64 77 78"), (MQTT, "64 73 77 78")):
             path = os.path.join(SHARE, "systemd", unit)
@@ -135,7 +135,7 @@ class Units(unittest.TestCase):
                 done = subprocess.run(["systemd-analyze", "verify", os.path.join(folder, unit)], capture_output=True, text=True, check=False)
                 self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
 
-    def test_the_bridge_to_ros_stays_on_this_machine_and_in_its_memory(self):
+    def test_ros_bridge_stays_on_this_machine_and_in_its_memory(self):
         self.assertEqual(values(ROS2, "IPAddressDeny"), ["any"])
         self.assertEqual(values(ROS2, "IPAddressAllow"), ["localhost"])
         self.assertEqual(values(ROS2, "MemoryMax"), ["64M"])
@@ -458,7 +458,7 @@ class Watchers(Rights):
         self.assertIn(f"who may drive uses {self.driving} and is in group daemon", done.stderr)
         self.assertNotEqual(done.returncode, 0)
 
-    def test_a_crowd_that_asks_without_end_costs_who_drives_no_gap_and_no_slot(self):
+    def test_request_flood_costs_the_driver_no_gap_and_no_slot(self):
         flood = subprocess.Popen([sys.executable, "-c", FLOOD, self.socket, "64"], stdout=subprocess.PIPE, text=True)
         self.addCleanup(flood.stdout.close)
         self.addCleanup(flood.wait)
@@ -501,7 +501,7 @@ class Strangers(unittest.TestCase):
         self.rig.processes.append(other)
         return other.wait(5), other.text()
 
-    def test_who_holds_the_lock_s_names_keeps_nobody_from_starting_even_after_a_kill_in_motion(self):
+    def test_lock_names_held_by_stranger_prevent_no_restart(self):
         names = lock_names(self.rig.gateway_bus())
         self.rig.start_gateway()
         with iwheel.Gateway(self.rig.path("gateway.sock"), wait=10) as gateway:
@@ -529,7 +529,7 @@ class Strangers(unittest.TestCase):
             self.assertEqual(done.returncode, 77, done.stderr)
             self.assertIn(word, done.stderr)
 
-    def test_a_socket_in_a_folder_like_tmp_cannot_be_held_against_root(self):
+    def test_socket_in_folder_like_tmp_cannot_block_root(self):
         shared = self.rig.path("shared")
         os.mkdir(shared)
         os.chmod(shared, 0o1777)
@@ -546,7 +546,7 @@ class Strangers(unittest.TestCase):
         with iwheel.Gateway(path, wait=5) as gateway:
             self.assertEqual(gateway.status()["state"], "listening")
 
-    def test_a_record_directory_that_is_not_safe_is_told_and_nothing_is_put_there(self):
+    def test_record_directory_unsafe_is_reported_and_stays_empty(self):
         for mode, owner, word in ((0o1777, 0, "chmod go-w"), (0o755, STRANGER, "give the directory")):
             folder = self.rig.path(f"records-{mode:o}")
             os.mkdir(folder)

@@ -350,7 +350,7 @@ class Check(unittest.TestCase):
         for what in ("reason 5", "150"):
             self.assertNotIn(what, shown)
 
-    def test_exception_behind_a_traceback_is_shown_with_what_came_instead(self):
+    def test_exception_after_traceback_is_shown_with_its_details(self):
         runner = (
             "echo 'FAIL: test_x (x.X)'; seq 301 309; echo \"AssertionError: 'ready' did not come; after the last text came:\"\n"
             "echo busy; seq 401 430; seq 501 540; exit 1\n"
@@ -376,7 +376,7 @@ class Check(unittest.TestCase):
         for number in (1, 74, 134):
             self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system")[0])
 
-    def test_runner_that_is_killed_fails_check_which_shows_what_it_said(self):
+    def test_runner_killed_fails_check_which_shows_its_output(self):
         status, lines, _ = self.check("echo as far as this; kill -9 $PPID; sleep 5\n", "system")
         self.assertEqual((1, "1 passed, 1 failed, 0 skipped"), (status, lines[-1]), lines)
         self.assertTrue([line for line in lines if line.endswith("as far as this")], lines)
@@ -393,7 +393,7 @@ class Check(unittest.TestCase):
         for junit in (died, late + died, late + self.case("1 passed, 1 failed, 0 skipped\n")):
             self.assertEqual(1, self.check("", "unit", junit=junit)[0], junit)
 
-    def test_failure_of_one_step_outweighs_another_that_is_not_judged(self):
+    def test_failure_of_one_step_outranks_inconclusive_step(self):
         late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
         self.assertEqual(1, self.check("echo '1 passed, 1 failed, 0 skipped'; exit 1\n", "unit", "system", junit=late)[0])
 
