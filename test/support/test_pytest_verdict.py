@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The rules of verdict.py as pytest_verdict.py keeps them: pytest runs made-up tests on a machine whose stalls are made up. And each fault that is seeded
-into the plugin fails the test that is named beside it.
+"""Tests the rules of verdict.py in pytest_verdict.py: pytest runs invented tests on a machine with invented stalls. Each fault that is seeded into the
+plugin must fail the test that is named in its row.
 
 usage: test/support/test_pytest_verdict.py [unittest's arguments]
 
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 SOURCES = (HERE / "pytest_verdict.py", HERE / "pytest_virtual.py")
-# (what, old, new, the test that must fail)
+# (fault, old, new, the test that must fail)
 FAULTS = (
     ("a collected failure is forgotten", "    if found:\n        more", "    if False:\n        more", "test_collected_rule_is_final"),
     (
@@ -128,7 +128,7 @@ HEAD = """
 
 
 def runs(pid):
-    """And has not only nobody who waits for it."""
+    """True if the process exists and is not only waiting for its parent (a zombie)."""
     path = Path(f"/proc/{pid}/cmdline")
     return path.exists() and bool(path.read_bytes())
 
@@ -136,8 +136,8 @@ def runs(pid):
 class Ran(NamedTuple):
     status: int
     lines: list
-    notes: list  # What the tests have noted, in that order.
-    cases: dict  # {name: passed, failed, error or skipped} of JUnit's file.
+    notes: list  # The notes of the tests, in order.
+    cases: dict  # {name: passed, failed, error or skipped} from JUnit's file.
 
     @property
     def last(self):
@@ -145,7 +145,7 @@ class Ran(NamedTuple):
 
 
 class Made(unittest.TestCase):
-    """Each test writes a file of tests."""
+    """Each test writes a file of tests and runs it."""
 
     plugin = HERE
 
@@ -194,7 +194,7 @@ class Made(unittest.TestCase):
         return Ran(done.returncode, done.stdout.splitlines(), notes.read_text().split() if notes.exists() else [], cases)
 
     def final(self, tests, *options, junit="failure", **how):
-        """One attempt, and it fails."""
+        """Asserts one attempt, which fails."""
         ran = self.run_made(tests, *options, **how)
         self.assertEqual(
             (1, "0 passed, 1 failed, 0 skipped", ["tried"], {"test_one": junit}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
@@ -202,7 +202,7 @@ class Made(unittest.TestCase):
         return "\n".join(ran.lines)
 
     def repeated(self, tests, **how):
-        """Four attempts, and it is not judged."""
+        """Asserts four attempts and no verdict."""
         ran = self.run_made(tests, **how)
         self.assertEqual(
             (75, "0 passed, 0 failed, 1 skipped", ["tried"] * 4, {"test_one": "skipped"}), (ran.status, ran.last, ran.notes, ran.cases), "\n".join(ran.lines)
@@ -247,7 +247,7 @@ class Conclusive(Made):
         self.final('def test_one():\n    note("tried")\n    os.system("echo ==1==ERROR: AddressSanitizer: heap-use-after-free >&2")\n    assert False\n')
 
     def test_words_of_a_fixture_are_judged(self):
-        said = self.final("""
+        output = self.final("""
             class Rig:
                 def said(self):
                     return "iwheel-gateway: Segmentation fault"
@@ -260,10 +260,10 @@ class Conclusive(Made):
                 note("tried")
                 assert False
             """)
-        self.assertIn("Segmentation fault", said)
+        self.assertIn("Segmentation fault", output)
 
     def test_fixture_that_is_a_type_hides_no_failure(self):
-        said = self.final("""
+        output = self.final("""
             class Rig:
                 def said(self):
                     return "nothing"
@@ -276,16 +276,16 @@ class Conclusive(Made):
                 note("tried")
                 assert False, "Segmentation fault, the reason"
             """)
-        self.assertIn("the reason", said)
+        self.assertIn("the reason", output)
 
     def test_crash_is_final(self):
         for crash in ("os.abort()", "os._exit(0)", "os.kill(os.getpid(), 9)"):
             self.final(f'def test_one():\n    note("tried")\n    {crash}\n')
 
     def test_hang_is_final(self):
-        said = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
-        self.assertIn("did not end within 1 s", said)
-        self.assertIn("in test_one", said, "Python says where it was")
+        output = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
+        self.assertIn("did not end within 1 s", output)
+        self.assertIn("in test_one", output, "Python says where it was")
 
     def test_end_of_what_forks_the_attempts_is_final(self):
         self.final('def test_one():\n    note("tried")\n    os.kill(os.getppid(), 9)\n    time.sleep(20)\n')
@@ -297,7 +297,7 @@ class Conclusive(Made):
         self.final('def test_one():\n    note("tried")\n    assert False, "the gateway itself was held up for 583 ms"\n', stalls="[]")
 
     def test_one_of_several_parts_is_final(self):
-        """Also if another part is only late."""
+        """A final failure counts even if another part is only late."""
         self.final("""
             class Test(unittest.TestCase):
                 def test_one(self):
@@ -529,13 +529,13 @@ class Processes(Made):
                 time.sleep(0.05)
             process.send_signal(number)
             try:
-                said, _ = process.communicate(timeout=10)
+                output, _ = process.communicate(timeout=10)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.communicate()
                 self.fail("it goes on")
             self.assertNotEqual(0, process.returncode)
-            self.assertNotRegex(said, r"passed, \d+ failed")
+            self.assertNotRegex(output, r"passed, \d+ failed")
             self.assertEqual([], [path.name for path in self.folder.glob("iwheel-*")])
             time.sleep(0.2)
             self.assertEqual([], [pid for pid in notes.read_text().split() if runs(pid)])
@@ -580,7 +580,7 @@ class Chosen(Made):
 
 
 class Virtual(Made):
-    """The kernel is a process that does at once what the plan says."""
+    """The kernel is a process that immediately does what the plan says."""
 
     BOOT = """
         import sys
@@ -628,7 +628,7 @@ class Virtual(Made):
 
 
 def seed(old, new, noticer):
-    """Whether the test fails with this fault in the plugin; None: the plugin has no such code."""
+    """Whether the test fails with this fault in the plugin; None if the plugin does not have this code exactly once."""
     texts = {source: source.read_text(encoding="utf-8") for source in SOURCES}
     found = [source for source, text in texts.items() for _ in range(text.count(old))]
     if len(found) != 1:
@@ -657,7 +657,7 @@ def main():
         noticed = seed(old, new, noticer)
         print(
             f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: {noticer}"
-            + (" does not notice it" if noticed is False else "; its text is not there once" if noticed is None else ""),
+            + (" does not notice it" if noticed is False else "; its code does not occur exactly once" if noticed is None else ""),
             flush=True,
         )
         passed, failed = passed + bool(noticed), failed + (not noticed)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The verdicts of test/support/verdict.py, by a fake runner whose attempts and stalls are made up; and that each fault seeded into the module is seen.
+"""Tests the verdicts of test/support/verdict.py with a fake runner whose attempts and stalls are invented, and tests that each seeded fault is noticed.
 
 usage: test/support/test_verdict.py [unittest's arguments]
 
@@ -28,7 +28,7 @@ sys.dont_write_bytecode = True
 import verdict
 
 AT_US = 3_000_000
-# What the module must decide is tried on copies of it, each with one of these faults: (what, old, new). Each must fail a test below.
+# The decisions of the module are tested on copies of it, each with one of these faults: (fault, old, new). Each fault must fail a test below.
 FAULTS = (
     ("a broken rule is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, RULE)"),
     ("a crash is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, CRASH)"),
@@ -60,7 +60,7 @@ FAULTS = (
 )
 
 
-# The same for what reads the runners' sums: (what, file, old, new).
+# The same for the readers of the runners' sums: (fault, file, old, new).
 START, COUNT = "test/all/start", "test/all/count_tests.py"
 READER_FAULTS = (
     (
@@ -89,7 +89,7 @@ READER_FAULTS = (
 
 
 class Made:
-    """A session whose attempts are made up: {name: attempts in their order}. `late`: stalls of the machine."""
+    """A session with invented attempts: {name: attempts in order}. `late`: stalls of the machine."""
 
     def __init__(self, attempts, late=()):
         self.attempts, self.late, self.made, self.printed = {name: list(all_of) for name, all_of in attempts.items()}, list(late), [], {}
@@ -108,7 +108,7 @@ class Made:
         self.printed[name] = (kind, attempt.skip, tries)
 
     def run(self):
-        """(exit status, lines, how often each was made)"""
+        """(exit status, lines, number of attempts of each test)"""
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
             self.session.run(list(self.attempts))
@@ -131,13 +131,13 @@ def stall(late_us=200_000, at_us=AT_US):
 class Conclusive(unittest.TestCase):
     def test_failure_names_the_longest_stall_that_was_measured(self):
         for late, words in (((), "meanwhile: 0 ms"), ((stall(7_000), stall(19_000)), "meanwhile: 19 ms")):
-            made, told = Made({"one": [bad(verdict.CHECK)]}, late), []
-            made.session.report = lambda name, kind, attempt, tries, told=told: told.extend(attempt.failures)
+            made, printed = Made({"one": [bad(verdict.CHECK)]}, late), []
+            made.session.report = lambda name, kind, attempt, tries, printed=printed: printed.extend(attempt.failures)
             made.run()
-            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", told[0].text)
+            self.assertEqual(f"it was wrong\nlongest stall of the machine measured {words}", printed[0].text)
 
     def final(self, first, late=()):
-        """One attempt, and a failure although the next one would pass."""
+        """Asserts one attempt, which fails although the next one would pass."""
         status, lines, made = Made({"one": [first, ok(), ok(), ok()], "two": [ok()]}, late).run()
         self.assertEqual((1, ["1 passed, 1 failed, 0 skipped"], 1), (status, lines, made["one"]))
 
@@ -262,7 +262,7 @@ class Words(unittest.TestCase):
 
 
 class Processes(unittest.TestCase):
-    """The sleepers themselves."""
+    """Tests the sleepers."""
 
     def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
         witness = verdict.Witness()
@@ -290,7 +290,7 @@ class Processes(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """./check itself, with the step `system`, whose pytest is a script of this test, and `unit`, whose tests are a file of CTest's output.
+    """./check with the step `system`, whose pytest is a script of this test, and with `unit`, whose tests are a file with CTest's output.
     Both wait for the build, which does nothing here and counts as one."""
 
     FILES = ("check", "docs/developer/proofs.csv", START, COUNT, "test/all/CMakeLists.txt", "test/all/steps.cmake")
@@ -302,10 +302,10 @@ class Check(unittest.TestCase):
         esac
         """
 
-    faulty = {}  # {file: (old, new)}: a fault that is seeded into it
+    faulty = {}  # {file: (old, new)}: a seeded fault
 
     def check(self, runner, *steps, junit=""):
-        """(exit status, lines, how often the runner ran)"""
+        """(exit status, lines, number of runs of the runner)"""
         with tempfile.TemporaryDirectory() as folder:
             files = {name: Path(HERE, "../..", name).read_text(encoding="utf-8") for name in self.FILES}
             for name, (old, new) in self.faulty.items():
@@ -411,7 +411,7 @@ def seed(old, new):
         return None
     sound, faulty = verdict, types.ModuleType("verdict")
     with tempfile.TemporaryDirectory() as folder:
-        faulty.__file__ = os.path.join(folder, "verdict.py")  # Sleepers are started from it.
+        faulty.__file__ = os.path.join(folder, "verdict.py")  # The sleepers are started from this file.
         with open(faulty.__file__, "w", encoding="utf-8") as file:
             file.write(text.replace(old, new))
         exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)
@@ -439,7 +439,7 @@ def main():
     for what, noticed in seeded:
         print(
             f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: "
-            + ("its text is not in verdict.py once" if noticed is None else ", ".join(noticed) or "no test notices it")
+            + ("its code does not occur exactly once in verdict.py" if noticed is None else ", ".join(noticed) or "no test notices it")
         )
         passed, failed = passed + bool(noticed), failed + (not noticed)
     print(f"{passed} passed, {failed} failed, 0 skipped")

@@ -54,11 +54,11 @@ TEST(test_estop_pulse_after_wake_latches_before_next_setpoint) {
 
 TEST(test_command_of_the_holder_is_sent_after_one_poll) {
     begin_driving_between_pairs();
-    const uint32_t looks = daemon_rig.looks;
+    const uint32_t polls = daemon_rig.polls;
     const uint32_t sent = daemon_rig.sent[IW_LEFT];
     say(SLOWER);
     daemon_rig_run(1);
-    TEST_ASSERT_EQUAL_UINT32(looks + 1U, daemon_rig.looks);
+    TEST_ASSERT_EQUAL_UINT32(polls + 1U, daemon_rig.polls);
     TEST_ASSERT_EQUAL_UINT32(sent + 1U, daemon_rig.sent[IW_LEFT]);
     TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
 }

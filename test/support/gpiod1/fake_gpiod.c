@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/// Two chips with their lines; the line is on the second. A chip's pointer is that of its first line.
+/// Two chips with their lines; the line is on the second. The pointer to a chip is the pointer to its first line.
 static char lines[2][FAKE_GPIO_LINES];
 static unsigned iterated;
 
@@ -28,7 +28,7 @@ struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
     fake_gpio.open -= (chip != NULL) ? 1 : 0;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *chip, unsigned offset) {
@@ -50,7 +50,7 @@ struct gpiod_chip *gpiod_chip_iter_next_noclose(struct gpiod_chip_iter *iter) {
 
 void gpiod_chip_iter_free_noclose(struct gpiod_chip_iter *iter) {
     (void)iter;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 unsigned gpiod_chip_num_lines(struct gpiod_chip *chip) {
@@ -65,7 +65,7 @@ const char *gpiod_line_name(struct gpiod_line *line) {
 
 struct gpiod_chip *gpiod_line_get_chip(struct gpiod_line *line) {
     if (line == NULL) {
-        abort(); // As the library crashes.
+        abort(); // The library crashes here.
     }
     const size_t at = (size_t)((char *)(void *)line - &lines[0][0]);
     return (struct gpiod_chip *)(void *)lines[at / FAKE_GPIO_LINES];
@@ -97,7 +97,7 @@ static int give(struct gpiod_line *line, int flags, bool both) {
     fake_gpio.offset = (unsigned)((char *)(void *)line - &lines[1][0]);
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
-    fake_gpio.room = 16U; // It cannot be chosen.
+    fake_gpio.room = 16U; // libgpiod 1 has no choice here.
     fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
     errno = fake_gpio.busy_error;
     if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {

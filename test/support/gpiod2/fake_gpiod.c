@@ -57,12 +57,12 @@ struct gpiod_chip *gpiod_chip_open(const char *path) {
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
     fake_gpio.open -= (chip != NULL) ? 1 : 0;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip) {
     if (chip == NULL) {
-        abort(); // As the library does.
+        abort(); // The library crashes here.
     }
     given++;
     return (struct gpiod_chip_info *)(void *)chip;
@@ -98,7 +98,7 @@ const char *gpiod_line_info_get_name(struct gpiod_line_info *info) {
 }
 
 void gpiod_line_info_free(struct gpiod_line_info *info) {
-    shown_offset = FAKE_GPIO_LINES - 1U; // Its name is another one's now.
+    shown_offset = FAKE_GPIO_LINES - 1U; // Another line has its name now.
     given -= (info != NULL) ? 1U : 0U;
 }
 
@@ -123,7 +123,7 @@ struct gpiod_line_settings *gpiod_line_settings_new(void) {
 
 void gpiod_line_settings_free(struct gpiod_line_settings *settings) {
     given -= (settings != NULL) ? 1U : 0U;
-    errno = EACCES; // As any call may.
+    errno = EACCES; // Any call may set errno.
 }
 
 int gpiod_line_settings_set_direction(struct gpiod_line_settings *settings, enum gpiod_line_direction direction) {
