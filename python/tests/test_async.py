@@ -16,7 +16,7 @@ class Async(RigCase):
     def run_async(self, coroutine, seconds=20):
         return asyncio.run(asyncio.wait_for(coroutine, seconds))
 
-    def test_drives_and_stands_at_the_end_of_the_block(self):
+    def test_drives_and_is_at_standstill_after_the_block(self):
         async def story():
             async with AsyncGateway(self.socket).arm("example") as wheels:
                 return await wheels.drive_for(0.5, 200, 200)
@@ -97,7 +97,7 @@ class Async(RigCase):
 
         self.assertIn(self.run_async(story()), ("listening", "stopping"))
 
-    def test_a_lost_lease_is_told_while_its_events_are_still_unread(self):
+    def test_lost_lease_with_unread_events_is_reported(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 await gateway.watch("lease", "stop")
@@ -153,7 +153,7 @@ class Async(RigCase):
 
         self.assertIsNone(self.run_async(story()))
 
-    def test_drive_for_tells_on_the_way_and_true_ends_it(self):
+    def test_drive_for_reports_status_and_true_ends_it(self):
         seen = []
 
         def tell(status):
@@ -170,7 +170,7 @@ class Async(RigCase):
         self.assertGreater(len(seen), 3)
         self.assert_stood_by(now_us(), 0)
 
-    def test_what_the_gateway_replies_is_handed_out(self):
+    def test_replies_of_the_gateway_are_returned(self):
         async def story():
             async with AsyncGateway(self.socket) as gateway:
                 self.assertEqual((await gateway.confirm("wheel_radius", 192.0))["state"], "confirmed")
@@ -204,7 +204,7 @@ class Async(RigCase):
 
         self.assertGreater(max(self.run_async(story())), 150)
 
-    def test_events_tell_of_a_restart(self):
+    def test_events_report_a_restart(self):
         async def story():
             seen = []
             async with AsyncGateway(self.socket, wait=5) as gateway:

@@ -215,7 +215,7 @@ class Cancelled(unittest.TestCase):
 
         self.with_stand_in(story)
 
-    def test_cancelled_again_while_it_stops_it_ends_at_once(self):
+    def test_task_cancelled_again_while_stopping_ends_immediately(self):
         instants = random.Random(36)
 
         async def story(stand_in, path):

@@ -142,7 +142,7 @@ class Examples(RigCase):
         gaps = sorted(t for t, _, speed in self.rig.bus.setpoints() if speed != 0 and t > last_us + 500_000)
         self.assertLess(max(b - a for a, b in itertools.pairwise(gaps)), 200_000, "it stopped in between")
 
-    def test_gamepad_state_from_the_kernel_is_no_evidence(self):
+    def test_gamepad_state_from_the_kernel_is_no_report(self):
         pad, _, last_us = self.held()
         for _ in range(8):
             time.sleep(0.4)
@@ -182,7 +182,7 @@ class Examples(RigCase):
         self.addCleanup(child.stderr.close)
         return child
 
-    def test_a_recording_says_what_it_waits_for_and_that_it_began(self):
+    def test_recording_reports_its_wait_and_its_start(self):
         self.rig.kill_gateway(signal.SIGTERM)
         child = self.recorder(self.socket, self.rig.path("a.csv"))
         told = child.stderr.readline()
@@ -204,7 +204,7 @@ class Examples(RigCase):
         self.rig.kill_gateway(signal.SIGKILL)
         self.assertEqual(child.wait(5), 0)
 
-    def test_a_recording_that_cannot_be_written_says_so_at_once(self):
+    def test_recording_that_cannot_be_written_fails_immediately(self):
         child = self.recorder(self.socket, self.rig.path("no/such/folder.csv"))
         self.assertEqual(child.wait(5), 1)
         self.assertIn("No such file", child.stderr.read())

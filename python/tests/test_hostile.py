@@ -191,7 +191,7 @@ class Hostile(unittest.TestCase):
             asyncio.run(AsyncGateway(impostor.path, wait=30).status())
         self.assertLess(time.monotonic() - begin, 5)
 
-    def test_a_newer_protocol_is_still_told_to_stop(self):
+    def test_newer_protocol_still_gets_stop_and_estop(self):
         for ask in ("stop", "estop"):
             with self.subTest(ask):
                 impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n', hello=NEWER)
@@ -263,7 +263,7 @@ class Hostile(unittest.TestCase):
     def test_a_closed_connection_is_unavailable(self):
         self.both(b"", GatewayUnavailable, close=True)
 
-    def test_too_many_clients_is_told(self):
+    def test_too_many_clients_is_reported(self):
         says = b'{"id":null,"ok":false,"error":"too_many_clients","message":"close another one"}\n'
         self.both(says, GatewayUnavailable, close=True)
 
@@ -274,7 +274,7 @@ class Hostile(unittest.TestCase):
             Gateway(impostor.path).arm()
         self.assertEqual([json.loads(line)["cmd"] for line in impostor.heard], ["arm"])
 
-    def test_nobody_there_and_no_rights_tell_the_cure(self):
+    def test_missing_gateway_and_missing_rights_name_the_fix(self):
         with self.assertRaisesRegex(GatewayUnavailable, "no gateway listens there; start it"):
             Gateway("/nonexistent/socket").status()
         impostor = Impostor(b"")
@@ -282,7 +282,7 @@ class Hostile(unittest.TestCase):
         os.chmod(impostor.path, 0)
         self.assertIn("you may not use it; join its group", as_nobody(Gateway(impostor.path).status))
 
-    def test_the_socket_of_the_environment_is_taken(self):
+    def test_socket_of_the_environment_is_used(self):
         before = os.environ.get("IWHEEL_SOCKET")
         os.environ["IWHEEL_SOCKET"] = "/tmp/somewhere.sock"
         self.addCleanup(lambda: os.environ.pop("IWHEEL_SOCKET") if before is None else None)

@@ -347,7 +347,7 @@ class Requests(RigCase):
                     error = self.error(cmd, {**self.needed(request), name: self.example(field)[0] if field else 1})
                     self.assertEqual(error == "unknown_field", field is None, error)
 
-    def test_what_is_needed_is_asked_for_and_what_is_not_is_not(self):
+    def test_required_fields_are_required_and_optional_ones_are_not(self):
         for cmd, request in self.description.requests.items():
             for name, field in request["fields"].items():
                 with self.subTest(cmd, field=name):

@@ -208,7 +208,7 @@ class Driving(RigCase):
                     wheels.drive_for(1, 0, 0, rate_hz=bad)
             self.assertTrue(wheels.drive(4000, 2000).limited)
 
-    def test_whole_numbers_of_other_types_are_taken(self):
+    def test_whole_numbers_of_other_types_are_accepted(self):
         class Index:
             def __index__(self):
                 return 100
@@ -261,7 +261,7 @@ class Arming(RigCase):
                 self.assertTrue(gateway.status()["left"]["at_rest"])
                 wheels.drive(100, 100)
 
-    def test_without_waiting_the_refusal_is_raised_at_once(self):
+    def test_arm_without_wait_raises_the_refusal_immediately(self):
         with Gateway(self.socket) as gateway:
             with gateway.arm() as wheels:
                 wheels.drive_for(0.2, 300, 300)
@@ -269,7 +269,7 @@ class Arming(RigCase):
                 gateway.arm(wait=0)
             self.assertEqual(caught.exception.error, "stale_command")
 
-    def test_a_stick_that_is_held_is_waited_for_no_longer_than_told(self):
+    def test_stick_that_is_held_is_awaited_for_the_given_time_only(self):
         other = self.rig.client()
         quit_it = threading.Event()
 
@@ -290,7 +290,7 @@ class Arming(RigCase):
             self.assertGreater(time.monotonic() - begin, 0.7)
             self.assertLess(time.monotonic() - begin, 1.2)
 
-    def test_what_does_not_pass_by_itself_is_raised_at_once(self):
+    def test_permanent_refusal_is_raised_immediately(self):
         with Gateway(self.socket) as gateway:
             gateway.estop()
             begin = time.monotonic()
@@ -318,7 +318,7 @@ class Ending(RigCase):
             self.assertIsInstance(caught.exception, kind)
         return caught.exception
 
-    def test_a_lost_lease_is_told_while_its_events_are_still_unread(self):
+    def test_lost_lease_with_unread_events_is_reported(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("lease", "stop")
             wheels = self.lose(gateway)
@@ -327,26 +327,26 @@ class Ending(RigCase):
             seen = [event.get("change", event.get("cause")) for event in gateway.events(timeout=0.3)]
             self.assertEqual(seen, ["gained", "lease_lost", "lost"])
 
-    def test_after_a_lost_lease_a_new_permission_is_had_at_once(self):
+    def test_new_permission_after_lost_lease_is_granted_immediately(self):
         with Gateway(self.socket) as gateway:
             wheels = self.lose(gateway)
             self.ended(lambda: wheels.twist(200, 0), "not_armed")
             with gateway.arm() as again:
                 again.drive_for(0.2, 100, 100)
 
-    def test_drive_for_tells_it_too(self):
+    def test_drive_for_reports_a_lost_lease(self):
         with Gateway(self.socket) as gateway:
             wheels = self.lose(gateway)
             self.ended(lambda: wheels.drive_for(1, 200, 200), "not_armed")
 
-    def test_an_estop_is_told_with_its_reason(self):
+    def test_estop_is_reported_with_its_reason(self):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other, gateway.arm() as wheels:
             wheels.drive(200, 200)
             other.estop("a child runs by")
             told = self.ended(lambda: wheels.drive(200, 200), "latched")
             self.assertIn("a child runs by", str(told))
 
-    def test_somebody_else_who_drives_now_is_told_and_left_alone(self):
+    def test_new_driver_is_reported_and_not_disturbed(self):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other:
             wheels = gateway.arm()
             mine = other.arm("second", takeover=True)
@@ -389,7 +389,7 @@ class Telling(RigCase):
         self.assertLess(time.monotonic() - begin, 4)
         self.assert_stood_by(now_us(), 0)
 
-    def test_what_it_raises_stops_the_wheels(self):
+    def test_exception_in_on_status_stops_the_wheels(self):
         def stumble(status):
             if status["left"]["speed_mm_s"] > 100:
                 raise ZeroDivisionError
@@ -417,7 +417,7 @@ class Telling(RigCase):
 class Answers(RigCase):
     """What the gateway replies is handed out."""
 
-    def test_tare_tells_the_new_zero_and_the_one_before(self):
+    def test_tare_returns_the_new_zero_and_the_previous_one(self):
         with Gateway(self.socket) as gateway:
             self.wait_until(lambda: self.granted(gateway.tare), 6)
             tared = gateway.tare("left")
@@ -433,7 +433,7 @@ class Answers(RigCase):
         except Refused:
             return None
 
-    def test_confirm_tells_what_is_known_of_the_item(self):
+    def test_confirm_returns_the_assumption_of_the_item(self):
         with Gateway(self.socket) as gateway:
             entry = gateway.confirm("wheel_radius", 200.0)
             self.assertEqual((entry["state"], entry["found"]), ("contradicted", "200"))
@@ -452,7 +452,7 @@ class Answers(RigCase):
             with self.assertRaises(ValueError):
                 gateway.config("drive.lease_ms", 300.5)
 
-    def test_watch_tells_what_was_granted_and_stops_tell_the_state(self):
+    def test_watch_returns_the_grant_and_stops_return_the_state(self):
         with Gateway(self.socket) as gateway:
             self.assertEqual(gateway.watch("state", rate_hz=500), {"topics": ["state"], "rate_hz": 100, "limited": True})
             gateway.watch()
@@ -499,7 +499,7 @@ class Reconnecting(RigCase):
                     break
             self.assertEqual([name for name in seen if name != "state"], ["disconnected", "reconnected"])
 
-    def test_who_does_not_read_events_is_told_how_many_were_lost(self):
+    def test_unread_events_are_counted_as_lost(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("frame")
             time.sleep(4.0)
@@ -514,12 +514,12 @@ class Reconnecting(RigCase):
 
 
 class Reading(RigCase):
-    def test_what_is_not_known_is_none(self):
+    def test_unknown_values_are_none(self):
         with Gateway(self.socket) as gateway:
             self.assertIsNone(gateway.status()["left"]["commanded_mm_s"])
             self.assertEqual(gateway.why()["number"], 0)
 
-    def test_two_threads_in_one_gateway_are_told(self):
+    def test_two_threads_in_one_gateway_are_reported(self):
         with Gateway(self.socket) as gateway:
             gateway.watch("stop")
             watcher = threading.Thread(target=lambda: list(gateway.events(timeout=0.5)))

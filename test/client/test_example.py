@@ -118,7 +118,7 @@ class Example(RigCase):
         with Gateway(self.socket) as gateway:
             self.assertEqual(("client_stop", "client.cpp"), (gateway.why()["cause"], gateway.why()["client_name"]))
 
-    def test_example_without_a_gateway_or_with_a_second_one_says_so(self):
+    def test_example_without_or_with_second_gateway_reports_it(self):
         self.start_driving()
         second = self.start(1)
         _, err = second.communicate(timeout=10)

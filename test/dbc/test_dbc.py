@@ -149,7 +149,7 @@ class TestDatabase(unittest.TestCase):
             # Of a setpoint the core has the longest period allowed, the DBC the gateway's own.
             self.assertTrue(message.cycle_time == int(period_ms) or (kind == "setpoint" and message.cycle_time < int(period_ms)))
 
-    def test_every_message_tells_its_number_in_hexadecimal(self):
+    def test_every_message_has_its_number_in_hexadecimal(self):
         for message in DATABASE.messages:
             self.assertIn(f"0x{message.frame_id:03X}", message.comment)
 

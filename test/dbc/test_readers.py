@@ -64,7 +64,7 @@ class Readers(unittest.TestCase):
                 compared += 1
         self.assertGreater(compared, 2 * len(LINES))
 
-    def test_what_python_can_writes_is_read_back(self):
+    def test_file_of_python_can_is_read_back(self):
         path = os.path.join(tempfile.mkdtemp(), "written.log")
         with can.CanutilsLogWriter(path, channel="vcan0") as writer:
             for i, more in enumerate(({}, {"is_extended_id": True}, {"is_remote_frame": True, "dlc": 5}, {"is_fd": True, "data": bytes(12)}, {"is_rx": False})):

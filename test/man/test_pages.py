@@ -109,7 +109,7 @@ class Missing(unittest.TestCase):
             page.flush()
             return subprocess.run([sys.executable, os.path.join(ROOT, "scripts", "man_pages.py"), page.name], capture_output=True, check=False).returncode
 
-    def test_a_page_of_what_is_not_there_is_none(self):
+    def test_page_without_its_program_is_an_error(self):
         self.assertEqual(self.renew("; file share/gateway.conf"), 0)
         self.assertNotEqual(self.renew("; file share/gone.conf"), 0)
         self.assertNotEqual(self.renew("; help iwheelctl"), 0)

@@ -135,7 +135,7 @@ def test_bridge_before_gateway_and_broker_waits_for_both(rig):
 
 
 @pytest.mark.rig(settings={"home_assistant": {"enabled": "yes"}})
-def test_home_assistant_is_told_sensors_that_are_in_the_state(rig):
+def test_home_assistant_gets_sensors_that_are_in_the_state(rig):
     rig.start()
     ha = rig.far("ha", topics=("homeassistant/#", "iwheel/#"))
     rig.online(ha)
@@ -289,7 +289,7 @@ def test_recording_is_fetched_in_pieces_with_checksum(rig):
     assert piece["size"] > 0 and piece["file_crc32"] is not None and far.ask("recording", name="../x.conf")["error"] == "bad_value"
 
 
-def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
+def test_gateway_that_hangs_stop_is_reported_not_delivered(rig):
     rig.start()
     far = rig.online()
     quote = far.quote()
@@ -484,7 +484,7 @@ def test_bridge_killed_with_stored_events_each_stop_comes_once(rig):
     far.tell("bridge killed while events wait", 4)
 
 
-def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
+def test_disk_full_events_wait_in_memory_and_are_reported(rig):
     def small_files():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
@@ -655,7 +655,7 @@ def test_credentials_wrong_or_readable_by_others_are_refused(rig):
         bridge.end()
 
 
-def test_another_bridge_with_the_same_directory_is_kept_out(rig):
+def test_second_bridge_with_the_same_directory_is_refused(rig):
     rig.start()
     rig.online()
     first = rig.bridge
@@ -691,7 +691,7 @@ def test_check_of_read_only_spool_warns_and_bridge_starts(rig):
     assert code == 0 and "warning" in words and "Read-only file system" in words, words
 
 
-def test_check_looks_at_everything_and_leaves_nothing_behind(rig):
+def test_check_judges_everything_and_leaves_no_file(rig):
     rig.start_bridge().end()
     for name in os.listdir(rig.path("spool")):
         os.unlink(os.path.join(rig.path("spool"), name))

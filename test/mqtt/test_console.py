@@ -381,7 +381,7 @@ def test_recording_with_piece_lost_or_refused_once_is_complete(rig):
     assert int(re.search(r"(\d+) asked for again", out).group(1)) >= 4, out
 
 
-def test_recording_that_stays_damaged_is_told_and_leaves_no_file(rig):
+def test_recording_that_stays_damaged_fails_and_leaves_no_file(rig):
     rig.start_broker()
     data = bytes(60000)
 
@@ -478,7 +478,7 @@ def test_mqtt5_event_refused_by_broker_is_stored_and_sent_later(rig):
     until(lambda: far.messages("info")[-1]["events"]["aside"] == 0, 20, "nothing is set aside any more")
 
 
-def test_mqtt5_at_a_broker_that_does_not_speak_it_names_the_cure(rig):
+def test_mqtt5_at_a_broker_without_it_names_the_fix(rig):
     if not shutil.which("nats-server"):
         raise Skip("nats-server is missing (scripts/install_tools check brings it)")
     port, mqtt = free_port(), free_port()

@@ -202,7 +202,7 @@ def test_forwarding_mosquitto_stores_while_fleet_is_down(rig):
     until(lambda: numbers(console) == list(range(first, last + 1)), 40, "all of them")
 
 
-def test_console_shows_who_is_there_and_who_stopped(rig):
+def test_console_shows_online_and_stopped_machines(rig):
     rig.start()
     rig.online()
     config = Path(rig.path("fleet.conf"))

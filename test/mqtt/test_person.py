@@ -134,7 +134,7 @@ def test_one_person_drives_and_the_second_is_busy(rig):
 
 
 @pytest.mark.rig(**DRIVING)
-def test_one_person_hands_over_at_standstill_only(rig):
+def test_one_person_passes_control_only_at_standstill(rig):
     rig.start()
     first, second = rig.online(rig.far("anna")), rig.far("ben")
     until(lambda: first.texts("state"), what="a state")

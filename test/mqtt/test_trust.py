@@ -93,7 +93,7 @@ def thief(rig, port, name, certificate, host="127.0.0.1", **options):
     return client
 
 
-def test_machine_cannot_take_the_name_of_another_at_mosquitto(rig):
+def test_machine_cannot_use_the_name_of_another_at_mosquitto(rig):
     port = start_fleet_broker(rig)
     use_tls(rig, "localhost", port)
     rig.start_gateway()
@@ -107,7 +107,7 @@ def test_machine_cannot_take_the_name_of_another_at_mosquitto(rig):
         one.close()
 
 
-def test_machine_cannot_take_the_name_of_another_at_nats(rig):
+def test_machine_cannot_use_the_name_of_another_at_nats(rig):
     """nats-server ties no name to a user: the bridge's own is random in each run, so that nobody can name it."""
     cluster = Cluster(rig)
     use_tls(rig, HOSTS[0], cluster.mqtt)

@@ -166,7 +166,7 @@ class Units(unittest.TestCase):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             self.assertEqual(([line for line in done.stderr.splitlines() if "iwheel" in line], done.returncode), ([], 0), done.stderr)
 
-    def test_the_template_differs_only_in_what_names_the_bus(self):
+    def test_template_differs_only_in_the_name_of_the_bus(self):
         plain, template = (read("systemd", unit).splitlines() for unit in GATEWAYS)
         different = {line.split("=")[0] for line in set(plain) ^ set(template)}
         self.assertEqual(different, {"Description", "ExecStart", "After"})
@@ -207,7 +207,7 @@ class Units(unittest.TestCase):
             with self.subTest(wrong):
                 self.assertNotEqual(complaints_of_udev(wrong + "\n"), [])
 
-    def test_udev_gives_only_to_groups_that_we_make(self):
+    def test_udev_uses_only_groups_that_we_create(self):
         made = set(re.findall(r"^g (\w+)", read("sysusers.d", "iwheel.conf"), re.MULTILINE))
         listed = set(re.findall(r'\bGROUP="([^"]*)"', read("udev", "60-iwheel.rules")))
         self.assertTrue(listed and listed <= made, f"{listed} is not among {made}")
@@ -218,7 +218,7 @@ class Units(unittest.TestCase):
         self.assertIn("\nSamplePoint=62.5%\n", text)
         self.assertIn("\nTransmitQueueLength=4\n", read("networkd", "70-iwheel-can.link"))
 
-    def test_sockets_may_have_the_room_that_the_gateway_asks_for(self):
+    def test_socket_buffers_may_be_as_large_as_requested(self):
         with open(os.path.join(ROOT, "port/linux/include/iwheel_linux/bus_link.h"), encoding="utf-8") as file:
             factors = re.search(r"IWL_LINK_ROOM_BYTES \((\d+)U \* (\d+)U \* (\d+)U\)", file.read()).groups()
         granted = re.search(r"^net\.core\.rmem_max = (\d+)$", read("sysctl.d", "10-iwheel.conf"), re.MULTILINE)
@@ -263,7 +263,7 @@ class Running(unittest.TestCase):
             code = subprocess.run([gateway, *arguments], capture_output=True, check=False, timeout=5).returncode
             self.assertIn(code, never, arguments)
 
-    def test_ready_watchdog_and_stopping_are_told(self):
+    def test_ready_watchdog_and_stopping_are_reported(self):
         rig = self.rig()
         notifications = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.addCleanup(notifications.close)
@@ -317,7 +317,7 @@ class Running(unittest.TestCase):
         self.assertGreater(len(allowed), 100)
         return allowed
 
-    def test_an_upgrade_while_somebody_drives_never_moves_a_wheel(self):
+    def test_upgrade_while_a_client_drives_never_moves_a_wheel(self):
         rig = self.rig()
         rig.start_gateway()
         with iwheel.Gateway(rig.path("gateway.sock"), wait=10) as gateway:
@@ -444,13 +444,13 @@ class Watchers(Rights):
         for action, answer in ((self.watch, "GatewayUnavailable"), (self.drive, "GatewayUnavailable"), (self.stop, "ok")):
             self.assertEqual(self.as_user([self.GROUP], action), answer)  # A stop takes the other socket.
 
-    def test_who_keeps_stopping_is_named_to_who_resets(self):
+    def test_reset_refused_by_repeated_stops_names_the_stopping_user(self):
         self.assertEqual(self.as_user([self.GROUP], self.stop), "ok")
         with self.assertRaises(iwheel.Refused) as refusal:
             iwheel.Gateway(self.driving).reset()
         self.assertRegex(str(refusal.exception), f"user {STRANGER} .process [0-9]+")
 
-    def test_iwheelctl_says_by_which_socket_it_watches(self):
+    def test_iwheelctl_reports_by_which_socket_it_watches(self):
         done = subprocess.run(
             [self.rig.program("iwheelctl"), "--socket", self.socket, "drive", "50", "50", "--for", "100ms"], capture_output=True, text=True, check=False
         )
@@ -518,7 +518,7 @@ class Strangers(unittest.TestCase):
         code, text = self.second()
         self.assertEqual(code, 69, text)
 
-    def test_a_folder_that_is_not_safe_is_refused_with_the_cure(self):
+    def test_unsafe_folder_is_refused_with_the_fix(self):
         for mode, owner, word in ((0o777, 0, "chmod go-w"), (0o775, 0, "chmod go-w"), (0o755, STRANGER, "give the directory")):
             folder = self.rig.path(f"folder-{mode:o}-{owner}")
             os.mkdir(folder)

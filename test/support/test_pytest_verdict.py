@@ -70,7 +70,7 @@ FAULTS = (
     ),
     ("tests that are together run apart", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
     ("a stall explains what is exact", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
-    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_what_a_test_counts_as"),
+    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_number_of_tests_of_a_test_counts"),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     (
         "others hear of each attempt",
@@ -83,8 +83,8 @@ FAULTS = (
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
-    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_what_a_folder_concludes_counts"),
-    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_what_a_folder_concludes_counts"),
+    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_verdict_of_a_folder_counts"),
+    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_verdict_of_a_folder_counts"),
     (
         "virtual time is real",
         '(self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)',
@@ -95,14 +95,14 @@ FAULTS = (
         "what a kernel did not get to passes",
         'self.answers[name].put(f"{why}\\n{boot.complaint()}")',
         "self.answers[name].put(verdict.Attempt())",
-        "test_kernel_that_ends_early_fails_what_is_left",
+        "test_kernel_that_ends_early_fails_the_remaining_tests",
     ),
     ("without a kernel all is well", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
     (
         "what is for real time runs in virtual time",
         "items[:] = [item for item in items if item not in native]",
         "pass",
-        "test_what_needs_real_time_is_left_out_of_virtual_time",
+        "test_native_test_is_left_out_of_virtual_time",
     ),
     ("the sample is always the same", 'f"{key} {item.nodeid}"', "item.nodeid", "test_sample_is_of_the_commit"),
     ("an interrupted run goes on", "        self.over = True\n        self.nursery.close()\n", "", "test_interrupted_run_ends_with_its_tests"),
@@ -220,7 +220,7 @@ class Conclusive(Made):
     def test_collected_rule_is_final(self):
         self.assertIn("rule: moved", self.final('def test_one(t):\n    note("tried")\n    t.failures.append(verdict.Failure("moved", verdict.RULE))\n'))
 
-    def test_rule_beside_an_explained_failure_is_final(self):
+    def test_rule_next_to_an_explained_failure_is_final(self):
         self.final("""
             def test_one(t):
                 note("tried")
@@ -287,7 +287,7 @@ class Conclusive(Made):
         self.assertIn("did not end within 1 s", output)
         self.assertIn("in test_one", output, "Python says where it was")
 
-    def test_end_of_what_forks_the_attempts_is_final(self):
+    def test_end_of_the_forking_process_is_final(self):
         self.final('def test_one():\n    note("tried")\n    os.kill(os.getppid(), 9)\n    time.sleep(20)\n')
 
     def test_check_on_a_quiet_machine_is_final(self):
@@ -439,7 +439,7 @@ class Processes(Made):
         )
         self.assertEqual((0, "4 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
 
-    def test_what_a_test_counts_as(self):
+    def test_number_of_tests_of_a_test_counts(self):
         ran = self.run_made('def test_one(record_property):\n    record_property("tests", 7)\n')
         self.assertEqual((0, "7 passed, 0 failed, 0 skipped"), (ran.status, ran.last), ran.lines)
 
@@ -490,11 +490,11 @@ class Processes(Made):
         self.assertEqual((0, "2 passed, 0 failed, 1 skipped", ["prepared"]), (ran.status, ran.last, ran.notes), ran.lines)
         self.assertIn("skip: test_it.py::Test::test_three: no port", ran.lines)
 
-    def test_what_was_measured_is_told(self):
+    def test_measurements_are_printed(self):
         ran = self.run_made('def test_one(t):\n    t.figures.append("7 ms")\n')
         self.assertRegex("\n".join(ran.lines), r"test_one PASSED \(0\.\d s, 7 ms\)")
 
-    def test_what_a_folder_concludes_counts(self):
+    def test_verdict_of_a_folder_counts(self):
         conftest = """
             def pytest_verdict_end(run):
                 values = [value for attempt in run.passed.values() for report in attempt.data if report.when == "call" for value in report.data["values"]]
@@ -611,7 +611,7 @@ class Virtual(Made):
         self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
         self.assertIn("not within 1 s", "\n".join(ran.lines))
 
-    def test_kernel_that_ends_early_fails_what_is_left(self):
+    def test_kernel_that_ends_early_fails_the_remaining_tests(self):
         ran = self.virtual(self.TWO.format("os.kill(os.getppid(), 9)"), "--jobs", "1")
         self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
         self.assertIn("its kernel ended before it did", "\n".join(ran.lines))
@@ -621,7 +621,7 @@ class Virtual(Made):
         self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.told(ran), ran.lines)
         self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
 
-    def test_what_needs_real_time_is_left_out_of_virtual_time(self):
+    def test_native_test_is_left_out_of_virtual_time(self):
         tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")
         self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.told(self.virtual(tests)))
         self.assertEqual(["tried"], self.run_made(tests).notes)

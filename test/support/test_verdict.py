@@ -225,7 +225,7 @@ class Status(unittest.TestCase):
         attempts = {f"ok{n}": [ok()] for n in range(passed)} | {f"late{n}": [bad(verdict.CHECK)] * 4 for n in range(inconclusive)} | more
         return Made(attempts, [stall()]).run()
 
-    def test_all_stalled_is_75_and_says_so(self):
+    def test_all_stalled_is_75_and_is_reported(self):
         status, lines, _ = self.of(0, 3)
         self.assertEqual((75, "0 passed, 0 failed, 3 skipped"), (status, lines[-1]))
         self.assertTrue(lines[-2].startswith("real time not judged"), lines)
@@ -234,11 +234,11 @@ class Status(unittest.TestCase):
         self.assertEqual(75, self.of(5, 2)[0])
         self.assertEqual(0, self.of(6, 2)[0])
 
-    def test_a_quarter_of_what_runs_in_real_time(self):
+    def test_quarter_counts_only_tests_in_real_time(self):
         with contextlib.redirect_stdout(io.StringIO()):
             self.assertEqual(75, verdict.summary(100, 0, 2, ["a", "b"], real_time=5))
 
-    def test_failure_outweighs_what_is_not_judged(self):
+    def test_failure_outranks_unjudged_tests(self):
         self.assertEqual(1, self.of(0, 3, bad=[bad(verdict.RULE)])[0])
 
     def test_nothing_that_ran_is_no_success(self):
@@ -264,7 +264,7 @@ class Words(unittest.TestCase):
 class Processes(unittest.TestCase):
     """Tests the sleepers."""
 
-    def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
+    def test_sleepers_notice_a_stalled_machine_and_end(self):
         witness = verdict.Witness()
         try:
             time.sleep(0.5)
@@ -367,7 +367,7 @@ class Check(unittest.TestCase):
         self.assertRegex(lines[-2], "^real time not judged: system;")
         self.assertRegex(lines[-3], "^1 inconclusive, counted as skipped")
 
-    def test_inconclusive_test_alone_is_told_and_no_failure(self):
+    def test_inconclusive_test_alone_is_reported_and_no_failure(self):
         status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system")
         self.assertEqual((0, "4 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
         self.assertRegex(lines[-2], "^1 inconclusive, counted as skipped")
@@ -419,7 +419,7 @@ def seed(old, new):
         try:
             suite().run(result)
             if result.wasSuccessful():
-                Processes("test_sleepers_notice_a_machine_that_stands_still_and_end").run(result)
+                Processes("test_sleepers_notice_a_stalled_machine_and_end").run(result)
         finally:
             verdict = sound
     return [case.id().split(".")[-1] for case, _ in result.failures + result.errors]

@@ -457,7 +457,7 @@ def test_gateway_killed_is_said_and_found_again(rig):
     assert rig.web.text().count("is gone; waiting for it") == 1
 
 
-def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
+def test_gateway_that_hangs_stop_is_reported_not_delivered(rig):
     rig.start().connected()
     rig.gateway.signal(signal.SIGSTOP)
     status, body = rig.ask_json("POST", "/api/stop")
