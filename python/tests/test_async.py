@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""AsyncGateway and AsyncArmed against the real daemon."""
+"""AsyncGateway and AsyncArmed with the real daemon."""
 
 import asyncio
 import signal
@@ -103,7 +103,7 @@ class Async(RigCase):
                 await gateway.watch("lease", "stop")
                 wheels = await gateway.arm()
                 await wheels.drive(200, 200)
-                time.sleep(1.4)  # The loop does not run: what has come is still in the socket.
+                time.sleep(1.4)  # The loop does not run, so the received events are still in the socket.
                 with self.assertRaises(LeaseEnded):
                     await wheels.drive_for(1, 200, 200)
                 return [event.get("change", event.get("cause")) async for event in gateway.events(timeout=0.3)]
@@ -156,13 +156,13 @@ class Async(RigCase):
     def test_drive_for_reports_status_and_true_ends_it(self):
         seen = []
 
-        def tell(status):
+        def collect(status):
             seen.append(status["left"]["speed_mm_s"])
             return seen[-1] > 150
 
         async def story():
             async with AsyncGateway(self.socket).arm() as wheels:
-                return await wheels.drive_for(30, 300, 300, on_status=tell, rate_hz=40)
+                return await wheels.drive_for(30, 300, 300, on_status=collect, rate_hz=40)
 
         begin = time.monotonic()
         self.assertEqual(self.run_async(story()).left_mm_s, 300)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The examples, used as a person would."""
+"""The examples, used as a person would use them."""
 
 import csv
 import itertools
@@ -83,7 +83,7 @@ class Examples(RigCase):
         self.wait_until(lambda: self.holder() == "gamepad", 5)
         os.write(pad, self.event(-32767, 2, 1))
         time.sleep(0.4)
-        self.assertEqual(self.last_motion_us(), 0, "it moved without the dead man's button")
+        self.assertEqual(self.last_motion_us(), 0, "it moved without the hold-to-run button")
         os.write(pad, self.event(1, 1, 4))
         time.sleep(0.5)
         self.assertGreater(self.last_motion_us(), 0)
@@ -125,7 +125,7 @@ class Examples(RigCase):
         time.sleep(1.8)
         self.assert_stood_by(last_us, 2000 + 150 + 700)
         self.assertIn("stopped: no report of the gamepad for 2 s", os.read(child.stderr.fileno(), 1000).decode())
-        os.write(pad, self.event(-32000, 2, 1))  # The link is back, the button was never let go.
+        os.write(pad, self.event(-32000, 2, 1))  # The link is back, and the button was never released.
         time.sleep(0.5)
         self.assert_stood_by(last_us, 2000 + 150 + 700)
         os.write(pad, self.event(0, 1, 4) + self.event(1, 1, 4))
@@ -185,9 +185,9 @@ class Examples(RigCase):
     def test_recording_reports_its_wait_and_its_start(self):
         self.rig.kill_gateway(signal.SIGTERM)
         child = self.recorder(self.socket, self.rig.path("a.csv"))
-        told = child.stderr.readline()
-        self.assertIn("no gateway listens there; start it", told)
-        self.assertIn("Waiting for the gateway, 60 minutes at most", told)
+        line = child.stderr.readline()
+        self.assertIn("no gateway listens there; start it", line)
+        self.assertIn("Waiting for the gateway, 60 minutes at most", line)
         self.rig.start_gateway()
         self.assertIn("recording 20 lines a second into", child.stderr.readline())
         self.rig.kill_gateway(signal.SIGKILL)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gateway and Armed against the real daemon: whatever happens to the program, the wheels stop."""
+"""Gateway and Armed with the real daemon: the wheels stop, whatever happens to the program."""
 
 import asyncio
 import os
@@ -19,11 +19,11 @@ from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, Le
 from iwheel._wire import add_piece
 
 BUDGET_MS = 987 + 100
-"""Lease, period and ramp of the default configuration of rig.py, and what a busy machine adds."""
+"""Lease, period and ramp of the configuration of rig.py, and the delay that a busy machine adds."""
 
 
 class Crowded(RigCase):
-    """Every place of the gateway is taken."""
+    """Occupies every place of the gateway."""
 
     config = {**RigCase.config, "northbound": {"max_clients": 4}}
 
@@ -119,7 +119,7 @@ class Driving(RigCase):
         self.assertNotEqual(child.returncode, 0)
         self.assert_stood_by(sent_us, 600)
         with Gateway(self.socket) as gateway:
-            # Gone: the interrupt met a request that was half sent, which only the end of the connection undoes.
+            # The connection has ended: the interrupt came while a request was half sent, and only that undoes it.
             self.assertIn(gateway.why()["cause"], ("client_stop", "client_gone"))
 
     def test_kill_9_stops_although_a_forked_child_lives_on(self):
@@ -301,7 +301,7 @@ class Arming(RigCase):
 
 
 class Ending(RigCase):
-    """Whatever ended the permission: the first call after it says so."""
+    """For each end of the permission, the first call after it reports the end."""
 
     def lose(self, gateway):
         wheels = gateway.arm()
@@ -322,8 +322,8 @@ class Ending(RigCase):
         with Gateway(self.socket) as gateway:
             gateway.watch("lease", "stop")
             wheels = self.lose(gateway)
-            told = self.ended(lambda: wheels.drive(200, 200), "not_armed")
-            self.assertIsInstance(told.__cause__, Refused)
+            raised = self.ended(lambda: wheels.drive(200, 200), "not_armed")
+            self.assertIsInstance(raised.__cause__, Refused)
             seen = [event.get("change", event.get("cause")) for event in gateway.events(timeout=0.3)]
             self.assertEqual(seen, ["gained", "lease_lost", "lost"])
 
@@ -343,8 +343,8 @@ class Ending(RigCase):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other, gateway.arm() as wheels:
             wheels.drive(200, 200)
             other.estop("a child runs by")
-            told = self.ended(lambda: wheels.drive(200, 200), "latched")
-            self.assertIn("a child runs by", str(told))
+            raised = self.ended(lambda: wheels.drive(200, 200), "latched")
+            self.assertIn("a child runs by", str(raised))
 
     def test_new_driver_is_reported_and_not_disturbed(self):
         with Gateway(self.socket) as gateway, Gateway(self.socket) as other:
@@ -363,8 +363,8 @@ class Ending(RigCase):
             self.ended(lambda: wheels.drive(100, 100), None)
 
 
-class Telling(RigCase):
-    """drive_for with on_status."""
+class OnStatus(RigCase):
+    """Tests of drive_for with on_status."""
 
     def test_every_command_is_followed_by_a_snapshot(self):
         seen = []
@@ -415,7 +415,7 @@ class Telling(RigCase):
 
 
 class Answers(RigCase):
-    """What the gateway replies is handed out."""
+    """The gateway's replies are returned."""
 
     def test_tare_returns_the_new_zero_and_the_previous_one(self):
         with Gateway(self.socket) as gateway:
