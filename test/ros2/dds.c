@@ -142,7 +142,7 @@ static void test_dds_reply_waits_for_the_reader_of_its_caller(void) {
     (void)dds_delete(peer);
 }
 
-static void test_dds_replies_to_callers_without_a_reader_leave_in_the_end(void) {
+static void test_dds_replies_to_callers_without_reader_are_sent_later(void) {
     static const ros_raw_t raw = {.size = 5, .bytes = {0, 1}};
     ros_request_t request;
     const dds_entity_t writer = client_of("arm");
@@ -169,6 +169,6 @@ int main(void) {
     RUN_TEST(test_dds_sample_that_cannot_be_read_is_a_request);
     RUN_TEST(test_dds_client_that_disposes_and_goes_is_no_request);
     RUN_TEST(test_dds_reply_waits_for_the_reader_of_its_caller);
-    RUN_TEST(test_dds_replies_to_callers_without_a_reader_leave_in_the_end);
+    RUN_TEST(test_dds_replies_to_callers_without_reader_are_sent_later);
     return UNITY_END();
 }
