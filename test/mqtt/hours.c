@@ -357,7 +357,7 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
     tell("network cut for an hour (virtual time), 360 stops meanwhile", 1);
 }
 
-static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted(void) {
+static void test_network_cut_for_an_hour_full_spool_counts_the_dropped(void) {
     begin((unsigned)(256.0 * hours), 5000);
     cut_network();
     stop_all_the_time(hours_ms(), 10000);
@@ -387,7 +387,7 @@ static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
     tell("connection cut behind any byte, in 20 minutes of virtual time", cuts);
 }
 
-static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly(void) {
+static void test_state_with_uneven_wake_ups_comes_at_configured_rate(void) {
     static const unsigned every_ms[] = {100, 500, 1000, 5000};
     for (size_t i = 0; i < sizeof every_ms / sizeof every_ms[0]; i++) {
         const unsigned wanted = 60000U / every_ms[i];
@@ -424,9 +424,9 @@ int main(int count, char **arguments) {
     }
     hours = (count > 1) ? strtod(arguments[1], NULL) : hours;
     UNITY_BEGIN();
-    RUN_TEST(test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly);
+    RUN_TEST(test_state_with_uneven_wake_ups_comes_at_configured_rate);
     RUN_TEST(test_network_cut_for_an_hour_each_event_once_in_order);
-    RUN_TEST(test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted);
+    RUN_TEST(test_network_cut_for_an_hour_full_spool_counts_the_dropped);
     RUN_TEST(test_network_cut_behind_any_byte_each_event_once_in_order);
     return UNITY_END();
 }

@@ -449,7 +449,7 @@ static void on_a_network(bool synchronised) {
     pass(1000);
 }
 
-static void test_ros_other_machine_may_not_arm_without_synchronised_clocks(void) {
+static void test_ros_other_machine_without_synchronised_clock_cannot_arm(void) {
     on_a_network(false);
     request_comes(ROS_ARM);
     pass(200);
@@ -480,7 +480,7 @@ static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
     TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.commanded_mm_s[IW_LEFT]);
 }
 
-static void test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command(void) {
+static void test_ros_command_of_unknown_clock_does_not_arm(void) {
     settings.drive.auto_arm = true;
     on_a_network(false);
     command_comes(0.0);
@@ -558,9 +558,9 @@ int main(void) {
     RUN_TEST(test_ros_one_person_keeps_the_wheels_until_they_are_stopped);
     RUN_TEST(test_ros_one_person_without_the_lease_has_nothing);
     RUN_TEST(test_ros_lease_that_ended_unseen_is_nobodys);
-    RUN_TEST(test_ros_other_machine_may_not_arm_without_synchronised_clocks);
+    RUN_TEST(test_ros_other_machine_without_synchronised_clock_cannot_arm);
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
-    RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);
+    RUN_TEST(test_ros_command_of_unknown_clock_does_not_arm);
     RUN_TEST(test_ros_command_that_arms_does_not_drive);
     RUN_TEST(test_ros_request_that_cannot_be_read_only_stops);
     RUN_TEST(test_ros_stop_at_rest_ends_arming_by_commands);

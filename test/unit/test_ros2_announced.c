@@ -100,7 +100,7 @@ static void test_announced_large_data_becomes_padding_and_the_rest_stays(void) {
 }
 
 /// CycloneDDS sends what is longer than 1344 bytes in fragments: the free data begins in the first one and ends in another.
-static void test_announced_data_that_begins_in_the_first_fragment_becomes_padding(void) {
+static void test_announced_data_begun_in_first_fragment_becomes_padding(void) {
     for (unsigned first = 1; first <= 2U; first++) {
         (void)begin(3, 0, true, false);
         memmove(message + 56, message + 44, 4); // The encapsulation, behind the longer head.
@@ -175,7 +175,7 @@ static void test_log_of_others_is_bounded_and_counts_what_it_leaves_out(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_announced_large_data_becomes_padding_and_the_rest_stays);
-    RUN_TEST(test_announced_data_that_begins_in_the_first_fragment_becomes_padding);
+    RUN_TEST(test_announced_data_begun_in_first_fragment_becomes_padding);
     RUN_TEST(test_announced_data_of_a_user_is_untouched);
     RUN_TEST(test_announced_message_that_is_cut_or_damaged_is_survived);
     RUN_TEST(test_log_of_others_is_bounded_and_counts_what_it_leaves_out);
