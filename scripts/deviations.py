@@ -42,7 +42,7 @@ LISTS = {
 }
 # Where nothing is looked for: what is built, and where these words stand for themselves.
 ELSEWHERE = {"build", ".git", ".venv", "__pycache__"}
-THEMSELVES = {"scripts/deviations.py", "test/gates/test_planted_faults.py"}
+THEMSELVES = {"scripts/deviations.py", "test/gates/test_seeded_faults.py"}
 WORDS = {".md", ".scd", ".svg", ".json.gz"}
 
 

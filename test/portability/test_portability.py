@@ -98,14 +98,14 @@ class Build:
         return count_unity(run([*self.emulator, self.link(name, [*common, *objects])], timeout=TIMEOUT_S))
 
 
-def planted_core(work):
+def seeded_core(work):
     """A core that reads words in the order of the machine it was written on, and must be found out."""
     core = work / "core"
     shutil.copytree(ROOT / "core", core)
     text = (core / "src/be.h").read_text()
     right = "((uint32_t)bytes[0] << 24) | ((uint32_t)bytes[1] << 16) | ((uint32_t)bytes[2] << 8) | bytes[3]"
     wrong = "__extension__({ uint32_t word; __builtin_memcpy(&word, bytes, 4); __builtin_bswap32(word); })"
-    assert right in text, f"be.h has no text {right!r} any more: mend the planted fault"
+    assert right in text, f"be.h has no text {right!r} any more: update the seeded fault"
     (core / "src/be.h").write_text(text.replace(right, wrong))
     return core
 
@@ -157,7 +157,7 @@ def test_unit(machine, compiler, level, name, record_property):
 
 
 def test_seeded_core_with_native_byte_order_is_detected(tmp_path, reference):
-    build = Build("s390x", "gcc", "-Os", tmp_path, planted_core(tmp_path))
+    build = Build("s390x", "gcc", "-Os", tmp_path, seeded_core(tmp_path))
     if build.missing:
         pytest.skip(f"{', '.join(build.missing)} missing (scripts/install_tools check brings it)")
     hashes = build.hashes()
