@@ -257,11 +257,11 @@ TEST(test_assumptions_file_how_is_written_only_if_set) {
 static bool believed(void) {
     length = gw_assumptions_file_write(&known, BUS, text, sizeof text);
     TEST_ASSERT_GREATER_THAN_UINT(0, length);
-    const bool taken = gw_assumptions_file_read(text, length, BUS, &got, reason);
-    if (!taken) {
+    const bool accepted = gw_assumptions_file_read(text, length, BUS, &got, reason);
+    if (!accepted) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "measured"), reason);
     }
-    return taken;
+    return accepted;
 }
 
 TEST(test_assumptions_file_bus_figure_beyond_limits_is_refused) {

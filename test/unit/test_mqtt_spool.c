@@ -284,10 +284,10 @@ TEST(test_spool_disk_full_at_any_byte_loses_nothing) {
     struct rlimit before;
     (void)getrlimit(RLIMIT_FSIZE, &before);
     (void)signal(SIGXFSZ, SIG_IGN);
-    for (rlim_t room = 0; room < 400U; room++) {
+    for (rlim_t limit = 0; limit < 400U; limit++) {
         tearDown();
         setUp();
-        const struct rlimit small = {room, before.rlim_max};
+        const struct rlimit small = {limit, before.rlim_max};
         (void)setrlimit(RLIMIT_FSIZE, &small);
         for (unsigned i = 1; i <= 6; i++) {
             add(i);

@@ -63,10 +63,10 @@ static void put_heartbeat(bool little, uint8_t writer_kind, int64_t first, int64
 }
 
 /// Does not change the message. Returns 0 if there is nothing to add.
-static size_t await_in(int64_t now_us, size_t count, size_t room) {
+static size_t await_in(int64_t now_us, size_t count, size_t capacity) {
     memset(out, 0xA5, sizeof out);
     memcpy(out, message, count);
-    const size_t used = rtps_await_firsts(&firsts, now_us, out, count, room);
+    const size_t used = rtps_await_firsts(&firsts, now_us, out, count, capacity);
     TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, out + used, sizeof out - used);
     if (used == count) {
         TEST_ASSERT_EQUAL_MEMORY(message, out, count);
@@ -178,8 +178,8 @@ TEST(test_firsts_damaged_message_or_small_buffer_is_unchanged) {
     for (size_t size = 1; size < whole; size++) {
         TEST_ASSERT_EQUAL_size_t((size == HEAD + BEAT) ? size + BEAT : 0U, await_in(0, size, sizeof out));
     }
-    for (size_t room = whole; room < whole + BEAT; room++) {
-        TEST_ASSERT_EQUAL_size_t(0, await_in(0, whole, room));
+    for (size_t capacity = whole; capacity < whole + BEAT; capacity++) {
+        TEST_ASSERT_EQUAL_size_t(0, await_in(0, whole, capacity));
     }
     TEST_ASSERT_EQUAL_size_t(whole + BEAT, await_in(0, whole, whole + BEAT));
     message[HEAD + 2U] = 27; // Too short for a heartbeat.

@@ -269,9 +269,9 @@ TEST(test_service_mark_is_stored_for_the_newest_callers_only) {
         length = 0;
         begin_message();
         put_data(true, i, NULL, 0);
-        const bool kept = i > 2U && i <= ROS_MARKS + 2U;
-        TEST_ASSERT_EQUAL_size_t(kept ? length + ROS_MARK_SIZE : 0U, mark());
-        if (kept) {
+        const bool stored = i > 2U && i <= ROS_MARKS + 2U;
+        TEST_ASSERT_EQUAL_size_t(stored ? length + ROS_MARK_SIZE : 0U, mark());
+        if (stored) {
             TEST_ASSERT_TRUE(ros_service_identify(out, sizeof out, 20, &caller));
             TEST_ASSERT_EACH_EQUAL_HEX8(i, caller.guid, ROS_GUID_SIZE);
         }
@@ -287,8 +287,8 @@ TEST(test_service_mark_of_a_damaged_message_is_none) {
     for (length = 0; length < whole; length++) {
         TEST_ASSERT_EQUAL_size_t(0, mark());
     }
-    for (size_t room = 0; room < whole + ROS_MARK_SIZE; room++) {
-        TEST_ASSERT_EQUAL_size_t(0, ros_service_mark(&marks, message, whole, out, room));
+    for (size_t capacity = 0; capacity < whole + ROS_MARK_SIZE; capacity++) {
+        TEST_ASSERT_EQUAL_size_t(0, ros_service_mark(&marks, message, whole, out, capacity));
     }
     TEST_ASSERT_EQUAL_size_t(whole + ROS_MARK_SIZE,
                              ros_service_mark(&marks, message, whole, out, whole + ROS_MARK_SIZE));
