@@ -311,7 +311,7 @@ TEST(test_assumptions_file_bus_source_of_operator_item_is_refused) {
         fill_item(items[i]);
         TEST_ASSERT_TRUE(believed());
         known.item[items[i]].entry.figure = 1;
-        TEST_ASSERT_FALSE_MESSAGE(believed(), "the operator gives no figure");
+        TEST_ASSERT_FALSE_MESSAGE(believed(), "the operator states no figure");
         known.item[items[i]].entry.figure = 0;
         known.item[items[i]].entry.source = IW_SOURCE_BUS;
         TEST_ASSERT_FALSE(believed());

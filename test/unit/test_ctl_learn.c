@@ -395,7 +395,7 @@ TEST(test_learn_lag_above_the_assumption_is_marked) {
     assert_lag(120.0, 0.0);
     TEST_ASSERT_EQUAL_CHAR('-', lag_found(IW_LEFT, "wheel_lag")->mark);
     TEST_ASSERT_EQUAL_CHAR('?', lag_found(IW_RIGHT, "wheel_lag")->mark);
-    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // One wheel alone gives no common value.
+    TEST_ASSERT_NULL(lag_found(LEARN_BOTH, "wheel_lag_ms")); // One wheel alone has no common value.
     drives.lag[IW_RIGHT] = drives.lag[IW_LEFT];
     TEST_ASSERT_EQUAL_INT32(120, (atoi(lag_found(LEARN_BOTH, "wheel_lag_ms")->value) + 5) / 10 * 10);
 }

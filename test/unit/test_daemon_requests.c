@@ -377,7 +377,7 @@ TEST(test_still_moving_is_reported_once_as_a_complete_event) {
     TEST_ASSERT_NULL(strstr(offset_event + strlen("\"cause\":\"still_moving"), "still_moving"));
 }
 
-/// Gives the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
+/// Passes the daemon a snapshot with rolling wheels or not, and counts the matching events at a watcher.
 static unsigned count_told(bool rolling, bool is_fault, const char *words) {
     static char text[8192];
     gw_daemon_t *daemon = daemon_rig.daemon;
@@ -448,7 +448,7 @@ TEST(test_rolling_fault_is_recorded_with_each_report) {
     box->config.blackbox_s = 1;
     box->writer.fd = ends[0];
     (void)count_told(true, false, "rolling");
-    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // Somebody pushes the machine.
+    TEST_ASSERT_EQUAL_UINT(0, take_orders(ends[1], &order)); // A person pushes the machine.
     (void)count_told(true, true, "rolling");
     TEST_ASSERT_EQUAL_UINT(1, take_orders(ends[1], &order));
     TEST_ASSERT_EQUAL_STRING("rolling", order.cause);

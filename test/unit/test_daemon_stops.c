@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A stop is never refused and never queues, even if all places of both sockets are taken, in virtual time.
+// A stop is never refused and never queues, even if all places of both sockets are occupied, in virtual time.
 #include "daemon_client.h"
 
 #include "unit.h"
@@ -38,7 +38,7 @@ static void join(sock_right_t right, unsigned count) {
     }
 }
 
-/// Takes every ordinary place of both sockets; `client` has one of them.
+/// Occupies every ordinary place of both sockets; `client` has one of them.
 static void take_all_places(void) {
     sock_clients_t *clients = &daemon_rig.daemon->clients;
     while (crowded > 0U) { // Connections of the test before
@@ -179,7 +179,7 @@ TEST(test_stop_never_refused_without_descriptors) {
     (void)close(fd);
 }
 
-/// Opens a thousand silent connections of the same user per second, which stay open as long as possible.
+/// Opens a thousand idle connections of the same user per second, which stay open as long as possible.
 static void flood(sock_right_t right, unsigned for_ms) {
     static int open_ones[64];
     static unsigned next;
@@ -204,7 +204,7 @@ TEST(test_stop_never_refused_with_1000_connections_a_second) {
             flood(right, later_ms);
             send_lines(fd, stops[later_ms % 3U]);
             flood(right, 30);
-            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.commanded_mm_s[IW_LEFT], "beside a flood");
+            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.commanded_mm_s[IW_LEFT], "during a flood");
             TEST_ASSERT_NOT_NULL_MESSAGE(strstr(receive(fd), "\"ok\":true"), text);
             (void)close(fd);
             come_to_rest();
@@ -278,7 +278,7 @@ TEST(test_stop_of_an_overflowing_connection_is_executed) {
     take_all_places();
     begin_driving();
     ask_too_much_and_stop(crowd[0], &daemon_rig.daemon->clients.client[1]);
-    assert_slower("given up");
+    assert_slower("closed");
     TEST_ASSERT_EQUAL_UINT(15, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
 }
 
@@ -296,7 +296,7 @@ TEST(test_stop_not_yet_read_of_a_broken_connection_is_executed) {
 TEST(test_stop_of_an_overflowing_holder_has_cause_client_stop) {
     begin_driving();
     ask_too_much_and_stop(client, &daemon_rig.daemon->clients.client[0]);
-    assert_slower("given up");
+    assert_slower("closed");
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
 }
 
@@ -323,8 +323,8 @@ TEST(test_stop_place_of_a_silent_connection_is_free_after_200_ms) {
     daemon_rig.waits = 0;
     daemon_rig_run(150);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(SOCK_STOP_PLACES, clients->count[SOCK_STOP],
-                                   "while nobody wants its place it stays");
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and keeps nobody awake");
+                                   "while no client needs its place it stays");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and does not wake the loop");
     daemon_rig_run(60);
     TEST_ASSERT_EQUAL_UINT(0, clients->count[SOCK_STOP]);
     for (unsigned i = before; i < crowded; i++) {

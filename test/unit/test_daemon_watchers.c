@@ -283,7 +283,7 @@ TEST(test_flood_of_requests_of_a_watcher_is_served_at_its_rate) {
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
     TEST_ASSERT_UINT_WITHIN(1, 100000U / SOCK_WATCHER_LINE_US, replies_of(watcher));
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "lines that have to wait keep nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "waiting lines do not wake the loop");
     daemon_rig_run(1000);
     TEST_ASSERT_UINT_WITHIN(2, 100U - SOCK_LINES_PER_CYCLE - 10U, replies_of(watcher));
     for (unsigned i = 0; i < 10U; i++) {
@@ -337,7 +337,7 @@ TEST(test_estop_of_a_watcher_that_ends_immediately_latches) {
     daemon_rig_run(100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[SOCK_WATCH]);
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "a client that has gone does not wake the loop");
 }
 
 TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
@@ -355,7 +355,7 @@ TEST(test_flood_of_new_watchers_is_accepted_at_its_rate) {
     daemon_rig_run(9);
     TEST_ASSERT_EQUAL_UINT(1U + SOCK_ACCEPTS_PER_CYCLE * (9000U / SOCK_WATCHER_ACCEPT_US + 1U),
                            daemon_rig.daemon->clients.count[SOCK_WATCH]);
-    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "waiting clients do not wake the loop");
     daemon_rig_run(20);
     TEST_ASSERT_EQUAL_UINT(61, daemon_rig.daemon->clients.count[SOCK_WATCH]);
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig_logged("turned away"));
@@ -401,7 +401,7 @@ TEST(test_client_without_descriptor_is_accepted_later) {
     TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
     TEST_ASSERT_EQUAL_UINT(1, count);
     TEST_ASSERT_EQUAL_UINT(1, lines);
-    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it keeps nobody awake");
+    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it does not wake the loop");
     TEST_ASSERT_EQUAL_UINT(1, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
     daemon_rig_run(10);
     TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[SOCK_DRIVE]);
@@ -442,7 +442,7 @@ TEST(test_round_of_sending_ends_after_its_time) {
     }
     TEST_ASSERT_UINT_WITHIN(1, SOCK_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(sock_service_is_busy(clients));
-    daemon_rig_run(20); // All is sent: a client without waiting bytes takes no time.
+    daemon_rig_run(20); // All is sent: a client without waiting bytes needs no time.
     daemon_rig.look_takes_us = 2U * SOCK_ROUND_US;
     sock_service_flush(clients, IW_CLIENT_NONE);
     daemon_rig.look_takes_us = 0;

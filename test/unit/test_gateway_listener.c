@@ -140,7 +140,7 @@ TEST(test_socket_folder_behind_a_symbolic_link_is_refused) {
 TEST(test_socket_folder_replaced_after_the_check_is_not_used) {
     char aside[80];
     struct stat status;
-    (void)snprintf(aside, sizeof aside, "%s/kept", folder);
+    (void)snprintf(aside, sizeof aside, "%s/moved", folder);
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("a"), 0755));
     TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("b"), 0755));
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/a/gateway.sock", folder);
@@ -149,9 +149,9 @@ TEST(test_socket_folder_replaced_after_the_check_is_not_used) {
     TEST_ASSERT_EQUAL_INT(0, symlink("b", in_folder("a")));
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), logged);
     TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("b/gateway.sock"), &status));
-    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("kept/gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("moved/gateway.sock"), &status));
     sock_listener_close(&listener);
-    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("moved/gateway.sock"), &status));
 }
 
 TEST(test_socket_has_its_mode_and_group_same_working_directory) {

@@ -424,7 +424,7 @@ TEST(test_lock_held_by_another_user_is_given_up_to_root) {
     TEST_ASSERT_EQUAL_INT(sizeof holder, read(ready[0], &holder, sizeof holder));
     TEST_ASSERT_EQUAL_INT(0, holder.uid);
     TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
-    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
+    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_poll(&first.lock, GW_BUS_LOCK_LOOK_US), "root yields to no other gateway");
     for (size_t i = 0; i < 2U; i++) {
         (void)close(go[i]);
         (void)close(ready[i]);
@@ -504,5 +504,5 @@ TEST(test_marker_of_another_user_is_ignored) {
     TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_INT(0, lstat(first.marker_path, &status));
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "he could take his own away again");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "the user could remove the file again");
 }

@@ -43,7 +43,7 @@ static void expect(const char *check, inspect_verdict_t verdict, const char *tex
     TEST_ASSERT_EQUAL_MESSAGE(verdict, finding->verdict, finding->text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->text, text), finding->text);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->cure, fix), finding->cure);
-    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every trouble has a cure");
+    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every finding has a fix");
 }
 
 TEST(test_inspect_healthy_bus_has_no_finding) {

@@ -126,7 +126,7 @@ TEST(test_line_that_cannot_open_returns_errno_and_leaks_nothing) {
     TEST_ASSERT_EQUAL_INT(ENOENT, iwl_gpio_line_open(&line, &nowhere));
     const iwl_gpio_address_t no_such = {.name = FAKE_GPIO_CHIP, .offset = 99, .by_offset = true};
     const int error = iwl_gpio_line_open(&line, &no_such);
-    TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "as the library says it");
+    TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "with the library's error");
     TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
 }

@@ -218,7 +218,7 @@ TEST(test_spool_flipped_bit_loses_only_events_from_there_on) {
         for (; mqtt_spool_after(&spool, number, &event); number = event.number) {
             found++;
         }
-        TEST_ASSERT_TRUE_MESSAGE(found < 3U, "what is wrong is not told");
+        TEST_ASSERT_TRUE_MESSAGE(found < 3U, "the fault is not reported");
         expect(1, found);
     }
 }

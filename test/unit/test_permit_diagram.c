@@ -58,7 +58,7 @@ static const struct {
     {IW_PHASE_ARMING, STRANGER, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, STRANGERS, IW_PHASE_LISTENING},
     {IW_PHASE_ARMING, CAUSE_ALWAYS, IW_PHASE_CUT},
-    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold takes longer than the limit of the confirmation.
+    {IW_PHASE_ARMING, HELD, IW_PHASE_LISTENING}, // A hold lasts longer than the limit of the confirmation.
 
     {IW_PHASE_ARMED, LEASE_LOST, IW_PHASE_BRAKING},
     {IW_PHASE_ARMED, STOP, IW_PHASE_BRAKING},

@@ -6,11 +6,11 @@
 
 #include <string.h>
 
-#define ROOM 256U
+#define SIZE 256U
 
 static ros_caller_t caller;
-static uint8_t message[ROOM];
-static uint8_t out[ROOM];
+static uint8_t message[SIZE];
+static uint8_t out[SIZE];
 static size_t length;
 static ros_marks_t marks;
 
@@ -175,7 +175,7 @@ TEST(test_service_reply_that_does_not_fit_is_cut) {
     for (size_t size = 40; size < 100U; size++) {
         memset(out, 0xA5, sizeof out);
         const size_t used = ros_service_write(
-            &caller, true, "a text that is longer than what there is room for in it, by far", out, size);
+            &caller, true, "a text that is much longer than the space for it in the message", out, size);
         TEST_ASSERT_LESS_OR_EQUAL_size_t(size, used);
         TEST_ASSERT_EQUAL_HEX8(0, out[used - 1U]);
         TEST_ASSERT_EQUAL_HEX8(0xA5, out[size]);

@@ -106,7 +106,7 @@ TEST(test_round_continues_after_the_last_served_client) {
         TEST_ASSERT_GREATER_THAN_UINT(before, served());
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
         for (unsigned i = 0; i < served(); i++) {
-            TEST_ASSERT_TRUE_MESSAGE(is_served(i), "in order, nobody twice before everybody once");
+            TEST_ASSERT_TRUE_MESSAGE(is_served(i), "in order, no client twice before each client once");
         }
         before = served();
     }

@@ -53,7 +53,7 @@ static int open_socket(const char *path, int type) {
         }
         (void)poll(NULL, 0U, 1);
     }
-    TEST_FAIL_MESSAGE("nobody listens");
+    TEST_FAIL_MESSAGE("there is no listener");
     return -1;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// A pair of simulated wheels with a driver beside it, and an account of what it sent.
+/// A pair of simulated wheels with a driver, and an account of the frames that it sent.
 #ifndef TEST_SIM_RIG_H
 #define TEST_SIM_RIG_H
 
@@ -12,7 +12,7 @@
 /// Both wheels are there.
 #define BOOTED (START_US + 500U * MS)
 
-/// What was sent of one id.
+/// The frames of one id.
 typedef struct {
     uint32_t count;
     iw_time_us_t first_us;
@@ -26,16 +26,16 @@ extern sim_pair_config_t config;
 extern sim_pair_t pair;
 extern seen_t seen[2048]; ///< By id.
 
-/// A default pair that begins to boot at START_US; nobody drives.
+/// Begins with a default pair that boots at START_US, without a driver.
 void rig_init(void);
 
-/// The account begins anew.
+/// Resets the account.
 void rig_forget(void);
 
-/// Runs the pair; if somebody drives, both wheels are told so every 20 ms.
+/// Runs the pair; a driver commands both wheels every 20 ms.
 void rig_run(iw_time_us_t from_us, iw_time_us_t until_us);
 
-/// From now on both wheels are told this, with 2000 mA; until `rig_let_go`.
+/// Commands both wheels from now on, with 2000 mA, until `rig_let_go`.
 void rig_drive(int16_t left_mm_s, int16_t right_mm_s);
 void rig_let_go(void);
 
