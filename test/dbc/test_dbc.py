@@ -45,7 +45,7 @@ UNIT_OF_SUFFIX = {
     "_raw": None,
     "_type": None,
 }
-# Where the DBC says more than the C codec, which does not know the unit of a force.
+# Names of fields whose unit the DBC defines: the C codec does not know the unit of a force.
 DBC_NAME = {
     (266, "type"): "setpoint_type",
     (298, "type"): "setpoint_type",
@@ -146,7 +146,7 @@ class TestDatabase(unittest.TestCase):
             message = DATABASE.get_message_by_frame_id(int(can_id))
             self.assertEqual(f"{side}{kind}", message.name.lower())
             self.assertEqual(int(length), message.length)
-            # Of a setpoint the core has the longest period allowed, the DBC the gateway's own.
+            # The core's row of a setpoint contains the longest permitted period; the DBC contains the gateway's default.
             self.assertTrue(message.cycle_time == int(period_ms) or (kind == "setpoint" and message.cycle_time < int(period_ms)))
 
     def test_every_message_has_its_number_in_hexadecimal(self):

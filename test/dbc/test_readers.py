@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Other people's programs read a recording of the black box as it is, and cantools with share/iwheel.dbc sees in it what `iwheelctl decode` sees."""
+"""Third-party programs read an unmodified recording of the black box. cantools with share/iwheel.dbc decodes the same values as `iwheelctl decode`."""
 
 import csv
 import io
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "test/recordings/estop.log"
 LINES = RECORDING.read_text(encoding="ascii").splitlines()
 PROGRAM = os.path.join(os.environ["IWHEEL_BUILD"], "app/ctl/iwheelctl")
-# The decoder's columns beside the DBC's names.
+# The columns of `iwheelctl decode` whose names differ from those in the DBC.
 COLUMN = {
     "speed_mm_s": "setpoint_speed_mm_s",
     "current_mA": "setpoint_current_mA",
