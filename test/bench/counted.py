@@ -192,7 +192,7 @@ def arm_steps(work, cpu, more=()):
 def status_events(build):
     """{which part is cached: instructions of one event `state` on this machine}, for the gateway of that build."""
     program, few, many = Path(build) / "test/bench_status", 20, 120
-    return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("kept", "anew")}
+    return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("same", "changed")}
 
 
 def client_reads(work, build, *fields):

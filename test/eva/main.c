@@ -250,7 +250,7 @@ static void observe(iw_side_t side) {
 
 /// Functions outside the loop of a gateway: the codec's other direction, the bit timing.
 static void calculate(void) {
-    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_wheel_t messages[IW_SIDES];
     iw_can_frame_t frame;
     iw_bit_timing_t timing = {any_u16(), any_u16(), any_u16()};
     const iw_bit_timing_limits_t limits = {any_u16(), any_u16(), any_u16(), any_u16(), any_u16()};
@@ -260,11 +260,11 @@ static void calculate(void) {
     (void)iw_codec_find(any_u32());
     const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_POSE);
     const iw_side_t side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
-    Frama_C_make_unknown((char *)told, sizeof told);
+    Frama_C_make_unknown((char *)messages, sizeof messages);
     (void)iw_codec_name(kind);
-    (void)iw_codec_encode(kind, side, &told[side], &frame);
+    (void)iw_codec_encode(kind, side, &messages[side], &frame);
     (void)receive_frame(NULL, &frame);
-    (void)iw_codec_decode(&frame, told);
+    (void)iw_codec_decode(&frame, messages);
 }
 
 static void event(void) {

@@ -77,8 +77,8 @@ class Meanings(Finder):
         if all(text.startswith("iwn_out_") for text in texts):
             return True
         if logs[0] != logs[1]:
-            told, target = texts[logs.index(True)].partition(",")[2], targets[logs.index(False)]
-            return target not in told if target else not re.search(r"->|\w\(", told)
+            arguments, target = texts[logs.index(True)].partition(",")[2], targets[logs.index(False)]
+            return target not in arguments if target else not re.search(r"->|\w\(", arguments)
         return all(targets) and targets[0] not in texts[1] and targets[1] not in texts[0]
 
     def mean_DeclRefExpr(self, node):

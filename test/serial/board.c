@@ -35,17 +35,17 @@ static bool line_ended;
 
 /// The image reads byte by byte.
 size_t brd_serial_read(char *out, size_t size) {
-    static char taken[4096];
+    static char input[4096];
     static size_t at;
     static size_t end;
     if (at == end) {
-        const ssize_t count = read(STDIN_FILENO, taken, sizeof taken);
+        const ssize_t count = read(STDIN_FILENO, input, sizeof input);
         line_ended = line_ended || count == 0;
         at = 0;
         end = (count > 0) ? (size_t)count : 0U;
     }
     const size_t left = (end - at < size) ? end - at : size;
-    memcpy(out, &taken[at], left);
+    memcpy(out, &input[at], left);
     at += left;
     return left;
 }

@@ -423,7 +423,7 @@ while True:
 
 
 class Watchers(Rights):
-    """Members of the second socket's group may watch and stop, never drive, and take nothing from the driver."""
+    """Members of the second socket's group may watch and stop. They can never drive, and they use no place of the drivers' socket."""
 
     GROUP = 4
     """A group with some name on every Debian (adm); group `daemon` (1) may drive."""
@@ -442,7 +442,7 @@ class Watchers(Rights):
             self.assertEqual(self.as_user([self.GROUP], action), answer)
         self.socket = self.driving
         for action, answer in ((self.watch, "GatewayUnavailable"), (self.drive, "GatewayUnavailable"), (self.stop, "ok")):
-            self.assertEqual(self.as_user([self.GROUP], action), answer)  # A stop takes the other socket.
+            self.assertEqual(self.as_user([self.GROUP], action), answer)  # For the stop, the client uses the watch socket.
 
     def test_reset_refused_by_repeated_stops_names_the_stopping_user(self):
         self.assertEqual(self.as_user([self.GROUP], self.stop), "ok")

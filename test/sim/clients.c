@@ -26,7 +26,7 @@ static void judge_refused(rig_t *rig, const iw_gateway_t *before) {
     }
 }
 
-static void tell(rig_t *rig, const request_t *request, iw_refusal_t result) {
+static void note_result(rig_t *rig, const request_t *request, iw_refusal_t result) {
     rig->result->stats.requests++;
     rig->result->stats.refused[result]++;
     rig_hash(rig, ((uint64_t)request->kind << 32) ^ ((uint64_t)request->id << 8) ^ (uint64_t)result);
@@ -65,7 +65,7 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
     memset(&applied, POISON, sizeof applied);
     untouched = applied;
     const iw_refusal_t result = iw_gateway_drive(&rig->gateway, rig->now_us, request->id, &drive, &applied);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
         if (memcmp(&applied, &untouched, sizeof applied) != 0) {
@@ -99,7 +99,7 @@ static void settle_assumption(rig_t *rig) {
 
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_arm(&rig->gateway, rig->now_us, request->id, request->a != 0);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     } else if (is_contradicted(before)) {
@@ -113,7 +113,7 @@ static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t
 
 static void request_reset(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_reset(&rig->gateway, rig->now_us);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     }
@@ -122,7 +122,7 @@ static void request_reset(rig_t *rig, const request_t *request, const iw_gateway
 
 static void request_release(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_release(&rig->gateway);
-    tell(rig, request, result);
+    note_result(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     }
@@ -146,7 +146,7 @@ static void run_request(rig_t *rig, const request_t *request) {
         request_release(rig, request, &before);
         break;
     case EV_ONE_STOP:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         if (request->b != 0) {
             oracle_shutdown(&rig->oracle, rig->now_us);
         }
@@ -155,12 +155,12 @@ static void run_request(rig_t *rig, const request_t *request) {
         oracle_stop(&rig->oracle, rig->now_us, true);
         break;
     case EV_ONE_ESTOP:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         iw_gateway_estop(&rig->gateway, rig->now_us, request->id);
         oracle_soft_estop(&rig->oracle, rig->now_us);
         break;
     case EV_DISCONNECT:
-        tell(rig, request, IW_REFUSE_NONE);
+        note_result(rig, request, IW_REFUSE_NONE);
         iw_gateway_disconnect(&rig->gateway, rig->now_us, request->id);
         oracle_stop(&rig->oracle, rig->now_us,
                     request->id == rig->oracle.holder || request->id == rig->oracle.pending_arm);

@@ -415,7 +415,7 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
 }
 
-/// In silence nothing may come out: after the zeros have ended, the next step takes back every setpoint that is not echoed in time.
+/// Nothing may be sent in silence: after the last zero, the next step purges each setpoint that is not echoed in time.
 static void judge_silence(oracle_t *self, iw_time_us_t now_us, iw_time_us_t handed_us) {
     const iw_time_us_t given_us = oracle_us(self->config->echo_ms) + oracle_us(self->config->period_ms) + 10U * MS;
     const bool runs = now_us - self->step_us < oracle_us(self->config->period_ms) + 10U * MS &&

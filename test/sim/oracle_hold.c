@@ -2,8 +2,8 @@
 // after_stop = hold: zeros after a stop or a latch have no end but release, arm, another master and the end of the process.
 #include "oracle_parts.h"
 
-/// By this time a hold must be reported: the ramp, the shortest hold and the previous step.
-#define TOLD_US (4000U * MS)
+/// A hold must be reported after this time: the ramp, the shortest hold and the previous step.
+#define REPORT_US (4000U * MS)
 
 void oracle_hold_asked(oracle_t *self) {
     self->hold_active = self->config->hold;
@@ -59,8 +59,8 @@ void oracle_judge_hold(oracle_t *self, iw_time_us_t now_us) {
     if (seen.holding && !holds && !self->hold_unsure) {
         oracle_break(self, now_us, 821, "a hold is reported although it has ended or was never requested");
     }
-    if (holds && !seen.holding && !seen.arming && oracle_elapsed(now_us, since_us, TOLD_US) &&
-        now_us - self->late_us > TOLD_US) {
+    if (holds && !seen.holding && !seen.arming && oracle_elapsed(now_us, since_us, REPORT_US) &&
+        now_us - self->late_us > REPORT_US) {
         oracle_break(self, now_us, 820, "zeros are to be held, and no hold is reported");
     }
     // The zeros for the dead process have become a hold of this process.

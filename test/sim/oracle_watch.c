@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-/// An echo that takes longer than this shows that the bus does not accept frames as it should.
+/// An echo that takes longer than this shows that the bus does not accept frames in time.
 #define SLOW_ECHO_US (20U * MS)
 /// Additional time for a condition that must last: the time between steps.
 #define MARGIN_US (70U * MS)
@@ -72,19 +72,19 @@ static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, u
 
 static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bool comparable) {
     oracle_wheel_t *const wheel = &self->wheel[side];
-    const int32_t told = wheel->speed;
+    const int32_t commanded = wheel->speed;
     const int32_t measured = (int32_t)((int64_t)wheel->rpm * 20106 / 1000);
-    const bool against = comparable && abs(told) > 105 && abs(measured) > 105 && (told > 0) != (measured > 0);
-    const int32_t most = (abs(told) > abs(wheel->before)) ? abs(told) : abs(wheel->before);
+    const bool against = comparable && abs(commanded) > 105 && abs(measured) > 105 && (commanded > 0) != (measured > 0);
+    const int32_t most = (abs(commanded) > abs(wheel->before)) ? abs(commanded) : abs(wheel->before);
     const bool faster = comparable && abs(measured) - most > self->config->follow_mm_s + 25;
-    const bool blocked = comparable && abs(told) >= 100 && abs(measured) * 5 + 100 < abs(told) &&
+    const bool blocked = comparable && abs(commanded) >= 100 && abs(measured) * 5 + 100 < abs(commanded) &&
                          iw_gateway_state(self->gateway) == IW_STATE_ARMED;
     if (since(&wheel->against_us, now_us, against, 300)) {
         oracle_break(self, now_us, 706, "not LATCHED although a wheel turns against its command");
     }
     if (since(&wheel->faster_us, now_us, faster, self->config->follow_ms)) {
         oracle_break(self, now_us, 707, "not LATCHED although a wheel is too fast: %d instead of %d mm/s", measured,
-                     told);
+                     commanded);
     }
     if (since(&wheel->blocked_us, now_us, blocked, self->config->blocked_ms)) {
         oracle_break(self, now_us, 708, "still ARMED although a wheel is blocked");

@@ -364,7 +364,7 @@ static void heal(rig_t *rig) {
         sim_wheel_slow(&rig->world.pair.wheel[side], rig->scenario->slow_permille);
     }
     clients_all_gone(rig);
-    port_lose_bus(rig); // The interface is taken down and up: swallowed frames are dropped.
+    port_lose_bus(rig); // The interface goes down and up: the lost frames are dropped.
 }
 
 static bool turning(const rig_t *rig) {

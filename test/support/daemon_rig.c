@@ -67,9 +67,9 @@ void iwl_bus_poll(iwl_backend_store_t *self, iw_time_us_t now_us) {
     (void)now_us;
 }
 
-void iwl_bus_waited(iwl_backend_store_t *self, bool told) {
+void iwl_bus_waited(iwl_backend_store_t *self, bool ready) {
     (void)self;
-    (void)told;
+    (void)ready;
 }
 
 iw_time_us_t iwl_bus_next_us(const iwl_backend_store_t *self) {

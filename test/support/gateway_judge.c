@@ -133,9 +133,9 @@ void gateway_judge_before(gateway_judge_t *self, bool pressed, iw_time_us_t late
 static void judge_gap(gateway_judge_t *self) {
     const fake_bus_t *const bus = self->bus;
     const bool sending = iw_permit_demand(&self->gateway->permit) != IW_DEMAND_SILENCE;
-    const bool takes = bus->state >= IW_BUS_PASSIVE && bus->acknowledged && bus->send_result[IW_LEFT] > 0 &&
-                       bus->send_result[IW_RIGHT] > 0 && bus->flights == 0;
-    if (!sending || !takes) {
+    const bool accepts = bus->state >= IW_BUS_PASSIVE && bus->acknowledged && bus->send_result[IW_LEFT] > 0 &&
+                         bus->send_result[IW_RIGHT] > 0 && bus->flights == 0;
+    if (!sending || !accepts) {
         self->gap_us = bus->now_us;
     }
     for (size_t side = 0; side < IW_SIDES; side++) {

@@ -19,15 +19,15 @@ static inline iw_status_t message_encode(const message_t *message, iw_can_frame_
 
 /// Returns true and the message if the frame is one.
 static inline bool message_decode(const iw_can_frame_t *frame, message_t *out_message) {
-    iw_codec_wheel_t told[IW_SIDES] = {{{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}},
-                                       {{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}}};
-    const iw_codec_kind_t kind = iw_codec_decode(frame, told);
+    iw_codec_wheel_t decoded[IW_SIDES] = {{{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}},
+                                          {{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}}};
+    const iw_codec_kind_t kind = iw_codec_decode(frame, decoded);
     if (kind >= IW_CODEC_KINDS) {
         return false;
     }
     out_message->kind = kind;
     out_message->side = iw_codec_side(frame->id);
-    out_message->as = told[out_message->side];
+    out_message->as = decoded[out_message->side];
     return true;
 }
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The event `state` for a watcher, from a gateway that drives two wheels, for a counter of instructions.
 ///
-///     bench_status kept ROUNDS    no assumption has changed since the previous event
-///     bench_status anew ROUNDS    an assumption has changed each time
-///     bench_status line           prints one event
+///     bench_status same ROUNDS       no assumption has changed since the previous event
+///     bench_status changed ROUNDS    an assumption has changed each time
+///     bench_status line              prints one event
 ///
 /// Two runs with different ROUNDS differ only in the events. Exit status 1 if the gateway does not drive or an event is incomplete.
 #include "answers/answers.h"
@@ -58,7 +58,7 @@ static void bench_status(void) {
 
 int main(int argc, char **argv) {
     rounds = (argc > 2) ? (unsigned)strtoul(argv[2], NULL, 10) : 0U;
-    changes = argc > 1 && strcmp(argv[1], "anew") == 0;
+    changes = argc > 1 && strcmp(argv[1], "changed") == 0;
     prints = argc > 1 && strcmp(argv[1], "line") == 0;
     UNITY_BEGIN();
     RUN_TEST(bench_status);

@@ -49,9 +49,9 @@ static int nothing(void *context) {
 }
 
 static void wheel_speaks(iw_side_t side) {
-    const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
+    const iw_codec_wheel_t message = {.speed = {.speed_rpm = rpm}};
     iw_can_frame_t *const frame = &bus.frame[(bus.first + bus.count) % QUEUE];
-    (void)iw_codec_encode(IW_CODEC_SPEED, side, &told, frame);
+    (void)iw_codec_encode(IW_CODEC_SPEED, side, &message, frame);
     bus.count++;
 }
 
@@ -128,7 +128,7 @@ int bench_frame_in(void) {
 
 static iw_snapshot_t seen;
 
-/// Takes a snapshot of everything.
+/// Reads one snapshot.
 void bench_look(void) {
     iw_gateway_snapshot(&gateway, gateway.promised_us, &seen);
 }

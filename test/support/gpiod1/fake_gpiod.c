@@ -93,11 +93,11 @@ void gpiod_line_close_chip(struct gpiod_line *line) {
     }
 }
 
-static int give(struct gpiod_line *line, int flags, bool both) {
+static int request_line(struct gpiod_line *line, int flags, bool both) {
     fake_gpio.offset = (unsigned)((char *)(void *)line - &lines[1][0]);
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
-    fake_gpio.room = 16U; // libgpiod 1 has no choice here.
+    fake_gpio.room = 16U; // libgpiod 1 always uses this size.
     fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
     errno = fake_gpio.busy_error;
     if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {
@@ -109,12 +109,12 @@ static int give(struct gpiod_line *line, int flags, bool both) {
 
 int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
     (void)consumer;
-    return give(line, flags, true);
+    return request_line(line, flags, true);
 }
 
 int gpiod_line_request_rising_edge_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
     (void)consumer;
-    return give(line, flags, false);
+    return request_line(line, flags, false);
 }
 
 int gpiod_line_event_get_fd(struct gpiod_line *line) {
