@@ -129,14 +129,14 @@ def pytest_runtest_makereport(item, call):
     report.failures, report.claims = [], []
     if report.when == "call":
         rigs = [one for one in (item.funcargs or {}).values() if not isinstance(one, type)]  # rig_type is a type and has no output.
-        report.sections += [("its programs said", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
+        report.sections += [("output of its programs", one.said()) for one in rigs if report.failed and hasattr(one, "said")]
     if report.failed:
         error = call.excinfo.value if call.excinfo else report.longreprtext
         text = error if isinstance(error, str) else words_of(error)
-        told = verdict.of_text("\n".join([text, *(said for _, said in report.sections)]))
+        judged = verdict.of_text("\n".join([text, *(said for _, said in report.sections)]))
         if isinstance(error, verdict.Found):
             report.longrepr = str(error)
-        report.failures, report.claims = getattr(error, "failures", told.failures), told.claims
+        report.failures, report.claims = getattr(error, "failures", judged.failures), judged.claims
     evidence = evidence_of(item) if report.when == "call" else []
     report.claims += [claim for one in evidence for claim in one.claims]
     report.stalls = [stall for one in evidence for stall in one.stalls]
@@ -183,7 +183,7 @@ def limit_of(items):
 
 
 def apart(function, limit_s):
-    """Runs the function in a process and session of its own, kills that session afterwards, and returns the result, or a text that says how the process ended."""
+    """Runs the function in a separate process and session, and kills that session afterwards. Returns the result, or a text on how the process ended."""
     ours, theirs = multiprocessing.Pipe(duplex=False)
     child = os.fork()
     if child == 0:
@@ -275,7 +275,7 @@ class Run(verdict.Session):
         tempfile.tempdir = os.environ["TMPDIR"] = self.folder
         virtual = self.config.option.virtual
         self.nursery = (self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)(self.config, self.units)
-        super().__init__(self.work_off, self.tell, None if virtual else verdict.Witness(getattr(self.config, "witness_nice", 0)))
+        super().__init__(self.work_off, self.forward, None if virtual else verdict.Witness(getattr(self.config, "witness_nice", 0)))
 
     def stalls(self, begin_us, end_us):
         """There are no stalls in virtual time."""
@@ -310,7 +310,7 @@ class Run(verdict.Session):
         failures = [verdict.Failure(*failure) for failure in failures]
         return verdict.Attempt(failures, claims=claims, stalls=stalls, tests=tests, skips=len(skips), data=reports, **answer)
 
-    def tell(self, name, kind, attempt, tries):
+    def forward(self, name, kind, attempt, tries):
         """Passes the reports of the last attempt to pytest's other plugins, with the verdict."""
         with self.lock:
             if self.over:
@@ -324,7 +324,7 @@ class Run(verdict.Session):
                     self.skipped[report.nodeid] = f"skip: {report.nodeid}: {report.longrepr[2].removeprefix('Skipped: ')}"
                 more = [f"attempt {tries}, alone"] if tries > 1 else []
                 more += [f"longest stall {self.stall_ms(attempt):.0f} ms"] if report.failed else []
-                report.told = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
+                report.summary = ", ".join([f"{report.duration:.1f} s", *(getattr(report, "figures", [])), *more])
                 if report.when == "setup":
                     self.config.hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
                 self.config.hook.pytest_runtest_logreport(report=report)
@@ -352,15 +352,15 @@ def attempts_inside(session):
 def report_of(nodeid, location, attempt):
     """A report for an attempt without one of pytest: no test, or a process that sent none."""
     text = "\n".join(failure.text for failure in attempt.failures)
-    outcome, told = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
-    return pytest.TestReport(nodeid, location, {}, outcome, told, "call")
+    outcome, longrepr = ("failed", text) if text else ("skipped", (*location[:2], attempt.skip)) if attempt.skip else ("passed", None)
+    return pytest.TestReport(nodeid, location, {}, outcome, longrepr, "call")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_report_teststatus(report):
     """With -v: the duration, the measurements and the number of the attempt."""
-    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "told") and not hasattr(report, "context"):  # No subtest.
-        return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.told})"
+    if report.when == "call" and report.outcome in ("passed", "failed") and hasattr(report, "summary") and not hasattr(report, "context"):  # No subtest.
+        return report.outcome, ".F"[report.failed], f"{report.outcome.upper()} ({report.summary})"
     return None
 
 

@@ -33,23 +33,23 @@ FAULTS = (
         "test_crash_behind_a_collected_failure_is_final",
     ),
     ("a skip hides what was found before it", "except (Exception, pytest.skip.Exception,", "except (AssertionError,", "test_skip_hides_no_failure"),
-    ("the kind of a failure is lost", 'getattr(error, "failures", told.failures)', "told.failures", "test_collected_rule_is_final"),
-    ("what a program printed is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
-    ("what a fixture's programs said is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
+    ("the kind of a failure is lost", 'getattr(error, "failures", judged.failures)', "judged.failures", "test_collected_rule_is_final"),
+    ("the output of a program is not judged", "(said for _, said in report.sections)", "()", "test_sanitizer_report_is_final"),
+    ("the output of a fixture's programs is not judged", 'report.failed and hasattr(one, "said")]', "False]", "test_words_of_a_fixture_are_judged"),
     ("a fixture that is a type hides the failure", "if not isinstance(one, type)]", "]", "test_fixture_that_is_a_type_hides_no_failure"),
     ("stalls that the test measured are lost", "for stall in one.stalls]", "for stall in ()]", "test_stall_that_the_test_measured_counts"),
-    ("the gateway's own word is lost", "told.failures), told.claims", "told.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
+    ("the gateway's own report is lost", "judged.failures), judged.claims", "judged.failures), []", "test_gateway_late_next_to_a_late_machine_is_repeated"),
     (
-        "the gateway's own word is enough",
+        "the gateway's own report is enough",
         "claims=claims, stalls=stalls,",
         "claims=[], stalls=stalls + claims,",
         "test_gateway_late_on_a_quiet_machine_is_final",
     ),
-    ("a crash is a matter of time", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
+    ("a crash counts as late", "[verdict.Failure(answer, verdict.CRASH)]", "[verdict.Failure(answer)]", "test_crash_is_final"),
     ("a crash passes", "return verdict.Attempt([verdict.Failure(answer, verdict.CRASH)])", "return verdict.Attempt()", "test_crash_is_final"),
-    ("no end in time", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
-    ("what a test leaves behind lives on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
-    ("other users are kept from the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
+    ("no time limit", "not ours.poll(limit_s)", "not ours.poll(None)", "test_hang_is_final"),
+    ("remaining processes of a test live on", "os.killpg(child, signal.SIGKILL)", "os.kill(child, signal.SIGKILL)", "test_nothing_is_left_behind"),
+    ("other users cannot enter the folder of the tests", "os.chmod(self.folder, 0o1777)", "pass", "test_other_users_may_enter_the_folder_of_all_tests"),
     (
         "attempts share their output",
         "    capture.stop_global_capturing()",
@@ -68,23 +68,23 @@ FAULTS = (
         "shared = False",
         "test_class_that_prepares_once_is_one_attempt",
     ),
-    ("tests that are together run apart", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
-    ("a stall explains what is exact", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
-    ("a test counts as one, whatever it says", '.get("tests", 1)', '.get("test", 1)', "test_number_of_tests_of_a_test_counts"),
+    ("tests of one group run separately", "if mark else item.parent.nodeid", "if False else item.parent.nodeid", "test_tests_together_are_one_attempt"),
+    ("a stall excuses an exact test", 'if items[0].get_closest_marker("exact"):', "if False:", "test_exact_test_is_final"),
+    ("a test always counts as one", '.get("tests", 1)', '.get("test", 1)', "test_number_of_tests_of_a_test_counts"),
     ("skipped tests of a class pass", "skips=len(skips)", "skips=0", "test_class_that_prepares_once_is_one_attempt"),
     (
-        "others hear of each attempt",
+        "other plugins receive each attempt",
         'report.outcome, report.longrepr = "skipped"',
-        'report.told, report.longrepr = "skipped"',
+        'report.summary, report.longrepr = "skipped"',
         "test_late_on_a_late_machine_is_not_judged",
     ),
     ("pytest's own status wins", "session.exitstatus = MISSING if", "_ = MISSING if", "test_late_on_a_late_machine_is_not_judged"),
-    ("what was skipped has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
+    ("a skipped test has no name", "print(*kept, *run.skipped.values(),", "print(*kept,", "test_late_on_a_late_machine_is_not_judged"),
     ("all tests run although some cannot be read", "or session.testsfailed", "", "test_broken_file_is_no_success"),
     ("the long tests always run", 'if os.environ.get("IWHEEL_FULL") != "1" and', "if False and", "test_long_tests"),
     ("the long tests never run", 'os.environ.get("IWHEEL_FULL") != "1"', "True", "test_long_tests"),
-    ("what a folder concludes is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_verdict_of_a_folder_counts"),
-    ("what a folder wants to know is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_verdict_of_a_folder_counts"),
+    ("the verdict of a folder is not counted", "session.config.hook.pytest_verdict_end(run=run)", "pass", "test_verdict_of_a_folder_counts"),
+    ("the data for a folder's verdict is lost", "for key, value in one.data.items()}", "for key, value in ()}", "test_verdict_of_a_folder_counts"),
     (
         "virtual time is real",
         '(self.config.pluginmanager.getplugin("pytest_virtual").Boots if virtual else Nursery)',
@@ -92,12 +92,12 @@ FAULTS = (
         "test_each_test_of_each_share_is_judged_once_inside",
     ),
     (
-        "what a kernel did not get to passes",
+        "a test that its kernel did not run passes",
         'self.answers[name].put(f"{why}\\n{boot.complaint()}")',
         "self.answers[name].put(verdict.Attempt())",
         "test_kernel_that_ends_early_fails_the_remaining_tests",
     ),
-    ("without a kernel all is well", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
+    ("tests without a kernel pass", "MISSING if", "0 if", "test_without_a_kernel_nothing_is_judged"),
     (
         "what is for real time runs in virtual time",
         "items[:] = [item for item in items if item not in native]",
@@ -285,7 +285,7 @@ class Conclusive(Made):
     def test_hang_is_final(self):
         output = self.final('@pytest.mark.limit(1)\ndef test_one():\n    note("tried")\n    time.sleep(20)\n')
         self.assertIn("did not end within 1 s", output)
-        self.assertIn("in test_one", output, "Python says where it was")
+        self.assertIn("in test_one", output, "Python reports the function")
 
     def test_end_of_the_forking_process_is_final(self):
         self.final('def test_one():\n    note("tried")\n    os.kill(os.getppid(), 9)\n    time.sleep(20)\n')
@@ -580,7 +580,7 @@ class Chosen(Made):
 
 
 class Virtual(Made):
-    """The kernel is a process that immediately does what the plan says."""
+    """The kernel is a process that immediately carries out the plan."""
 
     BOOT = """
         import sys
@@ -597,33 +597,33 @@ class Virtual(Made):
     def virtual(self, tests, *options, kernel="return 'none'", more=""):
         return self.run_made(tests, "--virtual", *options, conftest=textwrap.dedent(self.BOOT).format(here=str(HERE), kernel=kernel) + more)
 
-    def told(self, ran):
+    def results(self, ran):
         return ran.status, ran.last, ran.notes
 
     def test_each_test_of_each_share_is_judged_once_inside(self):
         where = 'note("inside" if request.config.option.inside else "outside")'
         ran = self.virtual(f"def test_one(request):\n    {where}\n\ndef test_two(request):\n    {where}\n", "--jobs", "2")
-        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.told(ran), ran.lines)
+        self.assertEqual((0, "2 passed, 0 failed, 0 skipped", ["inside"] * 2), self.results(ran), ran.lines)
         self.assertEqual({"test_one": "passed", "test_two": "passed"}, ran.cases)
 
     def test_nothing_is_excused_in_virtual_time(self):
         ran = self.virtual(self.TWO.format('assert False, "not within 1 s"'), "--jobs", "1")
-        self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertEqual((1, "1 passed, 1 failed, 0 skipped", ["tried"]), self.results(ran), ran.lines)
         self.assertIn("not within 1 s", "\n".join(ran.lines))
 
     def test_kernel_that_ends_early_fails_the_remaining_tests(self):
         ran = self.virtual(self.TWO.format("os.kill(os.getppid(), 9)"), "--jobs", "1")
-        self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.told(ran), ran.lines)
+        self.assertEqual((1, "0 passed, 2 failed, 0 skipped", ["tried"]), self.results(ran), ran.lines)
         self.assertIn("its kernel ended before it did", "\n".join(ran.lines))
 
     def test_without_a_kernel_nothing_is_judged(self):
         ran = self.virtual(self.TWO.format("pass"), kernel="raise RuntimeError('no flex')")
-        self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.told(ran), ran.lines)
+        self.assertEqual((77, "0 passed, 0 failed, 2 skipped", []), self.results(ran), ran.lines)
         self.assertIn("skip: test_it.py::test_two: no virtual time: no flex", ran.lines)
 
     def test_native_test_is_left_out_of_virtual_time(self):
         tests = '@pytest.mark.native("a race")\n' + self.TWO.format("pass")
-        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.told(self.virtual(tests)))
+        self.assertEqual((0, "1 passed, 0 failed, 0 skipped", []), self.results(self.virtual(tests)))
         self.assertEqual(["tried"], self.run_made(tests).notes)
 
 
