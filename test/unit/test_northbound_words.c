@@ -176,8 +176,7 @@ TEST(test_text_of_any_code_point_is_read_back_unchanged) {
     }
 }
 
-// ---- refusals
-// ---------------------------------------------------------------------------------------------------------
+// ---- refusals -------------------------------------------------------------------------------------------------------
 
 static iw_codec_wheel_t telemetry[IW_SIDES];
 static iw_config_t config = {.rest_rpm = 2, .rest_ms = 200};

@@ -150,8 +150,7 @@ TEST(test_service_identity_of_a_damaged_message_is_none) {
     TEST_ASSERT_FALSE(ros_service_identify(message, length, 20, &caller));
 }
 
-// ---- replies
-// ----------------------------------------------------------------------------------------------------------
+// ---- replies --------------------------------------------------------------------------------------------------------
 
 TEST(test_service_reply_of_fast_dds_is_flag_and_text) {
     const uint8_t wanted[] = {0, 1, 0, 0, 1, 0, 0, 0, 3, 0, 0, 0, 'o', 'k', 0};
@@ -182,8 +181,7 @@ TEST(test_service_reply_that_does_not_fit_is_cut) {
     }
 }
 
-// ---- additions
-// --------------------------------------------------------------------------------------------------------
+// ---- additions ------------------------------------------------------------------------------------------------------
 
 static void note(ros_form_t form, uint8_t last) {
     ros_caller_t of = {.form = form, .number = 0x100000002LL};
