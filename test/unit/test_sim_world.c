@@ -278,7 +278,7 @@ TEST(test_world_babbling_high_id_delays_others_by_one_frame) {
     TEST_ASSERT_EQUAL_UINT32(20U, setpoints);
 }
 
-static void plant_everything(void) {
+static void apply_every_fault(void) {
     for (unsigned side = 0U; side < IW_SIDES; side++) {
         sim_wheel_t *const wheel = &world.pair.wheel[side];
         wheel->muted = true;
@@ -303,7 +303,7 @@ static void plant_everything(void) {
 
 TEST(test_world_heal_undoes_every_fault) {
     run_until(START_US + SECOND);
-    plant_everything();
+    apply_every_fault();
     sim_world_heal(&world, START_US + SECOND);
     uint8_t const port = sim_world_connect(&world);
     (void)drive(port, START_US + 2U * SECOND, START_US + 4U * SECOND, 300);
